@@ -1,0 +1,1 @@
+"""The stages of rrrid and the toolboxes they are made of."""

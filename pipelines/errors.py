@@ -1,0 +1,88 @@
+"""Say what is wrong, where, and what to do about it: one family of errors with stable codes.
+
+Every error a user can meet is one of four kinds, and the kind decides the exit code (cli-contract): wrong usage (2),
+rejected input (3), nothing matched (5), environment (6). The code names the row of the table of bad inputs, so that
+a message can be searched for and a test can ask for exactly it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+
+__all__ = ["EnvironmentFault", "InputRejected", "NothingMatched", "RrridError", "UsageError", "clean", "did_you_mean"]
+
+# C0 and C1 control characters, tab and newline apart: a terminal obeys them, so no text of a log may carry them out.
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+
+
+def clean(text: object, limit: int = 400) -> str:
+    """`text` as one printable line of at most `limit` characters, control characters taken out."""
+    line = " ".join(_CONTROL.sub("", str(text)).split())
+    return line if len(line) <= limit else line[: limit - 1] + "…"
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """A hint such as ", did you mean 'torque'?", or an empty string where nothing known is near."""
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f", did you mean '{near[0]}'?" if near else ""
+
+
+class RrridError(Exception):
+    """What went wrong, with a stable code, a place and a remedy.
+
+    Args:
+        code: row of the table of bad inputs, without the prefix: "F01".
+        message: what is wrong, one sentence without a full stop.
+        where: file, dataset, sample or option the message is about; may be empty.
+        remedy: what to do; may be empty.
+    """
+
+    exit_code = 70
+
+    def __init__(self, code: str, message: str, *, where: object = "", remedy: str = "") -> None:
+        self.code = f"RRID-{code}"
+        self.message = clean(message)
+        self.where = clean(where)
+        self.remedy = clean(remedy)
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        remedy = f" {self.remedy[0].upper()}{self.remedy[1:].rstrip('.')}." if self.remedy else ""
+        return f"{self.code} {place}{self.message.rstrip('.')}.{remedy}"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_rebuild, (type(self), self.code, self.message, self.where, self.remedy))
+
+    def as_dict(self) -> dict[str, str]:
+        return {"code": self.code, "where": self.where, "message": self.message, "remedy": self.remedy}
+
+
+def _rebuild(kind: type[RrridError], code: str, message: str, where: str, remedy: str) -> RrridError:
+    return kind(code.removeprefix("RRID-"), message, where=where, remedy=remedy)
+
+
+class UsageError(RrridError):
+    """The command line or a configuration is wrong."""
+
+    exit_code = 2
+
+
+class InputRejected(RrridError):
+    """A log, a recording or a model cannot be used as it is."""
+
+    exit_code = 3
+
+
+class NothingMatched(RrridError):
+    """No input fits what the command reads."""
+
+    exit_code = 5
+
+
+class EnvironmentFault(RrridError):
+    """The machine stands in the way: disk full, no permission, a lock."""
+
+    exit_code = 6

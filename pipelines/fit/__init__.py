@@ -1,0 +1,1 @@
+"""Matrices in, estimates out: least squares, identifiability. No robot words."""

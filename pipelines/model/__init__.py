@@ -1,0 +1,1 @@
+"""What we believe: the physics of an arm, as NumPy functions of its motion."""

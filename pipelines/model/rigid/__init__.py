@@ -1,0 +1,1 @@
+"""The rigid body: geometry, kinematics, inverse dynamics, base parameters."""

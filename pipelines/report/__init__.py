@@ -1,0 +1,1 @@
+"""What the reader sees. The only door to matplotlib and jinja2."""

@@ -1,0 +1,1 @@
+"""Numbers in, numbers out: filters, spectra, derivatives. No robot words."""
