@@ -1,0 +1,87 @@
+"""What every rigid body offers, and the choice between the closed form and the general recursion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.robot import RobotDescription
+
+__all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "rigid_body"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Joint motion on one time base."""
+
+    t: Array  # [s] (samples,)
+    q: Array  # [rad] (samples, joints), in the log's zero: offsets of the description are not yet added
+    dq: Array  # [rad/s] (samples, joints)
+    ddq: Array  # [rad/s^2] (samples, joints)
+
+
+@dataclass(frozen=True)
+class BaseParameter:
+    """One element of the base parameter set: its name, its unit, and the combination of link parameters it stands for."""
+
+    name: str  # "p3", or the leading standard parameter of a general arm: "Ixx2"
+    unit: str  # "kg m^2"
+    combination: str  # readable: "m3 (a3 + x3)", "Ixx2 - Iyy2 - 0.04 m3"
+
+
+@dataclass(frozen=True)
+class TorqueParts:
+    """The rigid body's torque, split. Each (samples, joints) [N m]; their sum is the torque."""
+
+    inertia: Array  # D(q) ddq
+    coriolis: Array  # c(q, dq)
+    gravity: Array  # h(q)
+
+
+class RigidBody(Protocol):
+    """A rigid arm whose torque is linear in its base parameters: τ = Y(q, dq, ddq) p, eq. (8)."""
+
+    robot: RobotDescription
+    parameters: tuple[BaseParameter, ...]
+
+    def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Y (samples, joints, parameters) for q, dq, ddq (samples, joints)."""
+        ...
+
+    def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
+        """τ = Y p (samples, joints) [N m], without forming Y where that is faster."""
+        ...
+
+    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
+        """Inertial, Coriolis and gravity torque."""
+        ...
+
+    def mass_matrix(self, q: Array, p: Array) -> Array:
+        """D(q) (samples, joints, joints) [kg m^2]."""
+        ...
+
+    def tip(self, q: Array) -> Array:
+        """Tip position (samples, 3) [m] in the base frame."""
+        ...
+
+    def known_parameters(self) -> Array | None:
+        """p of the links the description knows, (parameters,), or None where it does not know them all."""
+        ...
+
+
+@lru_cache(maxsize=64)
+def rigid_body(robot: RobotDescription) -> RigidBody:
+    """The closed form (A1)-(A5) where `robot` has the RRR arm's geometry, the general recursion otherwise."""
+    from pipelines.model.rigid import rrr
+
+    if rrr.fits(robot):
+        return rrr.RRR(robot)
+    from pipelines.model.rigid.base import BaseArm
+
+    return BaseArm(robot)
