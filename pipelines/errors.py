@@ -10,8 +10,13 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
 
-__all__ = ["EnvironmentFault", "InputRejected", "NothingMatched", "RrridError", "UsageError", "clean", "did_you_mean"]
+__all__ = ["Check", "EnvironmentFault", "InputRejected", "Interrupted", "Level", "NothingMatched", "RrridError",
+           "UsageError", "clean", "did_you_mean"]
+
+Level = Literal["ok", "warn", "repair", "reject"]
 
 # C0 and C1 control characters, tab and newline apart: a terminal obeys them, so no text of a log may carry them out.
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
@@ -64,6 +69,34 @@ def _rebuild(kind: type[RrridError], code: str, message: str, where: str, remedy
     return kind(code.removeprefix("RRID-"), message, where=where, remedy=remedy)
 
 
+@dataclass(frozen=True)
+class Check:
+    """One named check of an input and what it found: the same words as an error, but the work goes on.
+
+    "warn" continues, "repair" continues on data that had to be mended (an error under --strict), "reject" is what
+    the same input costs when a stage other than the doctor meets it. `gate` marks what --check answers with exit 1.
+    """
+
+    code: str  # with prefix: "RRID-T05"
+    level: Level
+    message: str
+    where: str = ""
+    remedy: str = ""
+    gate: bool = False
+
+    @staticmethod
+    def of(code: str, level: Level, message: str, *, where: object = "", remedy: str = "", gate: bool = False) -> Check:
+        """A check from a bare row name ("T05"), its texts made printable."""
+        return Check(f"RRID-{code}", level, clean(message), clean(where), clean(remedy), gate)
+
+    def as_dict(self) -> dict[str, object]:
+        return {"code": self.code, "level": self.level, "where": self.where, "message": self.message,
+                "remedy": self.remedy, "gate": self.gate}
+
+    def as_error(self) -> InputRejected:
+        return InputRejected(self.code.removeprefix("RRID-"), self.message, where=self.where, remedy=self.remedy)
+
+
 class UsageError(RrridError):
     """The command line or a configuration is wrong."""
 
@@ -86,3 +119,11 @@ class EnvironmentFault(RrridError):
     """The machine stands in the way: disk full, no permission, a lock."""
 
     exit_code = 6
+
+
+class Interrupted(RrridError):
+    """A signal ended the work; nothing half written is left."""
+
+    def __init__(self, signal_number: int) -> None:
+        super().__init__("P06", "interrupted", remedy="run the same command again; nothing was half written")
+        self.exit_code = 128 + signal_number

@@ -1,0 +1,58 @@
+"""What a report consists of: words, tables and figures, drawn from a finished result.
+
+A stage's `report(result)` returns one `Report`; `pipelines.report.render` turns it into one HTML file and the figures
+beside it. Nothing here imports matplotlib: a figure carries the function that will draw it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+__all__ = ["Figure", "Report", "Section", "Table", "Tone"]
+
+Tone = Literal["good", "attention", "bad", "neutral"]
+Cell = str | int | float | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under named columns. A unit stands in the column's name: "torque [N m]". Numbers are formatted on drawing."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    caption: str = ""
+    tones: tuple[Tone, ...] = ()  # one a row, where rows are good or bad
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One message, one figure. `draw(figure)` gets an empty matplotlib Figure of `size` inches and returns nothing."""
+
+    name: str  # file name without ending
+    caption: str  # says what to see
+    draw: Callable[[Any], None] = field(compare=False)
+    size: tuple[float, float] = (7.2, 3.6)  # [inch]
+    alt: str = ""  # for readers who do not see it; the caption where empty
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with paragraphs, then tables, then figures."""
+
+    title: str
+    text: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    figures: tuple[Figure, ...] = ()
+
+
+@dataclass(frozen=True)
+class Report:
+    """The verdict first, then the key figures, then the evidence."""
+
+    title: str
+    verdict: str  # one sentence
+    tone: Tone = "neutral"
+    key_figures: Table | None = None
+    sections: tuple[Section, ...] = ()
