@@ -285,8 +285,6 @@ def load_robot(source: str | Path) -> RobotDescription:
 
 def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
     """`urdf = "arm.urdf"` names a file beside the description: its kinematics become `urdf_text`."""
-    from pipelines.log.urdf import import_urdf
-
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
@@ -294,6 +292,8 @@ def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
     kinematics = table.get("kinematics")
     if not isinstance(kinematics, dict) or not isinstance(kinematics.get("urdf"), str):
         return None
+    from pipelines.log.urdf import import_urdf
+
     tip = kinematics.get("tip_link")
     arm = import_urdf(path.parent / str(kinematics.pop("urdf")), tip_link=tip if isinstance(tip, str) else None)
     kinematics["urdf_text"] = arm.urdf_text

@@ -1,0 +1,229 @@
+"""The dynamics of the RRR arm in closed form, linear in 15 base parameters.
+
+Kostić et al. 2004, eq. (8), (A4) and (A5), with the one wrong entry of the print corrected (erratum E1: the last
+trigonometric function of r34 is a cosine, as in r24). Conventions: `verified.md`, section 0.
+
+The letters: S = q2 + q3; c, s a cosine and sine; g the gravitational acceleration.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipelines.log.robot import LinkParameters, RobotDescription
+from pipelines.model.rigid import rrr_kinematics
+from pipelines.model.rigid.body import Array, BaseParameter, TorqueParts
+
+__all__ = ["RRR", "fits"]
+
+_TINY = 1e-12
+
+_MOMENT, _INERTIA = "kg m", "kg m^2"
+_PARAMETERS = (
+    ("p1", _INERTIA, "a2^2 m3 + a2 m2 (a2 + 2 x2) - Ixx2 + Iyy2"),
+    ("p2", _INERTIA, "-2 (a2 m2 y2 + Ixy2)"),
+    ("p3", _MOMENT, "m3 (a3 + x3)"),
+    ("p4", _MOMENT, "m3 y3"),
+    ("p5", _INERTIA, "a3 m3 (a3 + 2 x3) - Ixx3 + Iyy3"),
+    ("p6", _INERTIA, "2 (a3 m3 y3 + Ixy3)"),
+    ("p7", _INERTIA, "2 d2 m2 z2 + d2^2 m2 + 2 (d2 + d3) m3 z3 + (d2 + d3)^2 m3 + Iyy1 + Ixx2 + Ixx3"),
+    ("p8", _INERTIA, "-(d2 + d3) m3 y3 - Iyz3"),
+    ("p9", _INERTIA, "-a3 m3 (z3 + d2 + d3) - (d2 + d3) m3 x3 - Ixz3"),
+    ("p10", _INERTIA, "-d2 m2 y2 - Iyz2"),
+    ("p11", _INERTIA, "-a2 (m3 (z3 + d2 + d3) + m2 (d2 + z2)) - d2 m2 x2 - Ixz2"),
+    ("p12", _INERTIA, "(a2^2 + a3^2 + 2 a3 x3) m3 + a2 m2 (a2 + 2 x2) + Izz2 + Izz3"),
+    ("p13", _INERTIA, "a3 m3 (a3 + 2 x3) + Izz3"),
+    ("p14", _MOMENT, "m2 (x2 + a2) + m3 a2"),
+    ("p15", _MOMENT, "m2 y2"),
+)
+
+
+def fits(robot: RobotDescription) -> bool:
+    """Whether (A1)-(A5) describe `robot`: DH with alpha = (pi/2, 0, 0), a1 = 0, gravity along -z, no tool."""
+    if robot.convention != "dh" or len(robot.joints) != 3 or not all(robot.revolute):
+        return False
+    one, two, three = robot.joints
+    zeros = (one.alpha - math.pi / 2, two.alpha, three.alpha, one.a, *robot.gravity[:2], *robot.tool)
+    return all(abs(value) <= _TINY for value in zeros) and min(two.a, three.a, -robot.gravity[2]) > _TINY
+
+
+class RRR:
+    """The RRR arm: τ = R(q, dq, ddq) p with the 15 elements of (A4)."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        if not fits(robot):
+            raise ValueError(f"'{robot.name}' is not an RRR arm as in Kostić et al. 2004")
+        self.robot = robot
+        self.parameters = tuple(BaseParameter(*row) for row in _PARAMETERS)
+        self.geometry = rrr_kinematics.rrr_geometry(robot)
+        self._a2 = robot.joints[1].a
+        self._g = -robot.gravity[2]
+        self._offset = np.array(self.geometry.offset)
+
+    def tip(self, q: Array) -> Array:
+        return rrr_kinematics.tip(self.geometry, q)
+
+    def orientation(self, q: Array) -> Array:
+        return rrr_kinematics.orientation(self.geometry, q)
+
+    def inverse(self, tips: Array) -> rrr_kinematics.InverseKinematics:
+        return rrr_kinematics.inverse(self.geometry, tips)
+
+    def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """R (samples, 3, 15). Kostić et al. 2004, eq. (A5), with r34 as in erratum E1."""
+        trigonometry = self._trigonometry(q)
+        R = np.zeros((*np.shape(q)[:-1], 3, 15))
+        self._fill_waist_row(R[..., 0, :], trigonometry, dq, ddq)
+        self._fill_other_rows(R[..., 1, :], R[..., 2, :], trigonometry, dq, ddq)
+        return R
+
+    def _fill_waist_row(self, one: Array, trigonometry: tuple[Array, ...], dq: Array, ddq: Array) -> None:
+        c2, s2, _, _, cS, sS = trigonometry
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = _doubled(trigonometry)
+        v1, v2, v3 = np.moveaxis(dq, -1, 0)
+        u1, u2, u3 = np.moveaxis(ddq, -1, 0)
+        a2, v, u = self._a2, v2 + v3, u2 + u3
+        v12, v13, v1v = v1 * v2, v1 * v3, v1 * v
+        one[..., 0] = u1 * c2**2 - v12 * sin22
+        one[..., 1] = 0.5 * u1 * sin22 + v12 * cos22
+        one[..., 2] = 2 * a2 * ((u1 * cS - v13 * sS) * c2 - v12 * sin223)
+        one[..., 3] = -2 * a2 * ((u1 * sS + v13 * cS) * c2 + v12 * cos223)
+        one[..., 4] = u1 * cS**2 - v1v * sin2S
+        one[..., 5] = -0.5 * u1 * sin2S - v1v * cos2S
+        one[..., 6] = u1
+        one[..., 7] = u * cS - v**2 * sS
+        one[..., 8] = u * sS + v**2 * cS
+        one[..., 9] = -(v2**2) * s2 + u2 * c2
+        one[..., 10] = v2**2 * c2 + u2 * s2
+
+    def _fill_other_rows(self, two: Array, three: Array, trigonometry: tuple[Array, ...], dq: Array,
+                         ddq: Array) -> None:
+        c2, s2, c3, s3, cS, sS = trigonometry
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = _doubled(trigonometry)
+        v1, v2, v3 = np.moveaxis(dq, -1, 0)
+        u1, u2, u3 = np.moveaxis(ddq, -1, 0)
+        a2, g, half = self._a2, self._g, 0.5 * v1**2
+        turning, slanted = 0.5 * v3**2 + v2 * v3, u2 + 0.5 * u3
+        two[..., 0] = half * sin22
+        two[..., 1] = -half * cos22
+        two[..., 2] = 2 * a2 * (slanted * c3 - turning * s3 + half * sin223) + g * cS
+        two[..., 3] = 2 * a2 * (-slanted * s3 - turning * c3 + half * cos223) - g * sS
+        two[..., 4] = half * sin2S
+        two[..., 5] = half * cos2S
+        two[..., 7] = u1 * cS
+        two[..., 8] = u1 * sS
+        two[..., 9] = u1 * c2
+        two[..., 10] = u1 * s2
+        two[..., 11] = u2
+        two[..., 12] = u3
+        two[..., 13] = g * c2
+        two[..., 14] = -g * s2
+
+        three[..., 2] = a2 * ((half + v2**2) * s3 + c3 * u2 + half * sin223) + g * cS
+        three[..., 3] = a2 * ((half + v2**2) * c3 - s3 * u2 + half * cos223) - g * sS
+        three[..., [4, 5, 7, 8]] = two[..., [4, 5, 7, 8]]
+        three[..., 12] = u2 + u3
+
+    def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
+        """τ (samples, 3) [N m]; `p` is (15,), or (samples, 15) where every sample has its own arm."""
+        parts = self.torque_parts(q, dq, ddq, p)
+        return parts.inertia + parts.coriolis + parts.gravity
+
+    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
+        """D(q) ddq, c(q, dq) and h(q): the terms of (A5) gathered by what they multiply."""
+        trigonometry = self._trigonometry(q)
+        D11, D12, D13, D22, D23, D33 = self._mass(trigonometry, p)
+        u1, u2, u3 = np.moveaxis(ddq, -1, 0)
+        inertia = np.stack([D11 * u1 + D12 * u2 + D13 * u3, D12 * u1 + D22 * u2 + D23 * u3,
+                            D13 * u1 + D23 * u2 + D33 * u3], axis=-1)
+        return TorqueParts(inertia, self._coriolis(trigonometry, dq, p), self._gravity(trigonometry, p))
+
+    def mass_matrix(self, q: Array, p: Array) -> Array:
+        """D(q) (samples, 3, 3) [kg m^2]."""
+        D11, D12, D13, D22, D23, D33 = np.broadcast_arrays(*self._mass(self._trigonometry(q), p))
+        entries = np.stack([D11, D12, D13, D12, D22, D23, D13, D23, D33], axis=-1)
+        return entries.reshape(*entries.shape[:-1], 3, 3)
+
+    def known_parameters(self) -> Array | None:
+        """p from the links of the description. Kostić et al. 2004, eq. (A4)."""
+        links = [joint.link for joint in self.robot.joints]
+        if any(link is None for link in links):
+            return None
+        one, two, three = (_numbers(link) for link in links if link is not None)
+        Iyy1 = one[5]
+        m2, x2, y2, z2, Ixx2, Iyy2, Izz2, Ixy2, Ixz2, Iyz2 = two
+        m3, x3, y3, z3, Ixx3, Iyy3, Izz3, Ixy3, Ixz3, Iyz3 = three
+        (_, a2, a3), (_, d2, d3) = ([getattr(j, key) for j in self.robot.joints] for key in ("a", "d"))
+        return np.array([
+            a2**2 * m3 + a2 * m2 * (a2 + 2 * x2) - Ixx2 + Iyy2,
+            -2 * (a2 * m2 * y2 + Ixy2),
+            m3 * (a3 + x3),
+            m3 * y3,
+            a3 * m3 * (a3 + 2 * x3) - Ixx3 + Iyy3,
+            2 * (a3 * m3 * y3 + Ixy3),
+            2 * d2 * m2 * z2 + d2**2 * m2 + 2 * (d2 + d3) * m3 * z3 + (d2 + d3)**2 * m3 + Iyy1 + Ixx2 + Ixx3,
+            -(d2 + d3) * m3 * y3 - Iyz3,
+            -a3 * m3 * (z3 + d2 + d3) - (d2 + d3) * m3 * x3 - Ixz3,
+            -d2 * m2 * y2 - Iyz2,
+            -a2 * (m3 * (z3 + d2 + d3) + m2 * (d2 + z2)) - d2 * m2 * x2 - Ixz2,
+            (a2**2 + a3**2 + 2 * a3 * x3) * m3 + a2 * m2 * (a2 + 2 * x2) + Izz2 + Izz3,
+            a3 * m3 * (a3 + 2 * x3) + Izz3,
+            m2 * (x2 + a2) + m3 * a2,
+            m2 * y2,
+        ])
+
+    def _trigonometry(self, q: Array) -> tuple[Array, ...]:
+        """cos and sin of q2, q3 and S; of S by the addition theorem, which costs a third of two more calls."""
+        q2, q3 = q[..., 1] + self._offset[1], q[..., 2] + self._offset[2]
+        c2, s2, c3, s3 = np.cos(q2), np.sin(q2), np.cos(q3), np.sin(q3)
+        return c2, s2, c3, s3, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
+
+    def _mass(self, trigonometry: tuple[Array, ...], p: Array) -> tuple[Array, ...]:
+        """D11, D12, D13, D22, D23, D33: what multiplies ddq in (A5).
+
+            D11 = p1 c2^2 + p2 s2 c2 + 2 a2 c2 (p3 cS - p4 sS) + p5 cS^2 - p6 sS cS + p7
+            D13 = p8 cS + p9 sS;  D12 = D13 + p10 c2 + p11 s2
+            D22 = p12 + 2 a2 (p3 c3 - p4 s3);  D23 = p13 + a2 (p3 c3 - p4 s3);  D33 = p13
+        """
+        c2, s2, c3, s3, cS, sS = trigonometry
+        p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11, p12, p13, _, _ = np.moveaxis(np.asarray(p), -1, 0)
+        D11 = (p1 * c2 + p2 * s2 + 2 * self._a2 * (p3 * cS - p4 * sS)) * c2 + (p5 * cS - p6 * sS) * cS + p7
+        D13 = p8 * cS + p9 * sS
+        bent = self._a2 * (p3 * c3 - p4 * s3)
+        return D11, D13 + p10 * c2 + p11 * s2, D13, p12 + 2 * bent, p13 + bent, p13
+
+    def _coriolis(self, trigonometry: tuple[Array, ...], dq: Array, p: Array) -> Array:
+        """c(q, dq): what is left of (A5) without ddq and g."""
+        c2, s2, c3, s3, cS, sS = trigonometry
+        v1, v2, v3 = np.moveaxis(dq, -1, 0)
+        p1, p2, p3, p4, p5, p6, _, p8, p9, p10, p11, _, _, _, _ = np.moveaxis(np.asarray(p), -1, 0)
+        a2, v, half = self._a2, v2 + v3, 0.5 * v1**2
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = _doubled(trigonometry)
+        upper, fore, both = p1 * sin22 - p2 * cos22, p5 * sin2S + p6 * cos2S, a2 * (p3 * sin223 + p4 * cos223)
+        bent = a2 * (p3 * s3 + p4 * c3)
+        return np.stack([
+            -v1 * (v2 * (upper + 2 * both) + v * fore + v3 * (2 * a2 * c2) * (p3 * sS + p4 * cS))
+            + v**2 * (p9 * cS - p8 * sS) + v2**2 * (p11 * c2 - p10 * s2),
+            half * (upper + fore + 2 * both) - (v3 + 2 * v2) * v3 * bent,
+            half * (fore + both + bent) + v2**2 * bent,
+        ], axis=-1)
+
+    def _gravity(self, trigonometry: tuple[Array, ...], p: Array) -> Array:
+        """h(q): h3 = g (p3 cS - p4 sS);  h2 = h3 + g (p14 c2 - p15 s2);  h1 = 0, for the first axis is vertical."""
+        c2, s2, _, _, cS, sS = trigonometry
+        p3, p4, p14, p15 = np.moveaxis(np.asarray(p)[..., [2, 3, 13, 14]], -1, 0)
+        h3 = self._g * (p3 * cS - p4 * sS)
+        return np.stack([np.zeros_like(h3), h3 + self._g * (p14 * c2 - p15 * s2), h3], axis=-1)
+
+
+def _doubled(trigonometry: tuple[Array, ...]) -> tuple[Array, ...]:
+    """sin and cos of 2 q2, of 2 S and of 2 q2 + q3."""
+    c2, s2, _, _, cS, sS = trigonometry
+    return (2 * s2 * c2, c2**2 - s2**2, 2 * sS * cS, cS**2 - sS**2, s2 * cS + c2 * sS, c2 * cS - s2 * sS)
+
+
+def _numbers(link: LinkParameters) -> tuple[float, ...]:
+    """m x y z Ixx Iyy Izz Ixy Ixz Iyz."""
+    return (link.mass, *link.com, *link.inertia)

@@ -1,0 +1,32 @@
+"""What several tests share."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+_REPO = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of reference material beside the repository. Without it a test fails, it does not skip."""
+    folder = _REPO.parent / "shared"
+    assert folder.is_dir(), f"{folder} is missing: these tests compare with the reference material there"
+    return folder
+
+
+@pytest.fixture(scope="session")
+def vectors(shared: Path) -> dict[str, Any]:
+    """reference_vectors.json: what independent programs computed for the RRR arm."""
+    content: dict[str, Any] = json.loads((shared / "reference" / "reference_vectors.json").read_text())
+    return content
+
+
+@pytest.fixture(scope="session")
+def samples() -> Path:
+    """The sample logs of the repository."""
+    return _REPO / "sample_logs"
