@@ -1,0 +1,123 @@
+"""Write files so that a reader sees the old one or the new one, never anything else.
+
+A file is written under a hidden name beside its target, flushed to the disk and moved over it in one step. A folder is
+filled under a hidden name and exchanged with its predecessor in one step.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from pipelines.errors import EnvironmentFault
+
+__all__ = ["environment_faults", "replace_folder", "staging_folder", "write_file"]
+
+_MARK = ".rrrid-tmp-"
+
+
+@contextlib.contextmanager
+def environment_faults(path: Path) -> Iterator[None]:
+    """Turn an OSError while writing below `path` into the fault of the environment that it is (exit 6)."""
+    try:
+        yield
+    except OSError as problem:
+        raise fault_of(problem, path) from problem
+
+
+def fault_of(problem: OSError, path: Path) -> EnvironmentFault:
+    """The environment fault behind an operating-system error."""
+    where = problem.filename or path
+    if problem.errno in (errno.ENOSPC, errno.EDQUOT):
+        return EnvironmentFault("P02", "no space left on the disk", where=where, remedy="free space and run again")
+    if problem.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return EnvironmentFault("F13", "permission denied", where=where, remedy="choose another --out, or change its permissions")
+    reason = os.strerror(problem.errno) if problem.errno else str(problem)
+    return EnvironmentFault("P02", f"cannot be read or written: {reason}", where=where, remedy="check the disk and the path")
+
+
+def write_file(path: Path, fill: Callable[[Path], None]) -> None:
+    """Let `fill` write a hidden file beside `path`, then move it over `path` in one step.
+
+    Raises:
+        EnvironmentFault: disk full, no permission. The old file is then untouched and nothing partial is left.
+    """
+    with environment_faults(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # The ending stays: writers choose the container by it.
+        draft = path.parent / f"{_MARK}{os.getpid()}-{secrets.token_hex(4)}{path.suffix}"
+        try:
+            fill(draft)
+            _sync(draft)
+            os.replace(draft, path)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise
+        _sync(path.parent)
+
+
+def staging_folder(target: Path) -> Path:
+    """An empty hidden folder beside `target`, to be filled and given to `replace_folder`.
+
+    What a killed process left behind for the same target is swept away first.
+    """
+    with environment_faults(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        for left in target.parent.glob(f"{_MARK}*-{target.name}"):
+            if not _alive(left):
+                shutil.rmtree(left, ignore_errors=True)
+        folder = target.parent / f"{_MARK}{os.getpid()}-{secrets.token_hex(4)}-{target.name}"
+        folder.mkdir()
+        return folder
+
+
+def replace_folder(staging: Path, target: Path) -> None:
+    """Put `staging` in the place of `target` in one step, and remove what stood there."""
+    with environment_faults(target):
+        for path in staging.rglob("*"):
+            _sync(path)
+        _sync(staging)
+        if not target.exists():
+            os.replace(staging, target)
+        elif _exchange(staging, target):
+            shutil.rmtree(staging)
+        else:
+            old = staging.with_name(f"{staging.name}.old")
+            os.replace(target, old)
+            os.replace(staging, target)
+            shutil.rmtree(old)
+        _sync(target.parent)
+
+
+def _alive(left: Path) -> bool:
+    """Is the process that made this staging folder still running?"""
+    number = left.name.removeprefix(_MARK).split("-")[0]
+    return number.isdigit() and Path(f"/proc/{number}").exists() and int(number) != os.getpid()
+
+
+def _exchange(a: Path, b: Path) -> bool:
+    """Swap two folders atomically where the kernel can (Linux renameat2, RENAME_EXCHANGE); False where it cannot."""
+    import ctypes
+
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is None:
+        return False
+    at_cwd, exchange = -100, 2
+    return bool(rename(at_cwd, os.fsencode(a.absolute()), at_cwd, os.fsencode(b.absolute()), exchange) == 0)
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as problem:
+        # Some file systems cannot sync a folder; that is no reason to lose the result.
+        if problem.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise
+    finally:
+        os.close(handle)

@@ -1,0 +1,249 @@
+"""Open, find and write logs: the one door between files on disk and `ExperimentLog`.
+
+    opened = open_log(path)         guarded, checked against digest, manifest and format; .log is in SI
+    paths, checks = find_logs([..]) the logs among files and folders
+    write_log(path, log)            .h5 or .parquet, atomically
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import stat
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pipelines.errors import Check, EnvironmentFault, InputRejected, NothingMatched, UsageError
+from pipelines.log import canonical
+from pipelines.log.atomic import fault_of, write_file
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.guard import Answer, guarded
+from pipelines.log.structure import conform, refuse_unlike_format
+
+__all__ = ["ENDINGS", "Opened", "find_logs", "hash_file", "open_log", "regular_file", "write_log"]
+
+ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
+
+_HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+_PARQUET_MAGIC = b"PAR1"
+_PROVENANCE = "provenance.json"
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A log, the file it came from, and what had to be said or mended on the way."""
+
+    path: Path
+    sha256: str
+    log: ExperimentLog
+    checks: tuple[Check, ...]
+
+
+def write_log(path: Path, log: ExperimentLog) -> None:
+    """Write `log` to `path`, the container chosen by its ending, atomically.
+
+    Raises:
+        InputRejected: the log is not what the format says.
+        UsageError: C02, the ending names no container.
+        EnvironmentFault: disk full, no permission; what stood at `path` is untouched.
+    """
+    container = ENDINGS.get(path.suffix.lower())
+    if container is None:
+        raise UsageError("C02", f"'{path.suffix}' names no container", where=path, remedy="end the name in .h5 or .parquet")
+    refuse_unlike_format(log)
+    if container == "hdf5":
+        from pipelines.log.hdf5 import write
+    else:
+        from pipelines.log.parquet import write
+    write_file(path, lambda draft: write(draft, log))
+
+
+def open_log(path: Path, *, assume_units: bool = False) -> Opened:
+    """Read the log in `path`, in a guarded child, and hold it against its digest, its manifest and the format.
+
+    Raises:
+        InputRejected: the file is damaged, hostile or not a log.
+        EnvironmentFault: no permission, or another program is writing it.
+    """
+    status = regular_file(path)
+    with _reading(path) as handle:
+        sha256 = hash_file(path)
+        container, checks = _container(path, os.pread(handle, 8, 0), status.st_size)
+        _against_manifest(path, sha256)
+        answer = guarded(lambda: _read(path, container), path)
+        after = os.fstat(handle)
+        now = path.stat()
+        if any((s.st_size, s.st_mtime_ns, s.st_ino) != (status.st_size, status.st_mtime_ns, status.st_ino) for s in (after, now)):
+            raise InputRejected("F14", "was modified while it was read", where=path, remedy="wait until the recording is finished")
+    log = canonical.parse_log_text(answer.about["text"], answer.arrays, where=str(path))
+    digest = answer.about["digest"]
+    if digest is not None and digest != canonical.digest_of(log):
+        raise InputRejected("F04", "checksum mismatch: the content does not fit its digest", where=path,
+                            remedy="copy the file again from where it was recorded")
+    if digest is None:
+        checks.append(Check.of("F05", "warn", "no integrity data: nothing would notice a flipped bit", where=path,
+                               remedy="'rrrid convert' writes a copy that has them"))
+    conformed, changes = conform(log, assume_units=assume_units)
+    return Opened(path, sha256, conformed, (*checks, *changes))
+
+
+def _read(path: Path, container: str) -> Answer:
+    if container == "hdf5":
+        from pipelines.log.hdf5 import read_parts
+    else:
+        from pipelines.log.parquet import read_parts
+    _, log, digest = read_parts(path)
+    return Answer({"text": canonical.log_text(log), "digest": digest}, {name: s.values for name, s in log.signals.items()})
+
+
+def regular_file(path: Path) -> os.stat_result:
+    """The status of `path`, which must be a regular file with something in it (F01, F12, F13)."""
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise UsageError("C04", "no such file", where=path, remedy="check the path") from None
+    except OSError as problem:
+        raise fault_of(problem, path) from None
+    except ValueError:
+        raise UsageError("C07", "not a path", where=path) from None
+    if not stat.S_ISREG(status.st_mode):
+        raise InputRejected("F12", "not a regular file", where=path, remedy="give a log, or a folder of logs")
+    if not os.access(path, os.R_OK):
+        raise EnvironmentFault("F13", "permission denied", where=path, remedy="change its permissions")
+    if status.st_size == 0:
+        raise InputRejected("F01", "empty file", where=path, remedy="copy it again, or record again")
+    return status
+
+
+class _reading:
+    """An open handle with a shared lock, which fails at once where a program is writing (F15)."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __enter__(self) -> int:
+        import fcntl
+
+        try:
+            self.handle = os.open(self.path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        except OSError as problem:
+            raise fault_of(problem, self.path) from None
+        try:
+            fcntl.flock(self.handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self.handle)
+            raise EnvironmentFault("F15", "in use by another process", where=self.path,
+                                   remedy="wait until the recording is finished") from None
+        except OSError:
+            pass  # a file system without locks cannot say; the digest will
+        return self.handle
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self.handle)
+
+
+def hash_file(path: Path) -> str:
+    """SHA-256 of the bytes of `path`, in hexadecimal."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as problem:
+        raise fault_of(problem, path) from None
+
+
+def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
+    """What the content says it is (F06); the name is only worth a warning."""
+    if magic == _HDF5_MAGIC:
+        container = "hdf5"
+        import h5py  # noqa: F401  imported before the fork, so that every child has it
+    elif magic[:4] == _PARQUET_MAGIC:
+        container = "parquet"
+        import pyarrow.parquet  # noqa: F401
+        with path.open("rb") as file:
+            file.seek(max(0, size - 4))
+            if file.read() != _PARQUET_MAGIC:
+                raise InputRejected("F07", "truncated: no footer", where=path, remedy="copy the file again from where it was recorded")
+    else:
+        raise InputRejected("F06", "neither HDF5 nor Parquet", where=path,
+                            remedy="rrrid reads logs in .h5 and .parquet, and imports .csv, .txt, .mat and .npy by a recipe")
+    if ENDINGS.get(path.suffix.lower()) == container:
+        return container, []
+    return container, [Check.of("F06", "warn", f"named '{path.suffix}', but its content is {container}; read as that", where=path,
+                                remedy="rename it")]
+
+
+def _against_manifest(path: Path, sha256: str) -> None:
+    """F05: a provenance.json or SHA256SUMS beside the file, or one folder up, may say what its bytes must be."""
+    for folder in (path.parent, path.parent.parent):
+        expected = _listed(folder, path)
+        if expected is not None and expected != sha256:
+            raise InputRejected("F05", f"sha256 differs from the manifest in {folder.name or folder}", where=path,
+                                remedy="copy the file again, or run the command that wrote it again")
+
+
+def _listed(folder: Path, path: Path) -> str | None:
+    name = path.relative_to(folder).as_posix()
+    try:
+        outputs = json.loads((folder / _PROVENANCE).read_text(encoding="utf-8"))["outputs"]
+        if isinstance(outputs.get(name), str):
+            return str(outputs[name])
+    except (OSError, ValueError, KeyError, AttributeError, TypeError):
+        pass  # no manifest, or not one of ours
+    try:
+        lines = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return None
+    return {entry.strip().lstrip("*"): value for value, _, entry in (line.partition(" ") for line in lines)}.get(name)
+
+
+def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
+    """The logs named by `inputs`: files as they are, folders searched below.
+
+    Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is named: then its logs
+    are meant. Links that lead out of a folder are passed over with a warning.
+
+    Raises:
+        UsageError: an input does not exist.
+        NothingMatched: there is no log at all.
+    """
+    found: list[Path] = []
+    checks: list[Check] = []
+    inputs = tuple(inputs)
+    for path in inputs:
+        if not path.is_dir():
+            regular_file(path)
+            found.append(path)
+            continue
+        root = path / "logs" if (path / _PROVENANCE).is_file() else path
+        found += sorted(_below(root, root.resolve(), checks))
+    if not found:
+        raise NothingMatched("C06", "no log there", where=", ".join(map(str, inputs)), remedy="logs end in .h5 or .parquet")
+    return tuple(dict.fromkeys(found)), tuple(checks)
+
+
+def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
+    found = []
+    try:
+        entries = sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except OSError as problem:
+        raise fault_of(problem, folder) from None
+    for entry in entries:
+        if entry.name.startswith("."):
+            continue
+        if entry.is_symlink() and not entry.resolve().is_relative_to(root):
+            checks.append(Check.of("X11", "warn", "link out of the folder passed over", where=entry))
+        elif entry.is_dir():
+            if not entry.is_symlink() and not (entry / _PROVENANCE).is_file():
+                found += _below(entry, root, checks)
+        elif entry.suffix.lower() in ENDINGS and not (entry.is_symlink() and not entry.exists()):
+            found.append(entry)
+    return found
+
+
+def with_source(log: ExperimentLog, path: Path) -> ExperimentLog:
+    """`log`, said to come from `path`."""
+    return replace(log, source=str(path))
