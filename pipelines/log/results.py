@@ -1,0 +1,113 @@
+"""Store any stage's result as open files, and bring it back: JSON for figures, HDF5 for long series.
+
+    text, series = encode(result)
+    result = decode(Result, json.loads(text), series)
+
+A result is a frozen dataclass of plain values, tuples, further dataclasses and arrays. Arrays of at most 64 numbers
+stand in the JSON; longer ones become series, and the JSON says which. Infinite and undefined numbers become null.
+Fields marked `metadata=NOT_STORED` (samples that are written as logs, say) are left out and come back as None.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+
+__all__ = ["NOT_STORED", "decode", "encode", "json_text", "read_series", "write_series"]
+
+NOT_STORED: Final[Mapping[str, object]] = {"stored": False}
+_INLINE = 64
+_SERIES = "$series"
+
+T = TypeVar("T")
+
+
+def encode(result: Any) -> tuple[dict[str, Any], dict[str, Array]]:
+    """`result` as a JSON object and the series that are too long for it."""
+    series: dict[str, Array] = {}
+    return _encode(result, "", series), series
+
+
+def json_text(value: Any) -> str:
+    """JSON as every file of rrrid has it: sorted keys, two blanks, null for infinite and undefined."""
+    return json.dumps(value, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _encode(value: Any, path: str, series: dict[str, Array]) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: _encode(getattr(value, field.name), f"{path}/{field.name}", series)
+                for field in dataclasses.fields(value) if field.metadata.get("stored", True)}
+    if isinstance(value, Mapping):
+        return {str(key): _encode(item, f"{path}/{key}", series) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        if value.size > _INLINE:
+            series[path] = np.asarray(value, dtype=np.float64)
+            return {_SERIES: path}
+        return _encode(value.tolist(), path, series)
+    if isinstance(value, tuple | list):
+        return [_encode(item, f"{path}/{i}", series) for i, item in enumerate(value)]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
+def decode(kind: type[T], value: Any, series: Mapping[str, Array]) -> T:
+    """The result of type `kind` that `encode` made `value` and `series` of."""
+    return typing.cast(T, _decode(kind, value, series))
+
+
+def _decode(kind: Any, value: Any, series: Mapping[str, Array]) -> Any:
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        real = [a for a in arguments if a is not type(None)]
+        return None if value is None else _decode(real[0], value, series) if len(real) == 1 else value
+    if isinstance(value, dict) and _SERIES in value:
+        return series[value[_SERIES]]
+    if origin is np.ndarray:
+        return np.array([math.nan if x is None else x for x in value] if value is not None else math.nan, dtype=np.float64)
+    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+        hints = typing.get_type_hints(kind)
+        return kind(**{field.name: _decode(hints[field.name], value[field.name], series)
+                       if field.metadata.get("stored", True) else None
+                       for field in dataclasses.fields(kind) if field.metadata.get("stored", True) is False or field.name in value})
+    if origin is tuple:
+        if len(arguments) == 2 and arguments[1] is Ellipsis:
+            return tuple(_decode(arguments[0], item, series) for item in value)
+        return tuple(_decode(a, item, series) for a, item in zip(arguments, value, strict=True))
+    if origin in (dict, Mapping) or (isinstance(origin, type) and issubclass(origin, Mapping)):
+        return {key: _decode(arguments[1], item, series) for key, item in value.items()}
+    if kind is float and value is None:
+        return math.nan
+    return float(value) if kind is float else value
+
+
+def write_series(path: Path, series: Mapping[str, Array]) -> None:
+    """The series of a result as HDF5, checksummed, each under the place where the JSON names it."""
+    import h5py
+
+    with h5py.File(path, "w", libver=("v110", "v110")) as file:
+        file.attrs["format"] = "rrrid-result"
+        for name, values in series.items():
+            file.create_dataset(name, data=values, compression="gzip", compression_opts=1, shuffle=True, fletcher32=True, track_times=False)
+
+
+def read_series(path: Path) -> dict[str, Array]:
+    """What `write_series` wrote."""
+    import h5py
+
+    found: dict[str, Array] = {}
+    with h5py.File(path, "r") as file:
+        file.visititems(lambda name, item: found.update({f"/{name}": item[()]}) if isinstance(item, h5py.Dataset) else None)
+    return found
