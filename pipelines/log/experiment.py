@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.log import schema
 from pipelines.log.robot import RobotDescription, parse_robot
 
 __all__ = ["Array", "Controller", "Derived", "ExperimentLog", "Signal"]
@@ -104,7 +105,10 @@ class ExperimentLog:
     source: str = field(default="", compare=False)  # the file it was read from; not part of the log
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
+        # One order, whatever the order they were given or stored in: equal logs make equal files.
+        order = {name: place for place, name in enumerate((*schema.SIGNALS, *schema.DERIVED))}
+        ordered = sorted(self.signals.items(), key=lambda item: (order.get(item[0], len(order)), item[0]))
+        object.__setattr__(self, "signals", MappingProxyType(dict(ordered)))
         if self.posture is not None:
             object.__setattr__(self, "posture", frozen(self.posture))
 

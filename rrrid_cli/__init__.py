@@ -1,0 +1,1 @@
+"""The command line of rrrid: parse, call one stage, print, exit."""

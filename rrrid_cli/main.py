@@ -1,0 +1,167 @@
+"""One command per stage. Parse, call, print, exit: nothing else happens here.
+
+Heavy modules are imported inside the commands: `rrrid --help` answers at once.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from pipelines.errors import Interrupted, RrridError, UsageError
+from rrrid_cli.console import Teller, say_error, say_outcome
+from rrrid_cli.options import Common, LogPaths, with_common
+
+__all__ = ["app", "entry"]
+
+STAGES = ("run", "inspect", "import", "convert")
+
+app = typer.Typer(name="rrrid", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+                  context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+                  help="Identify robot arms from logs: what the simulation gets wrong, why, and how much better it can be.")
+
+
+@app.command()
+@with_common
+def run(logs: LogPaths, common: Common) -> None:
+    """Do the whole workflow on a folder of logs; one report."""
+    from pipelines.run import STAGE
+
+    _go(STAGE, tuple(logs), common, {})
+
+
+@app.command()
+@with_common
+def inspect(logs: LogPaths, common: Common) -> None:
+    """The log doctor: check container, units, time and signals; nothing is changed."""
+    from pipelines.inspect import STAGE
+
+    _go(STAGE, tuple(logs), common, {})
+
+
+@app.command("import")
+@with_common
+def import_(
+    common: Common,
+    recipe: Annotated[str | None, typer.Argument(help="Recipe: a TOML file, or the name of a shipped one.", show_default=False)] = None,
+    source: Annotated[Path | None, typer.Option(help="Folder the recordings are in. [the recipe's]")] = None,
+    map: Annotated[list[str] | None, typer.Option(help="Column to take for a signal: q_1=Joint_1. Repeatable.")] = None,
+    guess: Annotated[Path | None, typer.Option(help="Draft a recipe for this recording, with the evidence; print it.")] = None,
+) -> None:
+    """Make logs of recordings (CSV, MAT, NPY) by a recipe."""
+    if guess is not None:
+        _guess(guess, common)
+        return
+    if recipe is None:
+        raise UsageError("C02", "no recipe", where="import", remedy="name a recipe, or draft one with --guess FILE")
+    from pipelines.import_log import STAGE
+
+    _go(STAGE, (), common, {"recipe": recipe, "source": source, "map": tuple(map or ()) or None})
+
+
+@app.command()
+@with_common
+def convert(
+    logs: LogPaths, common: Common,
+    to: Annotated[str | None, typer.Option(help="h5, parquet or csv. [the container the log is not in]")] = None,
+) -> None:
+    """Convert logs from HDF5 to Parquet and back, or to flat CSV."""
+    from pipelines.convert import STAGE
+
+    _go(STAGE, tuple(logs), common, {"to": to})
+
+
+@app.command()
+def schema(what: Annotated[str, typer.Argument(help="model")] = "model") -> None:
+    """Print the JSON schema of what rrrid writes."""
+    from pipelines.log.model_file import model_schema
+    from pipelines.log.results import json_text
+
+    if what != "model":
+        raise UsageError("C02", f"no schema of '{what}'", where="schema", remedy="one of: model")
+    sys.stdout.write(json_text(model_schema()))
+
+
+def _guess(path: Path, common: Common) -> None:
+    from pipelines.log.guess import guess_recipe
+
+    drafted = guess_recipe(path)
+    if common.out is not None:
+        raise UsageError("C02", "--guess prints its draft", where="--out", remedy="redirect it: rrrid import --guess FILE > recipe.toml")
+    if common.json:
+        from pipelines.log.results import encode, json_text
+
+        sys.stdout.write(json_text(encode(drafted)[0]))
+    else:
+        sys.stdout.write(drafted.text)
+
+
+def _go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any]) -> None:
+    """Run one stage as the options say, print its outcome, and end with its exit code."""
+    from pipelines.stage import Request, run_stage
+    from rrrid_cli.settings import make_settings
+
+    if common.format not in ("h5", "parquet"):
+        raise UsageError("C02", f"'{common.format}' is no container", where="--format", remedy="h5 or parquet")
+    settings = make_settings(stage.settings, stage.name, STAGES, common.config, common.set, given)
+    teller = Teller(common.quiet or common.json, common.verbose)
+    request = Request(paths, common.out, common.robot, common.strict, common.check, common.force, common.no_report,
+                      common.assume_units, common.format, teller)
+    try:
+        outcome = run_stage(stage, request, settings)
+    finally:
+        teller.done()
+    say_outcome(outcome, as_json=common.json, quiet=common.quiet, verbose=common.verbose)
+    raise typer.Exit(outcome.exit_code)
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> NoReturn:
+    raise Interrupted(number)
+
+
+def entry() -> NoReturn:
+    """The console script: every error becomes one line and an exit code; a traceback only with --debug."""
+    # Default threading makes the many small solves 5-10 times slower (design.md).
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGINT, _interrupt)
+    as_json, debug = "--json" in sys.argv, "--debug" in sys.argv
+    try:
+        app()
+    except RrridError as problem:
+        if debug:
+            raise
+        say_error(problem, as_json=as_json)
+        sys.exit(problem.exit_code)
+    except BrokenPipeError:
+        # The reader of a pipe has left; what is still buffered goes nowhere, without a second complaint at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except Exception as problem:
+        if debug:
+            raise
+        say_error(_internal(problem), as_json=as_json)
+        sys.exit(70)
+    sys.exit(0)
+
+
+def _internal(problem: Exception) -> RrridError:
+    """An error of ours: the traceback goes to a file, the user gets one line."""
+    import tempfile
+    import traceback
+
+    with tempfile.NamedTemporaryFile("w", prefix="rrrid-crash-", suffix=".txt", delete=False, encoding="utf-8") as file:
+        file.write(f"{' '.join(sys.argv)}\n\n")
+        traceback.print_exception(problem, file=file)
+    return RrridError("Z70", f"internal error: {type(problem).__name__}: {problem}", remedy=f"please report it with {file.name}")
+
+
+if __name__ == "__main__":
+    entry()

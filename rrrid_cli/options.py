@@ -1,0 +1,77 @@
+"""The options that every command shares, written once and put behind each command's own."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+__all__ = ["Common", "LogPaths", "with_common"]
+
+LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS")]
+
+
+@dataclass(frozen=True)
+class Common:
+    """What the shared options said."""
+
+    out: Path | None
+    json: bool
+    strict: bool
+    check: bool
+    robot: str | None
+    assume_units: bool
+    format: str
+    config: Path | None
+    set: list[str]
+    no_report: bool
+    force: bool
+    quiet: bool
+    verbose: bool
+    debug: bool
+
+
+def _flag(words: str, *names: str) -> Any:
+    return typer.Option(*names, help=words)
+
+
+_SHARED: tuple[tuple[str, Any, Any], ...] = (
+    ("out", Annotated[Path | None, _flag("Folder for everything the command leaves. [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
+    ("json", Annotated[bool, _flag("Print result.json on standard output, and nothing else there.", "--json")], False),
+    ("strict", Annotated[bool, _flag("A repair of the data is an error (exit 3).", "--strict")], False),
+    ("check", Annotated[bool, _flag("Exit 1 where a gate failed or something was found.", "--check")], False),
+    ("robot", Annotated[str | None, _flag("Robot description to use instead of the logs' own.", "--robot")], None),
+    ("assume_units", Annotated[bool, _flag("Take signals without units as SI.", "--assume-units")], False),
+    ("format", Annotated[str, _flag("Container of the logs that are written: h5 or parquet.", "--format")], "h5"),
+    ("config", Annotated[Path | None, _flag("TOML file of settings, one table a stage.", "--config")], None),
+    ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable.", "--set")], []),
+    ("no_report", Annotated[bool, _flag("Leave report and figures out.", "--no-report")], False),
+    ("force", Annotated[bool, _flag("Replace rrrid's own earlier output even where files were added to it.", "--force")], False),
+    ("quiet", Annotated[bool, _flag("Print nothing but errors.", "-q", "--quiet")], False),
+    ("verbose", Annotated[bool, _flag("Say every step.", "-v", "--verbose")], False),
+    ("debug", Annotated[bool, _flag("Show the traceback of an internal error.", "--debug")], False),
+)
+
+
+def with_common(command: Callable[..., None]) -> Callable[..., None]:
+    """`command(own options…, common)` as a command that takes the shared options as well."""
+    own = inspect.signature(command, eval_str=True)
+    names = [name for name, _, _ in _SHARED]
+    shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
+              for name, kind, default in _SHARED]
+    kept = [p for p in own.parameters.values() if p.name != "common"]
+
+    @functools.wraps(command)
+    def run(**given: Any) -> None:
+        common = Common(**{name: given.pop(name) for name in names})
+        command(**given, common=common)
+
+    parameters = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in kept] + shared
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run

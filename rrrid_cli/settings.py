@@ -1,0 +1,97 @@
+"""Make a stage's settings of its defaults, a configuration file, --set, and the command's own options, in this order."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+import types
+import typing
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pipelines.errors import UsageError, did_you_mean
+
+__all__ = ["make_settings"]
+
+S = TypeVar("S")
+
+
+def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path | None, sets: Iterable[str],
+                  given: Mapping[str, Any]) -> S:
+    """`kind` filled in; the last word has what was given on the command line.
+
+    Args:
+        stage: the command's name; only its table of the configuration is used.
+        stages: every known name, for a hint where one is misspelt.
+        given: the command's own options; None means: not given.
+
+    Raises:
+        UsageError: C01, an unknown stage or option; C02, a value of the wrong kind or range; C04, no such file.
+    """
+    chosen: dict[str, Any] = {}
+    for where, table in (*_from_file(config), *_from_sets(sets)):
+        for name, options in table.items():
+            if name not in stages:
+                raise UsageError("C01", f"'{name}' is no stage{did_you_mean(name, stages)}", where=where, remedy="write STAGE.OPTION")
+            if not isinstance(options, Mapping):
+                raise UsageError("C01", f"'{name}' is a stage, not an option", where=where, remedy=f"write [{name}] and its options below")
+            if name == stage:
+                chosen |= {key: _value(kind, key, value, f"{where}, {name}.{key}") for key, value in options.items()}
+    return kind(**(chosen | {key: value for key, value in given.items() if value is not None}))
+
+
+def _from_file(path: Path | None) -> list[tuple[str, dict[str, Any]]]:
+    if path is None:
+        return []
+    try:
+        return [(str(path), tomllib.loads(path.read_text(encoding="utf-8")))]
+    except OSError as problem:
+        raise UsageError("C04", f"cannot be read: {problem.strerror}", where=path, remedy="check the path") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
+        raise UsageError("C03", f"not valid TOML: {problem}", where=path, remedy="settings are TOML; YAML is not read") from None
+
+
+def _from_sets(sets: Iterable[str]) -> list[tuple[str, dict[str, Any]]]:
+    found = []
+    for text in sets:
+        name, equals, value = text.partition("=")
+        stage, dot, option = name.strip().partition(".")
+        if not (equals and dot and option):
+            raise UsageError("C01", f"'{text}' is not STAGE.OPTION=VALUE", where="--set", remedy="write for example convert.to=csv")
+        try:
+            parsed: Any = tomllib.loads(f"x = {value}")["x"]
+        except tomllib.TOMLDecodeError:
+            parsed = value.strip()  # a bare word is a text
+        found.append(("--set", {stage: {option: parsed}}))
+    return found
+
+
+def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
+    hints = typing.get_type_hints(kind)
+    if name not in hints:
+        known = [field.name for field in dataclasses.fields(kind)]
+        raise UsageError("C01", f"no such option{did_you_mean(name, known)}", where=where, remedy=f"there are: {', '.join(known) or 'none'}")
+    wanted = hints[name]
+    options = typing.get_args(wanted) if typing.get_origin(wanted) in (typing.Union, types.UnionType) else (wanted,)
+    for option in options:
+        fits, converted = _as_kind(option, value)
+        if fits:
+            return converted
+    raise UsageError("C02", f"{value!r} is not a {getattr(options[0], '__name__', options[0])}", where=where, remedy="correct the value")
+
+
+def _as_kind(kind: Any, value: Any) -> tuple[bool, Any]:
+    if kind is bool or isinstance(value, bool):
+        return kind is bool and isinstance(value, bool), value
+    if kind is float:
+        return isinstance(value, int | float) and math.isfinite(value), value if isinstance(value, str) else float(value) if isinstance(value, int | float) else value
+    if kind in (int, str):
+        return isinstance(value, kind), value
+    if kind is Path:
+        return isinstance(value, str), Path(str(value))
+    if typing.get_origin(kind) is tuple and isinstance(value, list):
+        inner = [_as_kind(typing.get_args(kind)[0], item) for item in value]
+        return all(fits for fits, _ in inner), tuple(item for _, item in inner)
+    return kind is type(None) and value is None, value
