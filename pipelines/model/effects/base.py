@@ -1,0 +1,191 @@
+"""What every effect offers: a physical cause is data plus one function.
+
+An effect is written by giving its words, its parameters and `columns`; all else has a default in `Effect`.
+
+    Coulomb friction     columns = tanh(w v) on its own row; nothing else
+    Cogging              columns = sin kq, cos kq; `shapes` runs over k; `values` gives amplitude and phase
+    A clipped drive      columns to screen with; `apply` = clip(predict(motion, arm))
+    An encoder fault     columns to screen with; `apply` = predict(corrected motion, arm)
+    Tilted gravity       columns to screen with; `apply` = predict(motion, arm.with_body(tilted body, p))
+
+An object is the effect in one place and one shape: `joint` and the *non-linear* numbers (speeds, orders, delays) are
+its fields. The *linear* numbers, its amplitudes, stay outside, for they are what a fit solves for:
+
+    torque = columns(motion, arm) @ amplitudes      to first order; exactly for most
+
+Torque is a load: measured torque = torque of the model + torques of the effects. Everything is computed from the motion
+and the *predicted* torque, never from measured torque, whose noise would bias it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal, Protocol, Self
+
+import numpy as np
+
+from pipelines.log.robot import RobotDescription
+from pipelines.model.rigid.body import Array, Motion, RigidBody
+
+__all__ = ["ArmModel", "Effect", "Hooks", "Predict", "Quantity", "Values"]
+
+Values = Mapping[str, float]
+
+
+class ArmModel(Protocol):
+    """What an effect may ask of the arm it acts on: the arm as modelled without this effect."""
+
+    @property
+    def robot(self) -> RobotDescription: ...
+
+    @property
+    def n_joints(self) -> int: ...
+
+    @property
+    def body(self) -> RigidBody: ...
+
+    @property
+    def p(self) -> Array:
+        """Base parameters (parameters,)."""
+        ...
+
+    def torque(self, motion: Motion) -> Array:
+        """Predicted torque (samples, joints) [N m]."""
+        ...
+
+    def with_body(self, body: RigidBody, p: Array) -> ArmModel:
+        """The same arm with another rigid body: new geometry, gravity or load."""
+        ...
+
+
+Predict = Callable[[Motion, ArmModel], Array]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One parameter of an effect: its unit and the range it is expected in before any log is seen."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    shape: bool = False  # non-linear: a field of the effect, scanned by `shapes`; otherwise an amplitude
+
+    def unit_at(self, revolute: bool) -> str:
+        """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m."""
+        if revolute:
+            return self.unit
+        return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m")
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """How an effect enters the forward simulation. What is left out changes nothing.
+
+    The first axis of every array holds replicas, so that many simulations run at once. `states` numbers of memory each
+    replica keeps; `rate` moves them in continuous time, `update` once per control sample (a delay line). The motion
+    handed in is the true one with ddq zero: what multiplies acceleration goes to `inertia` or `arm`.
+    """
+
+    load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
+    actuator: Callable[[Array, Motion, Array], Array] | None = None  # command, motion, states -> applied torque [N m]
+    sensor: Callable[[Array, Array], Array] | None = None  # true q, states -> measured q [rad]
+    inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)
+    arm: ArmModel | None = None  # the arm as it truly is
+    states: int = 0
+    rate: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> d(states)/dt
+    update: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> next states
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """A physical cause at one joint, or of the whole arm."""
+
+    joint: int | None = None  # 1-based; None where scope is "arm"
+
+    name: ClassVar[str]  # identifier of causes.md, and the file's name
+    title: ClassVar[str]  # plain words
+    scope: ClassVar[Literal["joint", "arm"]] = "joint"
+    parameters: ClassVar[tuple[Quantity, ...]]
+    signature: ClassVar[str]  # how it shows
+    explanation: ClassVar[str]  # what it is
+    remedy: ClassVar[str]  # what to do about it
+    experiment: ClassVar[str]  # what to record to be sure
+    twins: ClassVar[tuple[str, ...]] = ()  # effects it can be mistaken for
+    absorbed_by: ClassVar[tuple[str, ...]] = ()  # base parameters that hide it
+    needs: ClassVar[tuple[str, ...]] = ()  # what beyond position and torque it takes to see it: "reference log"
+    friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
+
+    def __post_init__(self) -> None:
+        if (self.scope == "joint") != (self.joint is not None and self.joint >= 1):
+            where = "one joint, counted from 1" if self.scope == "joint" else "the whole arm"
+            raise ValueError(f"{self.name} belongs to {where}, not to joint {self.joint}")
+
+    @abstractmethod
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        """Its torque per unit of each amplitude, to first order, (samples, joints, amplitudes)."""
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """Itself with every combination of non-linear numbers worth trying on this motion."""
+        yield self
+
+    @classmethod
+    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
+        """One at every joint, or the one of the whole arm."""
+        return tuple(cls(joint=k + 1) for k in range(n_joints)) if cls.scope == "joint" else (cls(),)
+
+    def at(self, values: Values) -> Self:
+        """Itself with the non-linear numbers out of `values`."""
+        shape: dict[str, Any] = {q.name: values[q.name] for q in self.parameters if q.shape}
+        return replace(self, **shape)
+
+    def amplitudes(self, values: Values) -> Array:
+        """The amplitudes that belong to `values`, in the order of the columns."""
+        return np.array([values[q.name] for q in self.parameters if not q.shape])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        """Every parameter by name; the inverse of `at` and `amplitudes`."""
+        linear = iter(amplitudes)
+        return {q.name: float(getattr(self, q.name) if q.shape else next(linear)) for q in self.parameters}
+
+    def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
+        """Its torque (samples, joints) [N m]."""
+        return np.asarray(self.at(values).columns(motion, arm) @ self.amplitudes(values))
+
+    def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
+        """Its torque (samples,) [N m] on its own joint against speed alone, at rest otherwise: the friction curve."""
+        still = np.zeros((len(dq), arm.n_joints))
+        motion = Motion(np.zeros(len(dq)), still, self.on_own_row(arm, dq)[..., 0], still)
+        return self.own(self.torque(motion, arm, values))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        """The torque (samples, joints) that a log of `motion` shows on an arm that has this effect, exactly.
+
+        `predict` says what it would show without; effects are thus put one around the other. To warp a signal, hand
+        another motion to `predict`; to change geometry or gravity, another arm; to clip, treat what it returns.
+        """
+        without = predict(motion, arm) if predict is not None else arm.torque(motion)
+        return np.asarray(without + self.torque(motion, arm, values))
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """How it enters the forward simulation; by default as a load."""
+        return Hooks(load=lambda motion, _: self.torque(motion, arm, values))
+
+    def own(self, signal: Array) -> Array:
+        """Column of its own joint, (samples,)."""
+        return np.asarray(signal[..., self._index])
+
+    def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
+        """`columns`, each (samples,), as (samples, joints, columns): they act on its own joint only."""
+        rows = np.zeros((len(columns[0]), arm.n_joints, len(columns)))
+        rows[:, self._index] = np.stack(columns, axis=-1)
+        return rows
+
+    @property
+    def _index(self) -> int:
+        if self.joint is None:
+            raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
+        return self.joint - 1

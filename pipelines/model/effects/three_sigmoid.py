@@ -1,0 +1,67 @@
+"""Friction as three sigmoids and a viscous term: Coulomb, Stribeck and viscous friction in one smooth curve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["ThreeSigmoid"]
+
+_GRID = 8  # sharpnesses in the grid: 56 ordered triples
+
+
+@dataclass(frozen=True)
+class ThreeSigmoid(Effect):
+    """τ = Σ_k f_k (1 - 2/(exp(2 w_k v) + 1)) + b v = Σ_k f_k tanh(w_k v) + b v.
+
+    Kostić et al. 2004, eq. (10); the two forms are equal, and tanh never overflows. For given w it is linear in f and
+    b. A set is one of 48 equal ones, 3! orders times 2³ signs (f, w) -> (-f, -w); w1 > w2 > w3 > 0 names it. A dip at
+    low speed needs f of both signs. Compare curves, not parameters: as w -> 0 a sigmoid becomes part of b.
+    """
+
+    w1: float = 100.0  # [s/rad]
+    w2: float = 30.0  # [s/rad]
+    w3: float = 10.0  # [s/rad]
+
+    name = "three_sigmoid"
+    title = "Friction of three sigmoids"
+    parameters = (
+        *(Quantity(f"f{k}", "N m", -50.0, 50.0, f"height of sigmoid {k}") for k in (1, 2, 3)),
+        *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2, 3)),
+        Quantity("b", "N m s/rad", 0.0, 20.0, "viscous coefficient"),
+    )
+    signature = "A friction curve that jumps at zero speed, dips at low speed and rises with speed."
+    explanation = "Dry, boundary and fluid friction together: the lubricant film builds up with speed."
+    remedy = "Compensate it in the feed-forward; the dip is what makes slow motion stick."
+    experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
+    twins = ("coulomb", "viscous", "stribeck", "concave_friction")
+    friction = True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        v = self.own(motion.dq)
+        return self.on_own_row(arm, np.tanh(self.w1 * v), np.tanh(self.w2 * v), np.tanh(self.w3 * v), v)
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """w1 > w2 > w3 on a geometric grid between the fastest and the slowest speeds that this motion holds."""
+        speed = np.abs(self.own(motion.dq))
+        moving = speed[speed > 0]
+        fast, slow = (moving.max(), np.quantile(moving, 0.02)) if moving.size else (1.0, 0.01)
+        grid = np.geomspace(1 / fast, 2 / max(slow, 1e-3 * fast), _GRID)
+        for w1, w2, w3 in combinations(grid[::-1].tolist(), 3):
+            yield replace(self, w1=w1, w2=w2, w3=w3)
+
+    @staticmethod
+    def canonical(values: Values) -> dict[str, float]:
+        """The one of the 48 equal sets that has w1 > w2 > w3 > 0."""
+        pairs = [(values[f"f{k}"], values[f"w{k}"]) for k in (1, 2, 3)]
+        positive = [(f, w) if w >= 0 else (-f, -w) for f, w in pairs]
+        ordered = sorted(positive, key=lambda pair: -pair[1])
+        heights = {f"f{k}": f for k, (f, _) in enumerate(ordered, start=1)}
+        return heights | {f"w{k}": w for k, (_, w) in enumerate(ordered, start=1)} | {"b": values["b"]}

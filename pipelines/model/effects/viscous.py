@@ -1,0 +1,28 @@
+"""Viscous friction: a torque in proportion to speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["Viscous"]
+
+
+@dataclass(frozen=True)
+class Viscous(Effect):
+    """τ = b v."""
+
+    name = "viscous"
+    title = "Viscous friction"
+    parameters = (Quantity("coefficient", "N m s/rad", 0.0, 20.0, "torque per unit of speed"),)
+    signature = "A torque in proportion to speed, the same in both directions."
+    explanation = "Sheared lubricant, and eddy currents in the motor."
+    remedy = "Compensate it in the feed-forward; it falls as the joint warms up, so log the temperature."
+    experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
+    twins = ("coulomb", "three_sigmoid", "quadratic_drag", "viscous_drift")
+    friction = True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, self.own(motion.dq))

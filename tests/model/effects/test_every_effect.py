@@ -1,0 +1,208 @@
+"""What holds for every effect in the folder. A new file inherits all of these tests."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.errors import UsageError
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects import all_effects, effect_names, find_effect
+from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_model import synthetic_arm
+
+UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "kg m^2", "N", "N m", "N m s/rad",
+         "N m/rad", "N m s^2/rad^2"}
+FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
+
+every_effect = pytest.mark.parametrize("kind", all_effects(), ids=lambda kind: kind.name)
+
+
+@pytest.fixture(scope="module")
+def arm() -> Arm:
+    return synthetic_arm()
+
+
+@pytest.fixture(scope="module")
+def motion() -> Motion:
+    """Three joints swinging with reversals, two seconds at 1 kHz."""
+    t = np.arange(2000) * 1e-3
+    w = 2 * np.pi * np.array([0.5, 1.0, 1.5])
+    q0, a = np.array([0.3, -0.4, 0.9]), np.array([0.8, 0.6, 0.5])
+    s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
+    return Motion(t, q0 + a * s, a * w * c, -a * w**2 * s)
+
+
+def placed(kind: type[Effect]) -> Effect:
+    """`kind` at joint 2, or of the whole arm."""
+    return kind(joint=2) if kind.scope == "joint" else kind()
+
+
+def drawn(effect: Effect, seed: int) -> dict[str, float]:
+    """Values out of the prior ranges."""
+    rng = np.random.default_rng(seed)
+    return {q.name: float(rng.uniform(max(q.low, -1e3), min(q.high, 1e3))) for q in effect.parameters}
+
+
+def without_amplitude(effect: Effect, values: dict[str, float]) -> dict[str, float]:
+    shaped = effect.at(values)
+    return shaped.values(np.zeros(len(shaped.amplitudes(values))))
+
+
+def test_every_file_is_an_effect() -> None:
+    """One file, one effect, of the same name; nothing is registered by hand."""
+    files = {path.stem for path in FOLDER.glob("*.py")} - {"__init__", "base"}
+    assert set(effect_names()) == files
+    assert [kind.name for kind in all_effects()] == sorted(files)
+    assert {"coulomb", "viscous", "three_sigmoid"} <= files
+
+
+def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+    """A slip of the pen gets a hint."""
+    with pytest.raises(UsageError, match="did you mean 'viscous'"):
+        find_effect("viscos")
+
+
+@every_effect
+def test_words(kind: type[Effect]) -> None:
+    """Title, signature, explanation, remedy and experiment are there, as sentences."""
+    assert "=" in (kind.__doc__ or ""), "the equation stands above the code"
+    assert kind.title.strip()
+    assert not kind.title.endswith(".")
+    for words in (kind.signature, kind.explanation, kind.remedy, kind.experiment):
+        assert words == words.strip()
+        assert words.endswith(".")
+        assert words[0].isupper()
+    assert kind.scope in ("joint", "arm")
+
+
+@every_effect
+def test_parameters(kind: type[Effect]) -> None:
+    """Each parameter has a unit, a meaning and a range; the non-linear ones are fields with a default."""
+    names = [q.name for q in kind.parameters]
+    assert len(set(names)) == len(names) > 0
+    assert all(re.fullmatch(r"[a-z][a-z0-9_]*", name) for name in names)
+    for q in kind.parameters:
+        assert q.unit in UNITS
+        assert q.meaning
+        assert q.low < q.high
+        if q.shape:
+            assert q.low <= getattr(placed(kind), q.name) <= q.high
+
+
+@every_effect
+def test_twins_exist(kind: type[Effect], shared: Path) -> None:
+    """Twins are other effects, of this folder or of causes.md."""
+    causes = set(re.findall(r"^\| `(\w+)` \|", (shared / "causes.md").read_text(), flags=re.MULTILINE))
+    assert "cogging" in causes
+    assert kind.name not in kind.twins
+    assert set(kind.twins) <= causes | set(effect_names())
+
+
+@every_effect
+def test_place(kind: type[Effect], arm: Arm) -> None:
+    """It stands at every joint once, or once for the arm; a wrong place is refused."""
+    everywhere = kind.everywhere(arm.n_joints)
+    assert [effect.joint for effect in everywhere] == ([1, 2, 3] if kind.scope == "joint" else [None])
+    for joint in (None, 0) if kind.scope == "joint" else (1,):
+        with pytest.raises(ValueError, match="belongs to"):
+            kind(joint=joint)
+
+
+@every_effect
+def test_columns(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """Columns are finite, (samples, joints, amplitudes), and not all zero, in every shape; they change no input."""
+    before = motion.q.copy(), motion.dq.copy()
+    for effect in placed(kind).shapes(motion, arm):
+        columns = effect.columns(motion, arm)
+        assert columns.shape[:2] == motion.q.shape
+        assert columns.shape[2] == len(effect.amplitudes(drawn(effect, 0)))
+        assert np.isfinite(columns).all()
+        assert np.abs(columns).max() > 0
+    np.testing.assert_array_equal(motion.q, before[0])
+    np.testing.assert_array_equal(motion.dq, before[1])
+
+
+@every_effect
+def test_values_and_amplitudes_are_one(kind: type[Effect]) -> None:
+    """From values to shape and amplitudes and back."""
+    values = drawn(placed(kind), 1)
+    effect = placed(kind).at(values)
+    back = effect.values(effect.amplitudes(values))
+    np.testing.assert_allclose(effect.amplitudes(back), effect.amplitudes(values), rtol=1e-9, atol=1e-12)
+    assert list(back) == [q.name for q in kind.parameters]
+    assert effect.at(back) == effect
+
+
+@every_effect
+def test_torque_is_linear_in_amplitude(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """Twice the amplitude is twice the torque of first order; none is none, exactly, in every form."""
+    values = drawn(placed(kind), 2)
+    effect = placed(kind).at(values)
+    none = without_amplitude(effect, values)
+    double = effect.values(2 * effect.amplitudes(values))
+    np.testing.assert_allclose(first_order(effect, motion, arm, double), 2 * first_order(effect, motion, arm, values),
+                               rtol=1e-9, atol=1e-12)
+    assert not effect.torque(motion, arm, none).any()
+    np.testing.assert_array_equal(effect.apply(motion, arm, none), arm.torque(motion))
+
+
+@every_effect
+def test_apply(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """The exact form is the first order where nothing else is said, and tends to it for small amplitudes everywhere."""
+    values = drawn(placed(kind), 3)
+    effect = placed(kind).at(values)
+    linear = kind.apply is Effect.apply and kind.torque is Effect.torque
+    if not linear:
+        values = effect.values(1e-6 * effect.amplitudes(values))
+    change = effect.apply(motion, arm, values) - arm.torque(motion)
+    expected = first_order(effect, motion, arm, values)
+    assert np.abs(change - expected).max() <= (1e-9 if linear else 0.05) * np.abs(expected).max()
+    model = arm.extended(Acting.of(effect, values))
+    np.testing.assert_allclose(model.torque(motion), effect.apply(motion, arm, values), rtol=1e-12, atol=1e-12)
+
+
+@every_effect
+def test_apply_goes_around_what_it_is_given(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """`predict` is used, so that effects can be put one around the other."""
+    effect = placed(kind)
+    none = without_amplitude(effect, drawn(effect, 4))
+    shifted = effect.apply(motion, arm, none, lambda m, a: a.torque(m) + 1.0)
+    np.testing.assert_array_equal(shifted, arm.torque(motion) + 1.0)
+
+
+@every_effect
+def test_friction_takes_power(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """What claims to be friction is dissipative column by column, odd in speed, and nothing at rest."""
+    if not kind.friction:
+        pytest.skip("not a law of friction")
+    effect = placed(kind)
+    power = effect.columns(motion, arm) * motion.dq[..., None]
+    assert power.min() >= 0
+    assert power.max() > 0
+    values = drawn(effect, 5)
+    speed = np.linspace(-5, 5, 101)
+    curve = effect.curve(speed, arm, values)
+    np.testing.assert_allclose(curve, -curve[::-1], atol=1e-9 * np.abs(curve).max())
+    assert curve[50] == 0.0
+
+
+@every_effect
+def test_simulation_hooks(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """It enters the simulation in some way; a plain load is its torque."""
+    values = drawn(placed(kind), 6)
+    hooks = placed(kind).simulate(arm, values)
+    assert any(hook is not None for hook in (hooks.load, hooks.actuator, hooks.sensor, hooks.inertia, hooks.arm))
+    assert (hooks.states == 0) == (hooks.rate is None and hooks.update is None)
+    if kind.simulate is Effect.simulate:
+        assert hooks.load is not None
+        np.testing.assert_array_equal(hooks.load(motion, np.zeros((len(motion.t), 0))),
+                                      placed(kind).torque(motion, arm, values))
+
+
+def first_order(effect: Effect, motion: Motion, arm: Arm, values: dict[str, float]) -> Array:
+    return np.asarray(effect.at(values).columns(motion, arm) @ effect.amplitudes(values))
