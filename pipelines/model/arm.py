@@ -1,0 +1,213 @@
+"""The model of an arm: a rigid body with its base parameters, friction, and every further effect.
+
+    arm = Arm.from_model(read_model("model.json"))
+    tau = arm.torque(motion)                          what a log of this motion should show
+    parts = arm.torque_parts(motion)                  the same, split
+    arm.parameters["cogging:2:amplitude"].value       every number with its uncertainty
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.errors import InputRejected, UsageError, did_you_mean
+from pipelines.log.model_file import ModelFile, Source, StoredEffect, StoredParameter, StoredValue, Validity
+from pipelines.log.robot import RobotDescription, format_robot, parse_robot
+from pipelines.model.effects import effect_names, find_effect
+from pipelines.model.effects.base import ArmModel, Effect
+from pipelines.model.parameter import Origin, Parameter
+from pipelines.model.rigid.body import Array, Motion, RigidBody, rigid_body
+
+__all__ = ["Acting", "Arm", "ArmTorque"]
+
+
+@dataclass(frozen=True)
+class Acting:
+    """An effect with the numbers it acts with."""
+
+    effect: Effect
+    parameters: tuple[Parameter, ...]
+
+    @classmethod
+    def of(cls, effect: Effect, values: Mapping[str, float], std: Mapping[str, float] | None = None,
+           origin: Origin = "fitted", revolute: bool = True) -> Acting:
+        """`effect` with `values` of all its parameters, units and bounds its own; `revolute` tells its joint's kind."""
+        return cls(effect.at(values), tuple(
+            Parameter(q.name, values[q.name], (std or {}).get(q.name), q.unit_at(revolute), (q.low, q.high), origin)
+            for q in effect.parameters))
+
+    @property
+    def values(self) -> dict[str, float]:
+        return {parameter.name: parameter.value for parameter in self.parameters}
+
+    @property
+    def place(self) -> str:
+        """As causes are written on the command line: "cogging:2", "gravity_tilt"."""
+        return self.effect.name if self.effect.joint is None else f"{self.effect.name}:{self.effect.joint}"
+
+
+@dataclass(frozen=True)
+class ArmTorque:
+    """The torque of the model, split. Each (samples, joints) [N m]."""
+
+    inertia: Array
+    coriolis: Array
+    gravity: Array
+    friction: Array
+    effects: Array  # what the accepted effects add, exactly: torque with them minus torque without
+
+    @property
+    def total(self) -> Array:
+        return self.inertia + self.coriolis + self.gravity + self.friction + self.effects
+
+
+@dataclass(frozen=True)
+class Arm:
+    """What we believe of an arm."""
+
+    name: str
+    body: RigidBody
+    base: tuple[Parameter, ...]  # in the order of body.parameters
+    friction: tuple[Acting, ...] = ()
+    effects: tuple[Acting, ...] = ()  # in the order they were accepted: each acts around those before it
+
+    @property
+    def robot(self) -> RobotDescription:
+        return self.body.robot
+
+    @property
+    def n_joints(self) -> int:
+        return self.body.robot.n_joints
+
+    @cached_property
+    def p(self) -> Array:
+        return np.array([parameter.value for parameter in self.base])
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Every number of the model: base parameters by name, the rest by place and name ("viscous:3:coefficient")."""
+        placed = {f"{acting.place}:{parameter.name}": parameter
+                  for acting in (*self.friction, *self.effects) for parameter in acting.parameters}
+        return {parameter.name: parameter for parameter in self.base} | placed
+
+    @property
+    def nominal(self) -> Arm:
+        """The arm without its further effects: rigid body and friction."""
+        return replace(self, effects=()) if self.effects else self
+
+    def with_body(self, body: RigidBody, p: Array) -> Arm:
+        """The same arm with another rigid body; its base parameters then are assumed."""
+        base = tuple(Parameter(known.name, float(value), None, known.unit, origin="assumed")
+                     for known, value in zip(body.parameters, p, strict=True))
+        return replace(self, body=body, base=base)
+
+    def extended(self, *more: Acting) -> Arm:
+        return replace(self, effects=(*self.effects, *more))
+
+    def torque(self, motion: Motion) -> Array:
+        """Torque (samples, joints) [N m] that a log of this motion should show."""
+        def predict(motion: Motion, arm: ArmModel, acting: tuple[Acting, ...]) -> Array:
+            if not acting:
+                return arm.torque(motion)
+            *inner, last = acting
+            return last.effect.apply(motion, arm, last.values, lambda m, a: predict(m, a, tuple(inner)))
+
+        if self.effects:
+            return predict(motion, self.nominal, self.effects)
+        rigid = self.body.torque(motion.q, motion.dq, motion.ddq, self.p)
+        return rigid + self.friction_torque(motion) if self.friction else rigid
+
+    def friction_torque(self, motion: Motion) -> Array:
+        """Torque (samples, joints) [N m] of the friction laws alone; they see the rigid body, not each other."""
+        rigid = replace(self, friction=(), effects=())
+        torque = np.zeros_like(motion.q)
+        for law in self.friction:
+            torque += law.effect.torque(motion, rigid, law.values)
+        return torque
+
+    def torque_parts(self, motion: Motion) -> ArmTorque:
+        """The torque of the model, split into what it is made of."""
+        rigid = self.body.torque_parts(motion.q, motion.dq, motion.ddq, self.p)
+        friction = self.friction_torque(motion)
+        without = rigid.inertia + rigid.coriolis + rigid.gravity + friction
+        effects = self.torque(motion) - without if self.effects else np.zeros_like(without)
+        return ArmTorque(rigid.inertia, rigid.coriolis, rigid.gravity, friction, effects)
+
+    @classmethod
+    def from_links(cls, robot: RobotDescription) -> Arm:
+        """The rigid arm whose links the description knows, without friction.
+
+        Raises:
+            UsageError: the description does not know every link.
+        """
+        body = rigid_body(robot)
+        p = body.known_parameters()
+        if p is None:
+            missing = [joint.name for joint in robot.joints if joint.link is None]
+            raise UsageError("C02", f"the links of {', '.join(missing)} are not described", where=robot.name,
+                             remedy="give each joint a [joint.link] with mass, com and inertia, or fit a model to logs")
+        base = tuple(Parameter(known.name, float(value), None, known.unit, origin="known")
+                     for known, value in zip(body.parameters, p, strict=True))
+        return cls(robot.name, body, base)
+
+    @classmethod
+    def from_model(cls, model: ModelFile, where: object = "") -> Arm:
+        """The arm that a model file describes.
+
+        Raises:
+            InputRejected: its parameters do not fit its robot or its effects (S18).
+        """
+        robot = parse_robot(model.robot, where=where, inside_log=True)
+        body = rigid_body(robot)
+        stored = {parameter.name: parameter for parameter in model.base_parameters}
+        _same_names(stored, [known.name for known in body.parameters], "base_parameters", where)
+        base = tuple(Parameter(s.name, s.value, s.std, s.unit, origin=s.origin, visible=s.visible)
+                     for s in (stored[known.name] for known in body.parameters))
+        friction, effects = (tuple(_acting(one, robot.revolute, kind, where) for one in members)
+                             for kind, members in (("friction", model.friction), ("effects", model.effects)))
+        return cls(model.name, body, base, friction, effects)
+
+    def to_model(self, *, validity: Validity | None = None, sources: Iterable[Source] = (),
+                 notes: Iterable[str] = ()) -> ModelFile:
+        """What a model file keeps of this arm."""
+        base = tuple(StoredParameter(p.name, p.value, p.std, p.unit, p.visible, p.origin, known.combination)
+                     for p, known in zip(self.base, self.body.parameters, strict=True))
+        return ModelFile(self.name, format_robot(self.robot), base, tuple(map(_stored, self.friction)),
+                         tuple(map(_stored, self.effects)), validity, tuple(sources), tuple(notes))
+
+
+def _stored(acting: Acting) -> StoredEffect:
+    return StoredEffect(acting.effect.name, acting.effect.joint, {
+        parameter.name: StoredValue(parameter.value, parameter.std, parameter.unit, parameter.origin)
+        for parameter in acting.parameters})
+
+
+def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: object) -> Acting:
+    if stored.effect not in effect_names():
+        raise InputRejected("S18", f"{kind}: '{stored.effect}' is not an effect that this version knows"
+                            f"{did_you_mean(stored.effect, effect_names())}", where=where)
+    effect = find_effect(stored.effect)
+    if stored.joint not in (range(1, len(revolute) + 1) if effect.scope == "joint" else (None,)):
+        raise InputRejected("S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where,
+                            remedy=f"it belongs to one {effect.scope}, and the arm has {len(revolute)} joints")
+    _same_names(stored.parameters, [q.name for q in effect.parameters], f"{kind}, {stored.effect}", where)
+    kind_of_joint = stored.joint is None or revolute[stored.joint - 1]
+    given = [(q, q.unit_at(kind_of_joint), stored.parameters[q.name]) for q in effect.parameters]
+    parameters = tuple(Parameter(q.name, v.value, v.std, v.unit, (q.low, q.high), v.origin) for q, _, v in given)
+    if wrong := [f"{q.name} in {v.unit}, not {unit}" for q, unit, v in given if v.unit != unit]:
+        raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(wrong)}", where=where)
+    return Acting(effect(joint=stored.joint).at({p.name: p.value for p in parameters}), parameters)
+
+
+def _same_names(given: Iterable[str], wanted: list[str], what: str, where: object) -> None:
+    names = list(given)
+    for name in names:
+        if name not in wanted:
+            raise InputRejected("S18", f"{what}: no parameter is called '{name}'{did_you_mean(name, wanted)}",
+                                where=where)
+    if missing := [name for name in wanted if name not in names]:
+        raise InputRejected("S18", f"{what}: {', '.join(missing)} missing", where=where)

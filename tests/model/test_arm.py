@@ -1,0 +1,154 @@
+"""The arm model: its torque, its parts, its numbers, and its way through a model file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue, model_text, parse_model
+from pipelines.log.robot import Joint, load_robot
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects.base import ArmModel, Effect, Predict, Quantity
+from pipelines.model.effects.viscous import Viscous
+from pipelines.model.parameter import Parameter
+from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_model import synthetic_arm
+from tests.model.rigid.rrr_arms import column, random_states
+
+
+@pytest.fixture(scope="module")
+def arm() -> Arm:
+    return synthetic_arm()
+
+
+@pytest.fixture(scope="module")
+def motion() -> Motion:
+    return Motion(np.arange(200) * 1e-3, *random_states(np.random.default_rng(1), 200))
+
+
+@dataclass(frozen=True)
+class HalfTorque(Effect):
+    """τ = τ_before / 2: not a sum, so the order of effects shows."""
+
+    name = "half_torque"
+    title = "Half the torque"
+    scope = "arm"
+    parameters: ClassVar[tuple[Quantity, ...]] = (Quantity("part", "1", 0.0, 1.0, "part that is left"),)
+    signature = explanation = remedy = experiment = "For tests."
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return arm.torque(motion)[..., None]
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Mapping[str, float],
+              predict: Predict | None = None) -> Array:
+        return values["part"] * (predict or (lambda m, a: a.torque(m)))(motion, arm)
+
+
+def test_torque_of_the_synthetic_arm(arm: Arm, vectors: dict[str, Any]) -> None:
+    """Rigid torque as Pinocchio has it, friction as the reference has it."""
+    case = vectors["dynamics"][1]
+    q, dq, ddq = (column(case, key) for key in ("q", "dq", "ddq"))
+    motion = Motion(np.arange(len(q)) * 1e-3, q, dq, ddq)
+    friction = np.stack([np.tanh(dq[:, [k]] * np.array(law["w"])) @ law["f"] + law["b"] * dq[:, k]
+                         for k, law in enumerate(vectors["synthetic_friction"])], axis=1)
+    tau = column(case, "tau") + friction
+    assert np.abs(arm.torque(motion) - tau).max() <= 1e-12 * np.abs(tau).max()
+
+
+def test_the_parts_sum_to_the_torque(arm: Arm, motion: Motion) -> None:
+    """Inertia, Coriolis, gravity, friction and effects are all there is."""
+    extended = arm.extended(Acting.of(Viscous(2), {"coefficient": 0.4}))
+    parts = extended.torque_parts(motion)
+    np.testing.assert_allclose(parts.total, extended.torque(motion), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(parts.effects[:, 1], 0.4 * motion.dq[:, 1], rtol=1e-9, atol=1e-12)
+    assert not arm.torque_parts(motion).effects.any()
+    assert np.abs(parts.friction).max() > 1.0
+
+
+def test_effects_act_around_those_before(arm: Arm, motion: Motion) -> None:
+    """Half of everything, then drag; drag, then half of everything."""
+    half, drag = Acting.of(HalfTorque(), {"part": 0.5}), Acting.of(Viscous(3), {"coefficient": 1.0})
+    rest, own = arm.torque(motion), np.array([0.0, 0.0, 1.0]) * motion.dq
+    np.testing.assert_allclose(arm.extended(half, drag).torque(motion), 0.5 * rest + own, rtol=1e-12)
+    np.testing.assert_allclose(arm.extended(drag, half).torque(motion), 0.5 * (rest + own), rtol=1e-12)
+    assert arm.extended(half, drag).nominal == arm
+
+
+def test_every_number_has_an_address(arm: Arm) -> None:
+    """Base parameters by name, the rest by place and name, as the command line writes them."""
+    numbers = arm.extended(Acting.of(Viscous(2), {"coefficient": 0.4}, {"coefficient": 0.01})).parameters
+    assert numbers["p3"].value == pytest.approx(0.17306)
+    assert numbers["p3"].origin == "known"
+    assert numbers["three_sigmoid:1:b"].value == 0.6
+    assert numbers["viscous:2:coefficient"] == Parameter("coefficient", 0.4, 0.01, "N m s/rad", (0.0, 20.0))
+    assert len(numbers) == 15 + 3 * 7 + 1
+
+
+def test_another_body_keeps_the_friction(arm: Arm, motion: Motion) -> None:
+    """An effect may hand on the arm with another geometry."""
+    heavier = arm.with_body(arm.body, 1.1 * arm.p)
+    rigid = arm.torque(motion) - arm.friction_torque(motion)
+    np.testing.assert_allclose(heavier.torque(motion), arm.torque(motion) + 0.1 * rigid, rtol=1e-9, atol=1e-9)
+    assert {parameter.origin for parameter in heavier.base} == {"assumed"}
+
+
+def test_unknown_links_are_refused() -> None:
+    """A description without links is no model; the message names the joints."""
+    robot = load_robot("rrr")
+    bare = replace(robot, joints=(replace(robot.joints[0], link=None), *robot.joints[1:]))
+    with pytest.raises(UsageError, match="waist"):
+        Arm.from_links(bare)
+
+
+def test_through_a_model_file_and_back(arm: Arm, motion: Motion) -> None:
+    """The arm read back gives the same torque, bit for bit, and the same numbers."""
+    extended = arm.extended(Acting.of(Viscous(2), {"coefficient": 0.4}, {"coefficient": 0.01}))
+    back = Arm.from_model(parse_model(model_text(extended.to_model())))
+    np.testing.assert_array_equal(back.torque(motion), extended.torque(motion))
+    assert back.parameters == extended.parameters
+    assert model_text(back.to_model()) == model_text(extended.to_model())
+
+
+VISCOUS = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.1, None, "N m s/rad", "fitted")})
+
+
+@pytest.mark.parametrize(("fault", "message"), [
+    ({"friction": (replace(VISCOUS, effect="viscuos"),)}, "did you mean 'viscous'"),
+    ({"friction": (replace(VISCOUS, joint=4),)}, "joint 4"),
+    ({"friction": (replace(VISCOUS, joint=0),)}, "joint 0"),
+    ({"effects": (replace(VISCOUS, joint=None),)}, "belongs to one joint"),
+    ({"effects": (replace(VISCOUS, parameters={}),)}, "coefficient missing"),
+    ({"effects": (replace(VISCOUS, parameters={"coeficient": VISCOUS.parameters["coefficient"]}),)},
+     "did you mean 'coefficient'"),
+    ({"effects": (replace(VISCOUS, parameters={"coefficient": StoredValue(1.0, None, "N m", "fitted")}),)},
+     "in N m, not N m s/rad"),
+    ({"base_parameters": ()}, "p1, p2"),
+    ({"base_parameters": (StoredParameter("p16", 1.0, None, "kg", True, "fitted", ""),)}, "p16"),
+    ({"robot": "name = 1"}, "robot description"),
+])
+def test_a_model_that_fits_nothing_is_refused(arm: Arm, fault: dict[str, Any], message: str) -> None:
+    """A model file whose parts do not fit each other names the part."""
+    model: ModelFile = replace(arm.to_model(), **fault)
+    with pytest.raises(InputRejected, match=message):
+        Arm.from_model(model)
+
+
+def test_units_follow_the_kind_of_joint() -> None:
+    """A prismatic joint has N where a revolute one has N m."""
+    assert Quantity("b", "N m s/rad", 0, 1, "").unit_at(revolute=False) == "N s/m"
+    assert Quantity("b", "N m s/rad", 0, 1, "").unit_at(revolute=True) == "N m s/rad"
+    assert Quantity("J", "kg m^2", 0, 1, "").unit_at(revolute=False) == "kg"
+    assert Joint("rail", "prismatic").revolute is False
+
+
+@pytest.mark.parametrize(("parameter", "words"), [
+    (Parameter("m", 1.93, 0.021, "kg"), "1.930 ± 0.021 kg"), (Parameter("k", 123.4, 25.0), "123 ± 25"),
+    (Parameter("g", 9.8062, None, "m/s^2"), "9.8062 m/s^2")])
+def test_a_number_in_words(parameter: Parameter, words: str) -> None:
+    """As many digits as the uncertainty leaves."""
+    assert parameter.words == words
