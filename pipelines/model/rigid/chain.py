@@ -11,13 +11,14 @@ mx = ∫x dm is the first moment (mass times centre of mass). Moments and produc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.robot import LinkParameters
 from pipelines.model.rigid.geometry import SerialChain
-from pipelines.model.rigid.kinematics import LinkMotion, Turn, link_motions, rows, turns
+from pipelines.model.rigid.kinematics import LinkMotion, Turn, cross, link_motions, rows, turns, walking_memory
 
 __all__ = ["BLOCK", "STANDARD", "inverse_dynamics", "mass_matrix", "regressor", "regressor_blocks",
            "standard_parameters"]
@@ -26,7 +27,7 @@ Array = npt.NDArray[np.float64]
 
 STANDARD = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 BLOCK = 4096  # samples handed on at once by `regressor_blocks`
-_CACHED = 1024  # samples worked on at once: all rows of one link then fit into the second-level cache
+_CACHED = 4096  # samples worked on at once: fewer cost more in calls, more would leave the caches
 
 
 def standard_parameters(links: Sequence[LinkParameters]) -> Array:
@@ -40,13 +41,13 @@ def regressor(chain: SerialChain, q: Array, dq: Array, ddq: Array, columns: Sequ
     `columns` chooses standard parameters by increasing index (10 · link + position in STANDARD); all of them otherwise.
     The array is stored (joints, columns, samples), samples fastest: `Y.transpose(1, 2, 0)` is contiguous.
     """
-    chosen = _by_link(chain, columns)
     samples = len(q)
     # zeros, not empty: a joint does not feel the links before it, and pages never written cost no time
-    y = np.zeros((chain.n_joints, sum(map(len, chosen)), samples))
+    y = np.zeros((chain.n_joints, 10 * chain.n_joints if columns is None else len(columns), samples))
+    fill = _Filler(chain, columns)
     for start in range(0, samples, _CACHED):
-        part = slice(start, min(start + _CACHED, samples))
-        _fill(y[:, :, part], chain, rows(q[part]), rows(dq[part]), rows(ddq[part]), chosen)
+        part = slice(start, start + _CACHED)
+        fill(y[:, :, part], q[part], dq[part], ddq[part])
     return y.transpose(2, 0, 1)
 
 
@@ -56,14 +57,14 @@ def regressor_blocks(chain: SerialChain, q: Array, dq: Array, ddq: Array, column
 
     The array is written anew for every block: what is to be kept must be copied.
     """
-    chosen = _by_link(chain, columns)
-    buffer = np.zeros((chain.n_joints, sum(map(len, chosen)), min(block, max(len(q), 1))))
+    buffer = np.zeros((chain.n_joints, 10 * chain.n_joints if columns is None else len(columns), min(block, len(q))))
+    fill = _Filler(chain, columns)
     for first in range(0, len(q), block):
         whole = slice(first, min(first + block, len(q)))
-        y = buffer[:, :, :whole.stop - whole.start]
-        for start in range(whole.start, whole.stop, _CACHED):
-            part = slice(start, min(start + _CACHED, whole.stop))
-            _fill(y[:, :, start - first:part.stop - first], chain, rows(q[part]), rows(dq[part]), rows(ddq[part]), chosen)
+        y = buffer[:, :, :whole.stop - first]
+        for start in range(0, y.shape[2], _CACHED):
+            part = slice(start + first, min(start + first + _CACHED, whole.stop))
+            fill(y[:, :, start:start + _CACHED], q[part], dq[part], ddq[part])
         yield whole, y
 
 
@@ -71,79 +72,103 @@ def _by_link(chain: SerialChain, columns: Sequence[int] | None) -> list[list[int
     """The chosen columns of each link, 0 … 9."""
     every = range(10 * chain.n_joints)
     wanted = list(every) if columns is None else list(columns)
-    if any(b <= a for a, b in zip(wanted, wanted[1:], strict=False)) or any(k not in every for k in wanted):
+    if any(b <= a for a, b in pairwise(wanted)) or any(k not in every for k in wanted):
         raise ValueError(f"columns must be increasing and within 0 … {every.stop - 1}")
     return [[k - 10 * i for k in wanted if 10 * i <= k < 10 * (i + 1)] for i in range(chain.n_joints)]
 
 
-def _fill(y: Array, chain: SerialChain, q: Array, dq: Array, ddq: Array, chosen: list[list[int]]) -> None:
-    """Write Y (joints, columns, samples) of one block. Joint j's torque through link i is its twist on link i's wrench:
+class _Filler:
+    """Writes blocks of the regressor, in memory that is taken once.
+
+    Joint j's torque through link i is its twist on link i's wrench:
 
         τ_j = w_j · n_i + v_j · f_i,    with f_i, n_i linear in the ten parameters of link i
 
-    which is the element-wise form of Atkeson, An & Hollerbach 1986, eq. (12)-(15).
+    which is Atkeson, An & Hollerbach 1986, eq. (12)-(15), with the projection done in the link's own frame.
     """
-    at = 0
-    for i, (link, wanted) in enumerate(zip(link_motions(chain, turns(chain, q), dq, ddq, chain.gravity), chosen,
-                                           strict=True)):
-        heads, tails = [k for k in wanted if k < 4], [k - 4 for k in wanted if k >= 4]
-        split, end = at + len(heads), at + len(wanted)
-        spin = _spin(link)
-        if heads:
-            _contract(link.twists, _pick(_moment_wrench(link, spin), heads), y[:i + 1, at:split])
-        if tails:
-            _contract(link.twists[:3], _pick(_inertia_moment(link, spin), tails), y[:i + 1, split:end])
-        at = end
+
+    def __init__(self, chain: SerialChain, columns: Sequence[int] | None) -> None:
+        self.chain = chain
+        self.tables = [[table for table in (_MOMENT_WRENCH[:, [k for k in wanted if k < 4]],
+                                            _INERTIA_WRENCH[:, [k - 4 for k in wanted if k >= 4]]) if table.size]
+                       for wanted in _by_link(chain, columns)]
+        self._take(0)
+
+    def _take(self, samples: int) -> None:
+        self.samples = samples
+        self.walking = walking_memory(self.chain, samples)
+        self.terms = np.zeros((_TERMS, samples))
+        self.wrench = np.empty((_MOMENT_WRENCH.size, samples))
+
+    def __call__(self, y: Array, q: Array, dq: Array, ddq: Array) -> None:
+        """Write y (joints, columns, samples) for q, dq, ddq (samples, joints)."""
+        if len(q) != self.samples:
+            self._take(len(q))
+        chain, at = self.chain, 0
+        motions = link_motions(chain, turns(chain, rows(q)), rows(dq), rows(ddq), chain.gravity, self.walking)
+        for i, (link, tables) in enumerate(zip(motions, self.tables, strict=True)):
+            if tables:
+                _terms(link, self.terms)
+            own = (2 if chain.revolute[i] else 5) if link.own_axis_is_z else None
+            for table in tables:
+                wrench = self.wrench[:table.size]
+                self.terms.take(table.ravel(), axis=0, out=wrench, mode="clip")
+                to = at + table.shape[1]
+                _project(link.twists, wrench.reshape(*table.shape, -1), own, y[:i + 1, at:to])
+                at = to
 
 
-def _pick(wrench: Array, which: list[int]) -> Array:
-    return wrench if len(which) == wrench.shape[1] else wrench[:, which]
+def _project(twists: Array, wrench: Array, own: int | None, out: Array) -> None:
+    """out (joints, columns, samples) = twists (6, joints, samples) on wrench (3 or 6, columns, samples).
+
+    Where the last joint's twist is a unit vector its row of the wrench is the answer; `own` says which row.
+    """
+    last = out.shape[0] - 1
+    for j in range(last if own is not None else last + 1):  # joint by joint: half again as fast as all at once
+        np.einsum("rs,rcs->cs", twists[:len(wrench), j], wrench, out=out[j])
+    if own is not None:
+        out[last] = wrench[own] if own < len(wrench) else 0.0
 
 
-def _contract(twists: Array, wrench: Array, out: Array) -> None:
-    np.einsum("rjs,rcs->jcs", twists, wrench, out=out)
+# Rows of `_terms`: 0 nothing, 1-3 a, 4-6 α, 7-15 S row by row, 16-18 ω_y ω_z, ω_z ω_x, ω_x ω_y, 19-21 S_yy - S_xx,
+# S_xx - S_zz, S_zz - S_yy, and the negatives of rows 1-18 behind them.
+_TERMS = 22 + 18
+_DXY, _DXZ, _DYZ = 19, 20, 21
+_AX, _AY, _AZ, _ALX, _ALY, _ALZ, _SXX, _SXY, _SXZ, _SYX, _SYY, _SYZ, _SZX, _SZY, _SZZ, _PX, _PY, _PZ = range(1, 19)
+_MINUS = 21
+
+# Moment (rows 0-2) and force (rows 3-5) of m, mx, my, mz: n = h × a, f = m a + S h, with h = (mx, my, mz).
+_MOMENT_WRENCH = np.array([
+    [0, 0, _AZ, _AY + _MINUS],
+    [0, _AZ + _MINUS, 0, _AX],
+    [0, _AY, _AX + _MINUS, 0],
+    [_AX, _SXX, _SXY, _SXZ],
+    [_AY, _SYX, _SYY, _SYZ],
+    [_AZ, _SZX, _SZY, _SZZ],
+])
+
+# Moment of Ixx, Iyy, Izz, Ixy, Ixz, Iyz: n = I α + ω × I ω, the off-diagonals of I being the negative products.
+_INERTIA_WRENCH = np.array([
+    [_ALX, _PX + _MINUS, _PX, _SZX, _SYX + _MINUS, _DYZ],
+    [_PY, _ALY, _PY + _MINUS, _SZY + _MINUS, _DXZ, _SXY],
+    [_PZ + _MINUS, _PZ, _ALZ, _DXY, _SYZ, _SXZ + _MINUS],
+])
 
 
-def _spin(link: LinkMotion) -> Array:
-    """S (3, 3, samples) = [α]× + [ω]×²: a point x of the link accelerates by a + S x."""
-    spin = link.omega[:, None] * link.omega[None]  # [ω]×² = ω ωᵀ - |ω|² 1
-    xx, yy, zz = spin[0, 0].copy(), spin[1, 1].copy(), spin[2, 2]
-    np.add(yy, zz, out=spin[0, 0])
-    np.add(xx, zz, out=spin[1, 1])
-    np.add(xx, yy, out=spin[2, 2])
-    for k, (a, b) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.negative(spin[k, k], out=spin[k, k])
-        spin[a, b] -= link.alpha[k]
-        spin[b, a] += link.alpha[k]
-    return spin
-
-
-def _moment_wrench(link: LinkMotion, spin: Array) -> Array:
-    """Moment (rows 0-2) and force (rows 3-5) of m, mx, my, mz: f = m a + S h,  n = h × a, with h = (mx, my, mz)."""
-    wrench = np.zeros((6, 4, spin.shape[2]))
-    a = link.acceleration
-    wrench[3:, 0] = a
-    wrench[3:, 1:] = spin
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        wrench[j, 1 + i] = -a[k]  # (h × a)_j = … - h_i a_k, (h × a)_k = h_i a_j - …
-        wrench[i, 1 + j] = a[k]
-    return wrench
-
-
-def _inertia_moment(link: LinkMotion, spin: Array) -> Array:
-    """Moment (3, 6, samples) of Ixx, Iyy, Izz, Ixy, Ixz, Iyz: n = I α + ω × I ω, off-diagonals of I negative."""
-    s, alpha = spin, link.alpha
-    moment = np.empty((3, 6, spin.shape[2]))
-    half = 0.5
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        product = half * (s[i, j] + s[j, i])  # ω_i ω_j
-        moment[k, k] = alpha[k]
-        np.negative(product, out=moment[k, i])
-        moment[k, j] = product
-    np.copyto(moment[:, 3], np.stack([s[2, 0], -s[2, 1], s[1, 1] - s[0, 0]]))
-    np.copyto(moment[:, 4], np.stack([-s[1, 0], s[0, 0] - s[2, 2], s[1, 2]]))
-    np.copyto(moment[:, 5], np.stack([s[2, 2] - s[1, 1], s[0, 1], -s[0, 2]]))
-    return moment
+def _terms(link: LinkMotion, out: Array) -> None:
+    """What every element of a link's wrench is made of; S = [α]× + [ω]×², so that a point x accelerates by a + S x."""
+    out[1:4] = link.acceleration()
+    out[4:7] = link.alpha
+    spin = out[7:16]
+    np.multiply(link.omega[:, None], link.omega[None], out=spin.reshape(3, 3, -1))
+    out[16], out[17], out[18] = spin[5], spin[6], spin[1]
+    spin[::4] -= spin[0] + spin[4] + spin[8]  # [ω]×² = ω ωᵀ - |ω|² 1
+    for k, (i, j) in enumerate(((5, 7), (6, 2), (1, 3))):
+        spin[i] -= link.alpha[k]
+        spin[j] += link.alpha[k]
+    for k, (i, j) in enumerate(((4, 0), (0, 8), (8, 4))):
+        np.subtract(spin[i], spin[j], out=out[19 + k])
+    np.negative(out[1:19], out=out[22:])
 
 
 def inverse_dynamics(chain: SerialChain, q: Array, dq: Array, ddq: Array, phi: Array,
@@ -158,7 +183,8 @@ def inverse_dynamics(chain: SerialChain, q: Array, dq: Array, ddq: Array, phi: A
         part = slice(start, start + _CACHED)
         moves = turns(chain, rows(q[part]))
         wrenches = [_wrench(link, values) for link, values in
-                    zip(link_motions(chain, moves, rows(dq[part]), rows(ddq[part]), g, with_twists=False),
+                    zip(link_motions(chain, moves, rows(dq[part]), rows(ddq[part]), g,
+                                     walking_memory(chain, len(q[part]), with_twists=False)),
                         np.reshape(phi, (-1, 10)), strict=True)]
         tau[part] = _inward(chain, moves, wrenches).T
     return tau
@@ -170,15 +196,11 @@ def _wrench(link: LinkMotion, values: Array) -> Array:
     ixx, iyy, izz, ixy, ixz, iyz = values[4:]
     inertia = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
     cross_h = np.array([[0.0, -h[2], h[1]], [h[2], 0.0, -h[0]], [-h[1], h[0], 0.0]])  # h × a = cross_h a
-    omega, alpha, a = link.omega, link.alpha, link.acceleration
+    omega, alpha, a = link.omega, link.alpha, link.acceleration()
     wrench = np.empty((6, omega.shape[1]))
-    wrench[:3] = inertia @ alpha + cross_h @ a + _cross(omega, inertia @ omega)
-    wrench[3:] = mass * a - cross_h @ alpha - _cross(omega, cross_h @ omega)
+    wrench[:3] = inertia @ alpha + cross_h @ a + cross(omega, inertia @ omega)
+    wrench[3:] = mass * a - cross_h @ alpha - cross(omega, cross_h @ omega)
     return wrench
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _inward(chain: SerialChain, moves: list[Turn], wrenches: list[Array]) -> Array:
@@ -189,19 +211,11 @@ def _inward(chain: SerialChain, moves: list[Turn], wrenches: list[Array]) -> Arr
     tau = np.empty((chain.n_joints, wrenches[0].shape[1]))
     total = np.zeros_like(wrenches[0])
     for i in reversed(range(chain.n_joints)):
-        total = chain.after[i].twist_matrix().T @ (total + wrenches[i])
+        total = chain.after[i].twist_matrix.T @ (total + wrenches[i])
         tau[i] = total[2 if moves[i].revolute else 5]
-        _move_inward(moves[i], total)
-        total = chain.before[i].twist_matrix().T @ total
+        moves[i].carry_wrench_back(total)
+        total = chain.before[i].twist_matrix.T @ total
     return tau
-
-
-def _move_inward(move: Turn, wrench: Array) -> None:
-    if move.revolute:
-        Turn(True, move.cosine, -move.sine, move.shift).rotate(wrench)
-    else:  # moment + z s × force
-        wrench[0] -= move.shift * wrench[4]
-        wrench[1] += move.shift * wrench[3]
 
 
 def mass_matrix(chain: SerialChain, q: Array, phi: Array) -> Array:
@@ -215,7 +229,8 @@ def mass_matrix(chain: SerialChain, q: Array, phi: Array) -> Array:
         part = slice(start, start + _CACHED)
         still = np.zeros_like(rows(q[part]))
         for i, (link, values) in enumerate(zip(link_motions(chain, turns(chain, rows(q[part])), still, still,
-                                                            np.zeros(3)), np.reshape(phi, (-1, 10)), strict=True)):
+                                                            np.zeros(3), walking_memory(chain, still.shape[1])),
+                                              np.reshape(phi, (-1, 10)), strict=True)):
             u = link.twists
             momentum = (_spatial_inertia(values) @ u.reshape(6, -1)).reshape(u.shape)
             d[:i + 1, :i + 1, part] += np.einsum("rjs,rks->jks", u, momentum)
@@ -223,7 +238,10 @@ def mass_matrix(chain: SerialChain, q: Array, phi: Array) -> Array:
 
 
 def _spatial_inertia(values: Array) -> Array:
-    """M (6, 6): momentum about the origin of a twist [w; v]: I w + h × v, m v + w × h. Featherstone 2008, eq. (2.62)."""
+    """M (6, 6): momentum about the origin of a twist [w; v]: I w + h × v, m v + w × h.
+
+    Featherstone 2008, eq. (2.62).
+    """
     mass, (hx, hy, hz) = values[0], values[1:4]
     ixx, iyy, izz, ixy, ixz, iyz = values[4:]
     cross_h = np.array([[0.0, -hz, hy], [hz, 0.0, -hx], [-hy, hx, 0.0]])

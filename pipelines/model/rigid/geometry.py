@@ -14,13 +14,13 @@ Every convention becomes the same three steps from the frame of link i-1 to the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.log.robot import Joint, RobotDescription
-from pipelines.log.urdf import chain_from_urdf
 
 __all__ = ["Placement", "SerialChain", "serial_chain"]
 
@@ -37,14 +37,12 @@ class Placement:
     def __matmul__(self, inner: Placement) -> Placement:
         return Placement(self.rotation @ inner.rotation, self.rotation @ inner.position + self.position)
 
-    @property
-    def turns(self) -> bool:
-        return bool(np.any(self.rotation != np.eye(3)))
+    @cached_property
+    def moves(self) -> bool:
+        """Whether the new frame differs from the old one at all."""
+        return bool(np.any(self.rotation != np.eye(3)) or np.any(self.position))
 
-    @property
-    def shifts(self) -> bool:
-        return bool(np.any(self.position != 0.0))
-
+    @cached_property
     def twist_matrix(self) -> Array:
         """X (6, 6) with [w'; v'] = X [w; v]: a twist about the old origin, seen about the new one in the new axes.
 
@@ -111,6 +109,8 @@ def _modified(joint: Joint) -> tuple[Placement, Placement]:
 
 
 def _urdf(robot: RobotDescription) -> tuple[tuple[Placement, ...], tuple[Placement, ...], Placement]:
+    from pipelines.log.urdf import chain_from_urdf
+
     arm = chain_from_urdf(robot.urdf_text or "", robot.tip_link)
     if len(arm.joints) != robot.n_joints:
         raise InputRejected("S02", f"the robot description lists {robot.n_joints} joints, its URDF moves "

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from pipelines.model.rigid.geometry import Placement, SerialChain
 
-__all__ = ["Frames", "LinkMotion", "Turn", "forward_kinematics", "jacobian", "link_motions", "rows", "tip_position",
-           "turns"]
+__all__ = ["Frames", "LinkMotion", "Turn", "cross", "forward_kinematics", "jacobian", "link_motions", "rows",
+           "tip_position", "turns", "walking_memory"]
 
 Array = npt.NDArray[np.float64]
 
@@ -40,33 +40,76 @@ class Turn:
     sine: Array
     shift: Array  # (samples,) [m], prismatic only
 
-    def rotate(self, vectors: Array) -> None:
-        """`vectors` (3 or 6, …, samples) from the axes before the joint into those behind it, in place: Rz(q)ᵀ v."""
-        for k in range(0, len(vectors), 3):
-            x, y = vectors[k], vectors[k + 1]
-            was = x * self.sine
-            x *= self.cosine
-            x += self.sine * y
-            y *= self.cosine
-            y -= was
+    def carry(self, twists: Array, work: Array | None = None) -> None:
+        """Twists (6, count, samples) from before the joint to behind it, in place: Rz(q)ᵀ v, or v + w × z s.
 
-    def move_twists(self, twists: Array) -> None:
-        """Twists (6, count, samples) from before the joint to behind it, in place."""
-        if self.revolute:
-            self.rotate(twists)
-        else:  # v + w × z s
+        `work` (2, 2, count, samples) is overwritten; without it new memory is taken.
+        """
+        if not self.revolute:
             twists[3] += twists[1] * self.shift
             twists[4] -= twists[0] * self.shift
+            return
+        parts = twists.reshape(2, 3, *twists.shape[1:])
+        x, y = parts[:, 0], parts[:, 1]
+        xs, ys = np.empty((2, *x.shape)) if work is None else work
+        np.multiply(x, self.sine, out=xs)
+        np.multiply(y, self.sine, out=ys)
+        x *= self.cosine
+        x += ys
+        y *= self.cosine
+        y -= xs
+
+    def carry_wrench_back(self, wrench: Array) -> None:
+        """A wrench (6, samples) from behind the joint to before it, in place: the transpose of `carry`."""
+        if self.revolute:
+            Turn(True, self.cosine, -self.sine, self.shift).carry(wrench[:, None])
+        else:  # moment + z s × force
+            wrench[0] -= self.shift * wrench[4]
+            wrench[1] += self.shift * wrench[3]
 
 
 @dataclass(frozen=True, eq=False)
 class LinkMotion:
-    """The motion of link frame i, in its own axes. Gravity is the base accelerating upwards."""
+    """The motion of link frame i, in its own axes. Gravity is the base accelerating upwards.
 
+    Views of working memory: the next link overwrites them.
+    """
+
+    velocity: Array  # (6, samples) ω [rad/s], then v [m/s] of the frame's origin
+    spatial_acceleration: Array  # (6, samples) α [rad/s^2], then a - ω × v [m/s^2]
     twists: Array  # (6, i + 1, samples) of joints 0 … i at unit speed: angular w, then linear v of the frame's origin
-    omega: Array  # (3, samples) [rad/s]
-    alpha: Array  # (3, samples) [rad/s^2]
-    acceleration: Array  # (3, samples) [m/s^2] of the frame's origin
+    own_axis_is_z: bool  # twists[:, i] is the unit twist about (revolute) or along (prismatic) z
+
+    @property
+    def omega(self) -> Array:
+        return self.velocity[:3]
+
+    @property
+    def alpha(self) -> Array:
+        return self.spatial_acceleration[:3]
+
+    def acceleration(self) -> Array:
+        """a (3, samples) [m/s^2] of the frame's origin, what an accelerometer there would show."""
+        return self.spatial_acceleration[3:] + cross(self.omega, self.velocity[3:])
+
+
+@dataclass(frozen=True, eq=False)
+class WalkingMemory:
+    """What `link_motions` works in. Taking it anew for every block would cost more than the arithmetic."""
+
+    state: Array  # (6, columns, samples)
+    other: Array
+    work: Array  # (4, columns, samples)
+    with_twists: bool
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a × b for (3, samples)."""
+    out = np.empty_like(b)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(a[i], b[j], out=out[k])
+        out[k] -= a[j] * b[i]
+    return out
 
 
 def rows(values: Array) -> Array:
@@ -81,72 +124,58 @@ def turns(chain: SerialChain, q: Array) -> list[Turn]:
             for a, r in zip(angle, chain.revolute, strict=True)]
 
 
+def walking_memory(chain: SerialChain, samples: int, with_twists: bool = True) -> WalkingMemory:
+    """Memory for `link_motions` over this many samples at once."""
+    columns = 2 + (chain.n_joints if with_twists else 0)
+    return WalkingMemory(np.empty((6, columns, samples)), np.empty((6, columns, samples)),
+                         np.empty((4, columns, samples)), with_twists)
+
+
 def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, gravity: Array,
-                 with_twists: bool = True) -> Iterator[LinkMotion]:
-    """Walk out along the chain; dq, ddq (joints, samples). The Newton-Euler forward pass, Luh, Walker & Paul 1980.
+                 memory: WalkingMemory) -> Iterator[LinkMotion]:
+    """Walk out along the chain; dq, ddq (joints, samples).
 
-        ω_i = Rᵀ ω + z q̇,   α_i = Rᵀ α + z q̈ + Rᵀω × z q̇,   a_i = Rᵀ (a + α × p + ω × (ω × p))
+        V_i = X V + s q̇,   A_i = X A + s q̈ + V_i × s q̇        Featherstone 2008, eq. (5.14)-(5.15)
+
+    with X the change of frame and s the joint's twist. Acceleration, velocity and the twists of all joints so far are
+    the columns of one array, so that every change of frame is one small matrix on many samples.
     """
-    samples = dq.shape[1]
-    motion = np.zeros((3, 3, samples))  # component, (ω, α, a), sample
-    motion[:, 2] = -gravity[:, None]
-    twists = np.zeros((6, 0, samples))
+    state, other, work = memory.state, memory.other, memory.work
+    state[:, :2] = 0.0
+    state[3:, 0] = -gravity[:, None]
     for i, move in enumerate(moves):
-        motion = _through(chain.before[i], motion)
-        _move(motion, move, dq[i], ddq[i])
-        motion = _through(chain.after[i], motion)
-        if with_twists:
-            twists = _extend(twists, chain.before[i], move, chain.after[i])
-        yield LinkMotion(twists, motion[:, 0], motion[:, 1], motion[:, 2])
+        used = 2 + (i if memory.with_twists else 0)
+        state, other = _through(chain.before[i], state, other, used)
+        move.carry(state[:, :used], work[:, :used].reshape(2, 2, used, -1))
+        _drive(state[:, 0], state[:, 1], move.revolute, dq[i], ddq[i])
+        if memory.with_twists:
+            state[:, used] = 0.0
+            state[2 if move.revolute else 5, used] = 1.0
+            used += 1
+        state, other = _through(chain.after[i], state, other, used)
+        yield LinkMotion(state[:, 1], state[:, 0], state[:, 2:used], not chain.after[i].moves)
 
 
-def _through(place: Placement, motion: Array) -> Array:
-    """Carry ω, α, a (3, 3, samples) through a fixed placement; never in place."""
-    if place.shifts:
-        omega, alpha = motion[:, 0], motion[:, 1]
-        x, y, z = place.position
-        lever = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # α × p = lever α
-        carried = motion.copy()
-        linear = carried[:, 2]
-        linear += lever @ alpha
-        linear += omega * (place.position @ omega)  # ω × (ω × p) = ω (ω·p) - p |ω|²
-        linear -= place.position[:, None] * np.einsum("ks,ks->s", omega, omega)
-        motion = carried
-    if place.turns:
-        return (place.rotation.T @ motion.reshape(3, -1)).reshape(motion.shape)
-    return motion if place.shifts else motion.copy()
+def _through(place: Placement, state: Array, other: Array, used: int) -> tuple[Array, Array]:
+    """The first `used` columns carried through a fixed placement: (where they are now, memory that is free)."""
+    if not place.moves:
+        return state, other
+    samples = state.shape[2]
+    np.matmul(place.twist_matrix, state[:, :used].reshape(6, used * samples),
+              out=other[:, :used].reshape(6, used * samples))
+    return other, state
 
 
-def _move(motion: Array, move: Turn, dq: Array, ddq: Array) -> None:
-    """Carry ω, α, a through a joint, in place."""
-    if move.revolute:
-        move.rotate(motion)
-        (wx, wy, wz), alpha = motion[:, 0], motion[:, 1]
-        alpha[0] += wy * dq  # Rᵀω × z q̇
-        alpha[1] -= wx * dq
-        alpha[2] += ddq
-        wz += dq
-        return
-    (wx, wy, wz), (ax, ay, _), linear = motion[:, 0], motion[:, 1], motion[:, 2]
-    linear[0] += (ay + wx * wz) * move.shift + 2.0 * wy * dq  # α × p + ω × (ω × p) + 2 ω × z ḋ, with p = z s
-    linear[1] += (wy * wz - ax) * move.shift - 2.0 * wx * dq
-    linear[2] += ddq - (wx * wx + wy * wy) * move.shift
-
-
-def _extend(twists: Array, before: Placement, move: Turn, after: Placement) -> Array:
-    """The twists of all joints so far, carried to the next link frame, and the new joint's own behind them."""
-    count, samples = twists.shape[1:]
-    extended = np.empty((6, count + 1, samples))
-    if before.turns or before.shifts:
-        extended[:, :count] = (before.twist_matrix() @ twists.reshape(6, -1)).reshape(twists.shape)
-    else:
-        extended[:, :count] = twists
-    move.move_twists(extended[:, :count])
-    extended[:, count] = 0.0
-    extended[2 if move.revolute else 5, count] = 1.0
-    if after.turns or after.shifts:
-        return (after.twist_matrix() @ extended.reshape(6, -1)).reshape(extended.shape)
-    return extended
+def _drive(acceleration: Array, velocity: Array, revolute: bool, dq: Array, ddq: Array) -> None:
+    """Add the joint's own speed and acceleration to A and V (6, samples), in place: s q̇, s q̈ and V × s q̇."""
+    axis, first = (2, 0) if revolute else (5, 3)
+    acceleration[first] += velocity[1] * dq  # ω × z q̇
+    acceleration[first + 1] -= velocity[0] * dq
+    if revolute:
+        acceleration[3] += velocity[4] * dq  # v × z q̇
+        acceleration[4] -= velocity[3] * dq
+    acceleration[axis] += ddq
+    velocity[axis] += dq
 
 
 def forward_kinematics(chain: SerialChain, q: Array) -> Frames:
@@ -173,9 +202,9 @@ def forward_kinematics(chain: SerialChain, q: Array) -> Frames:
 
 
 def _placed(place: Placement, r: Array, p: Array) -> tuple[Array, Array]:
-    if place.shifts:
+    if place.position.any():
         p = p + np.einsum("abs,b->as", r, place.position)
-    if place.turns:
+    if place.moves:
         r = np.einsum("abs,bc->acs", r, place.rotation)
     return r, p
 
