@@ -28,7 +28,7 @@ def arm() -> Arm:
 
 @pytest.fixture(scope="module")
 def motion() -> Motion:
-    return Motion(np.arange(200) * 1e-3, *random_states(np.random.default_rng(1), 200))
+    return Motion(np.linspace(0.0, 0.199, 200), *random_states(np.random.default_rng(1), 200))
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def test_torque_of_the_synthetic_arm(arm: Arm, vectors: dict[str, Any]) -> None:
     """Rigid torque as Pinocchio has it, friction as the reference has it."""
     case = vectors["dynamics"][1]
     q, dq, ddq = (column(case, key) for key in ("q", "dq", "ddq"))
-    motion = Motion(np.arange(len(q)) * 1e-3, q, dq, ddq)
+    motion = Motion(np.linspace(0.0, 0.199, len(q)), q, dq, ddq)
     friction = np.stack([np.tanh(dq[:, [k]] * np.array(law["w"])) @ law["f"] + law["b"] * dq[:, k]
                          for k, law in enumerate(vectors["synthetic_friction"])], axis=1)
     tau = column(case, "tau") + friction

@@ -30,7 +30,7 @@ def arm() -> Arm:
 @pytest.fixture(scope="module")
 def motion() -> Motion:
     """Three joints swinging with reversals, two seconds at 1 kHz."""
-    t = np.arange(2000) * 1e-3
+    t = np.linspace(0.0, 1.999, 2000)
     w = 2 * np.pi * np.array([0.5, 1.0, 1.5])
     q0, a = np.array([0.3, -0.4, 0.9]), np.array([0.8, 0.6, 0.5])
     s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))

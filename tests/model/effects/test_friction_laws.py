@@ -58,7 +58,8 @@ def test_forty_eight_sets_are_one(seed: int) -> None:
 def test_the_grid_is_ordered_and_finds_a_known_curve() -> None:
     """Every shape has w1 > w2 > w3 > 0, and the best of them leaves 1 % of the synthetic friction curve."""
     arm, v = synthetic_arm(), sweep()
-    motion = Motion(np.arange(len(v)) * 1e-3, np.zeros((len(v), 3)), np.stack([v, v, v], axis=1), np.zeros((len(v), 3)))
+    still = np.zeros((len(v), 3))
+    motion = Motion(np.linspace(0.0, 0.599, len(v)), still, np.stack([v, v, v], axis=1), still)
     f, w, b = FRICTION[1]
     truth = ThreeSigmoid(2).curve(v, arm, named(list(f), list(w), b))
     left = []

@@ -1,0 +1,118 @@
+"""The sample logs: what is committed is what the script makes, and it is what its README says."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.log.canonical import digest_of
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import open_log
+from pipelines.model.arm import Arm
+from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_model import synthetic_arm
+from sample_logs.make_samples import NOISE, SAMPLE_TIME, Fourier, averaged_torque, closed_form_logs, torque_step
+
+FILES = ["excitation-1.h5", "excitation-2.h5", "free-1.h5", "friction-1.h5", "friction-2.h5", "friction-3.h5",
+         "hold-1.h5"]
+
+
+@pytest.fixture(scope="module")
+def rebuilt() -> dict[str, ExperimentLog]:
+    return closed_form_logs()
+
+
+@pytest.fixture(scope="module")
+def arm() -> Arm:
+    return synthetic_arm()
+
+
+@pytest.fixture(scope="module")
+def folder(samples: Path) -> Path:
+    return samples / "rrr-closed-form"
+
+
+def test_committed_logs_are_what_the_script_makes(rebuilt: dict[str, ExperimentLog], folder: Path) -> None:
+    """Same files, same content, digest by digest, and nothing to be said on opening them."""
+    assert sorted(rebuilt) == FILES == sorted(path.name for path in folder.iterdir())
+    for name, log in rebuilt.items():
+        opened = open_log(folder / name)
+        assert digest_of(opened.log) == digest_of(log), name
+        assert not opened.checks
+
+
+def test_logs_pass_the_strict_checker(shared: Path, samples: Path) -> None:
+    """check_log.py finds no fault."""
+    done = subprocess.run([sys.executable, str(shared / "tools" / "check_log.py"), str(samples)], check=False,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_logs_are_small(folder: Path) -> None:
+    """Together under 2.5 MB."""
+    assert sum(path.stat().st_size for path in folder.iterdir()) < 2.5e6
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_torque_is_quantised_and_within_limits(rebuilt: dict[str, ExperimentLog], arm: Arm, name: str) -> None:
+    """12 bits over twice the nominal torque, none of it saturated; encoders in steps of 1e-5 rad."""
+    log, step = rebuilt[name], torque_step(arm.robot)
+    assert np.abs(log.tau / step - np.round(log.tau / step)).max() < 1e-6
+    assert np.abs(log.q / 1e-5 - np.round(log.q / 1e-5)).max() < 1e-4
+    assert (np.abs(log.tau) < [joint.torque for joint in arm.robot.joints]).all()
+
+
+@pytest.mark.parametrize("name", ["excitation-1.h5", "excitation-2.h5"])
+def test_excitations_start_from_rest_and_tell_every_parameter(rebuilt: dict[str, ExperimentLog], arm: Arm,
+                                                              name: str) -> None:
+    """No speed at either end of the period; the 15 columns of the regressor are well apart."""
+    log = rebuilt[name]
+    assert np.abs(np.diff(log.q[:3], axis=0)).max() <= 2e-5
+    assert np.abs(log.q[0] - log.q[-1]).max() <= 1e-4
+    dq = np.gradient(log.q, SAMPLE_TIME, axis=0)
+    smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(15) / 15, "same"), 0, dq)
+    ddq = np.gradient(smooth, SAMPLE_TIME, axis=0)
+    columns = arm.body.regressor(log.q, dq, ddq)[50:-50].reshape(-1, 15)
+    assert np.linalg.cond(columns / np.linalg.norm(columns, axis=0)) < 10
+    assert (np.abs(dq) < [joint.velocity for joint in arm.robot.joints]).all()
+
+
+def test_torque_is_the_mean_over_each_sample(arm: Arm) -> None:
+    """Averaging equals a fine integral, and differs from sampling at t_k by far more than its own error."""
+    rng = np.random.default_rng(5)
+    swing = Fourier(np.zeros(3), rng.normal(size=(3, 5)), rng.normal(size=(3, 5)), 0.5)
+    t = np.linspace(0.0, 1.999, 2000)
+    fine = (np.arange(400) + 0.5) / 400 * SAMPLE_TIME
+    integral = np.stack([arm.torque(swing(one + fine)).mean(axis=0) for one in t[::50]])
+    assert np.abs(averaged_torque(arm, swing, t[::50]) - integral).max() < 1e-6
+    assert np.abs(arm.torque(swing(t)) - averaged_torque(arm, swing, t)).max() > 0.01
+
+
+def test_hold_shows_noise_and_resolution_only(rebuilt: dict[str, ExperimentLog], arm: Arm) -> None:
+    """At rest the torque is gravity, with the noise and the steps that the README states."""
+    log = rebuilt["hold-1.h5"]
+    assert log.posture is not None
+    still = np.zeros_like(log.q)
+    left = log.tau - arm.torque(Motion(log.t, still + log.posture, still, still))
+    assert np.abs(left.mean(axis=0)).max() < 3e-3
+    expected = np.sqrt(NOISE**2 + torque_step(arm.robot) ** 2 / 12)
+    assert np.abs(left.std(axis=0) / expected - 1).max() < 0.06
+
+
+def test_friction_logs_move_their_joint_alone(rebuilt: dict[str, ExperimentLog]) -> None:
+    """The other joints stand still to the last bit; the moving one reverses and reaches both low and high speed."""
+    for joint in (1, 2, 3):
+        log = rebuilt[f"friction-{joint}.h5"]
+        moved = np.ptp(log.q, axis=0) > 0
+        assert moved.tolist() == [k == joint for k in (1, 2, 3)]
+        speed = smooth_speed(log.q[:, joint - 1])
+        assert np.sum(np.diff(np.sign(speed)) != 0) >= 6
+        assert np.abs(speed).max() > 3.0
+
+
+def smooth_speed(q: Array) -> Array:
+    return np.gradient(np.convolve(q, np.ones(21) / 21, "valid"), SAMPLE_TIME)
