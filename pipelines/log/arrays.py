@@ -1,0 +1,62 @@
+"""Read a NumPy file: its header is checked against its size before anything is read, and nothing is ever unpickled."""
+
+from __future__ import annotations
+
+import ast
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected
+
+__all__ = ["read_npy"]
+
+_LONGEST_HEADER = 65_536
+_BUDGET = 4 << 30  # [B]
+
+
+def read_npy(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]:
+    """The array of an NPY file, its fields by name where it is structured, else under the name "column".
+
+    Raises:
+        InputRejected: F02 truncated, F08 damaged header, X05 larger than a recording, X07 holds pickled objects.
+    """
+    kind, by_columns, shape, start = _header(data, source)
+    if kind.hasobject:
+        raise InputRejected("X07", "holds pickled Python objects, which are never opened", where=source,
+                            remedy="save plain numbers: numpy.save(…, allow_pickle=False)")
+    size = math.prod(shape) * kind.itemsize
+    if size > _BUDGET:
+        raise InputRejected("X05", f"declares {size} bytes", where=source, remedy="split the recording")
+    if start + size != len(data):
+        raise InputRejected("F02", f"truncated or damaged: {len(data)} of {start + size} bytes", where=source, remedy="copy the file again")
+    if size == 0:
+        raise InputRejected("T08", "no sample", where=source, remedy="record again")
+    array = np.frombuffer(data, dtype=kind, count=math.prod(shape), offset=start).reshape(shape, order="F" if by_columns else "C")
+    if kind.names is None:
+        return {"column": array}
+    if array.ndim != 1:
+        raise InputRejected("S11", f"a structured array of shape {shape}", where=source, remedy="save one record a sample")
+    return {name: array[name] for name in kind.names}
+
+
+def _header(data: bytes, source: str) -> tuple[np.dtype[np.generic], bool, tuple[int, ...], int]:
+    broken = InputRejected("F08", "damaged NPY header", where=source, remedy="save or copy the file again")
+    major = data[6] if len(data) > 12 else 0
+    if major not in (1, 2, 3):
+        raise broken
+    wide = 2 if major == 1 else 4
+    length = int.from_bytes(data[8 : 8 + wide], "little")
+    start = 8 + wide + length
+    if length > _LONGEST_HEADER or start > len(data):
+        raise broken
+    try:
+        table = ast.literal_eval(data[8 + wide : start].decode("latin-1" if major < 3 else "utf-8").strip())
+        descr, order, shape = table["descr"], table["fortran_order"], table["shape"]
+        kind = np.dtype(np.lib.format.descr_to_dtype(descr))
+    except (ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, RecursionError, MemoryError, OverflowError):
+        raise broken from None
+    if not (isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape) and len(shape) <= 8 and isinstance(order, bool)):
+        raise broken
+    return kind, order, shape, start

@@ -1,0 +1,103 @@
+"""Find out what the time of a recording is: seconds from a column of any unit, or from a declared rate."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipelines.errors import Check, InputRejected
+from pipelines.log.experiment import Array
+from pipelines.log.raw import RawTable
+from pipelines.log.recipe import TimeSpec
+from pipelines.log.units import to_si
+
+__all__ = ["declared_step", "plausible_units", "time_of"]
+
+_NEAR = 0.2  # a rate within a fifth of the declared one is the declared one
+_FASTEST, _SLOWEST = 1e5, 1.0  # [Hz] what robots are recorded at
+_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def declared_step(spec: TimeSpec) -> float | None:
+    """The sampling period a recipe declares. [s]"""
+    return spec.sample_time if spec.sample_time is not None else None if spec.rate is None else 1.0 / spec.rate
+
+
+def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Array, list[Check]]:
+    """Time stamps [s], NaN where one is missing.
+
+    Raises:
+        InputRejected: S08 where unit and rate contradict each other or leave the unit open, T08 without samples.
+    """
+    step = declared_step(spec)
+    if spec.column is None:  # the recipe was checked: then there is a rate
+        return table.rows * np.float64(step or math.nan), []
+    name = table.name_of(spec.column)
+    where = f"{table.source}, column '{name}'"
+    stamps = table.columns[name]
+    finite = stamps[np.isfinite(stamps)]
+    steps = np.diff(finite)
+    steps = steps[steps > 0]
+    if finite.size < 2 or steps.size == 0:
+        raise InputRejected("T08", f"{finite.size} time stamps, none later than another", where=where, remedy="record again")
+    median = float(np.median(steps))
+    unit = spec.unit or table.units.get(name)
+    checks: list[Check] = []
+    if unit is None:
+        unit = _detected(median, step, where, assume, checks)
+    elif spec.unit and (other := table.units.get(name)) and other != spec.unit:
+        checks.append(Check.of("S08", "warn", f"the header says '{other}', the recipe says '{spec.unit}' and is followed", where=where))
+    factor = _factor(unit, step, where)
+    _plausible(median, factor, unit, step, where)
+    origin = finite[0] if abs(finite[0]) > 1e6 * median * finite.size else 0.0  # an epoch: seconds since 1970 cost digits
+    if origin:
+        checks.append(Check.of("S08", "ok", f"time starts at {finite[0]:.16g} {unit}; counted from there", where=where))
+    return (stamps - origin) * factor, checks
+
+
+def _factor(unit: str, step: float | None, where: str) -> float:
+    if unit in ("sample", "samples", "index"):
+        if step is None:
+            raise InputRejected("S08", "time is a sample index, but no rate is declared", where=where, remedy="add rate = … [Hz] to [time]")
+        return step
+    return to_si(unit, "time", where=where).factor
+
+
+def plausible_units(median: float) -> list[str]:
+    """The units in which a median step gives a rate that robots are recorded at."""
+    return [unit for unit, factor in _UNITS.items() if _SLOWEST <= 1.0 / (median * factor) <= _FASTEST]
+
+
+def _fitting(median: float, step: float) -> list[str]:
+    fits = [unit for unit, factor in _UNITS.items() if abs(median * factor / step - 1.0) < _NEAR]
+    return fits + (["sample"] if abs(median - 1.0) < 1e-9 and "s" not in fits else [])
+
+
+def _detected(median: float, step: float | None, where: str, assume: bool, checks: list[Check]) -> str:
+    """S08: the unit of time stamps that nobody declared, where only one is possible."""
+    if step is not None:
+        fits = _fitting(median, step)
+        if len(fits) == 1:
+            checks.append(Check.of("S08", "warn", f"unit of time not declared; {fits[0]} fits the declared rate of {1 / step:.6g} Hz",
+                                   where=where, remedy=f'add unit = "{fits[0]}" to [time]'))
+            return fits[0]
+    elif assume:
+        checks.append(Check.of("S04", "warn", "unit of time not declared; taken as s, as --assume-units says", where=where))
+        return "s"
+    options = ", ".join(f"{unit} ({1 / (median * _UNITS[unit]):.4g} Hz)" for unit in plausible_units(median)) or "none plausible"
+    raise InputRejected("S08", f"unit of time not declared; its step of {median:.6g} could be: {options}", where=where,
+                        remedy="add unit or rate to [time]")
+
+
+def _plausible(median: float, factor: float, unit: str, step: float | None, where: str) -> None:
+    found = 1.0 / (median * factor)
+    if step is not None and abs(median * factor / step - 1.0) >= _NEAR:
+        fits = _fitting(median, step)
+        hint = f"; in {fits[0]} it would fit" if fits else ""
+        raise InputRejected("S08", f"time in {unit} makes {found:.6g} Hz, but {1 / step:.6g} Hz is declared{hint}", where=where,
+                            remedy="correct unit or rate in [time]")
+    if step is None and not _SLOWEST / 10 <= found <= 10 * _FASTEST:
+        options = plausible_units(median)
+        raise InputRejected("S08", f"time in {unit} makes {found:.6g} Hz; {' or '.join(options) or 'a sample index'} looks right",
+                            where=where, remedy="correct the unit in [time], or add the rate to confirm it")

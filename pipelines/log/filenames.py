@@ -1,0 +1,101 @@
+"""Find the files of a recipe by pattern: `run_{number}.csv`, `{role}/*.mat`, `{stem}_tau.csv`."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+
+from pipelines.errors import EnvironmentFault, UsageError
+
+__all__ = ["files_below", "fill", "match"]
+
+_MOST_FILES = 100_000
+_FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^{}]+(?:\{\d+(?:,\d*)?\}[^{}]*)*))?\}")
+
+
+@lru_cache(maxsize=256)
+def _compiled(pattern: str) -> re.Pattern[str]:
+    """The regular expression of a pattern: {name} any text without a slash, {name:regex} that, *, ** and ? as in a shell."""
+    parts, at = [], 0
+    seen: set[str] = set()
+    for found in _FIELD.finditer(pattern):
+        parts.append(_shell(pattern[at : found.start()]))
+        name, inner = found.group(1), found.group(2) or r"[^/]+?"
+        parts.append(f"(?P={name})" if name in seen else f"(?P<{name}>{inner})")
+        seen.add(name)
+        at = found.end()
+    parts.append(_shell(pattern[at:]))
+    try:
+        return re.compile("".join(parts))
+    except re.error as problem:
+        raise UsageError("C02", f"pattern '{pattern}': {problem}", remedy="write {name}, or {name:regular expression}") from None
+
+
+def _shell(text: str) -> str:
+    text = re.escape(text)
+    return text.replace(r"\*\*", ".*").replace(r"\*", "[^/]*").replace(r"\?", "[^/]")
+
+
+def match(patterns: str | tuple[str, ...], relative: str) -> dict[str, str] | None:
+    """The groups of the first pattern that fits the path, {stem} among them; None where none fits."""
+    for pattern in (patterns,) if isinstance(patterns, str) else patterns:
+        if found := _compiled(pattern).fullmatch(relative):
+            return {"stem": Path(relative).stem} | found.groupdict(default="")
+    return None
+
+
+def fill(template: str, groups: Mapping[str, str], where: object) -> str:
+    """A template with its {groups} filled in.
+
+    Raises:
+        UsageError: C02, it names a group that the pattern does not have.
+    """
+    def value(found: re.Match[str]) -> str:
+        if found.group(1) not in groups:
+            raise UsageError("C02", f"'{template}' names {{{found.group(1)}}}, but the pattern has {', '.join(groups)}", where=where)
+        return groups[found.group(1)]
+
+    return re.sub(r"\{(\w+)\}", value, template)
+
+
+def files_below(folder: Path) -> tuple[str, ...]:
+    """Paths of all regular files below `folder`, relative, sorted; links to folders are not followed, hidden ones left out.
+
+    Raises:
+        UsageError: not a folder. EnvironmentFault: no permission.
+    """
+    if not folder.is_dir():
+        raise UsageError("C04", "no such folder", where=folder, remedy="give the folder of the recordings with --source")
+    if not os.access(folder, os.R_OK | os.X_OK):
+        raise EnvironmentFault("F13", "permission denied", where=folder, remedy="change its permissions")
+    found: list[str] = []
+    for parent, folders, names in os.walk(folder, followlinks=False):
+        folders[:] = sorted(f for f in folders if not f.startswith("."))
+        found += [Path(parent, name).relative_to(folder).as_posix() for name in names if not name.startswith(".")]
+        if len(found) > _MOST_FILES:
+            raise UsageError("C07", f"more than {_MOST_FILES} files", where=folder, remedy="give a folder that holds the recordings only")
+    return tuple(sorted(found))
+
+
+def inside(folder: Path, relative: str, where: object) -> Path:
+    """The path of a file of the recording, which must lie inside its folder (X11)."""
+    path = folder / relative
+    if Path(relative).is_absolute() or not path.resolve().is_relative_to(folder.resolve()):
+        raise UsageError("X11", f"'{relative}' lies outside the source folder", where=where, remedy="keep the files of a recording together")
+    return path
+
+
+def unique(names: Iterable[str]) -> tuple[str, ...]:
+    """The names, those that occur twice numbered."""
+    taken: set[str] = set()
+    out = []
+    for name in names:
+        fresh, number = name, 2
+        while fresh in taken:
+            fresh, number = f"{name}-{number}", number + 1
+        taken.add(fresh)
+        out.append(fresh)
+    return tuple(out)

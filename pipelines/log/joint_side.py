@@ -1,0 +1,209 @@
+"""Turn recorded numbers into SI on the joint side: unwrap, scale, unit, torque constant, transmission, offset.
+
+With q_motor = N q_joint and tau_joint = Nᵀ tau_motor, the power q̇ᵀ tau is the same on both sides, sample by sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.errors import Check, InputRejected, UsageError
+from pipelines.log import schema
+from pipelines.log.experiment import Array, Signal
+from pipelines.log.raw import RawTable
+from pipelines.log.recipe import DriveSpec, Numbers, Recipe, SignalSpec
+from pipelines.log.repair import Recording
+from pipelines.log.robot import Drive, RobotDescription
+from pipelines.log.units import UNITS, to_si
+
+__all__ = ["Converted", "drive_of", "joint_side", "unit_declared"]
+
+_LINEAR = frozenset({"m", "mm", "um", "m/s", "mm/s", "m/s^2", "mm/s^2", "N", "mN", "kN"})
+_MOTION = ("position", "velocity", "acceleration")
+
+
+@dataclass(frozen=True, eq=False)
+class Converted:
+    """Signals in SI and what was done to them, in words."""
+
+    signals: Mapping[str, Signal]
+    steps: tuple[str, ...]
+    altered: tuple[str, ...]  # what goes beyond units and transmission
+    checks: tuple[Check, ...]
+
+
+def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive | None:
+    """The drive of the recipe, or of the robot where the recipe says nothing.
+
+    Raises:
+        UsageError: C02, it does not fit the number of joints, or cannot be inverted.
+    """
+    n = robot.n_joints
+    own = robot.drive or Drive()
+    matrix, constants = own.transmission, own.torque_constant
+    if spec.transmission is not None:
+        rows = spec.transmission
+        if len(rows) != n or any(isinstance(row, tuple) and len(row) != n for row in rows):
+            raise UsageError("C02", f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers", where=where)
+        matrix = tuple(row if isinstance(row, tuple) else tuple(float(row) if i == j else 0.0 for j in range(n)) for i, row in enumerate(rows))
+        if abs(np.linalg.det(np.array(matrix))) < 1e-12:
+            raise UsageError("C02", "drive.transmission cannot be inverted", where=where, remedy="each joint needs a motor")
+    if spec.torque_constant is not None:
+        constants = tuple(_per_joint(spec.torque_constant, n, "drive.torque_constant", where).tolist())
+    return None if matrix is None and constants is None else Drive(matrix, constants)
+
+
+def _per_joint(value: Numbers, n: int, what: str, where: object) -> Array:
+    if isinstance(value, tuple) and len(value) != n:
+        raise UsageError("C02", f"{what} holds {len(value)} numbers, the robot has {n} joints", where=where, remedy="one number, or one a joint")
+    return np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
+
+
+def unit_declared(name: str, spec: SignalSpec, table: RawTable, columns: tuple[str, ...], assume: bool, checks: list[Check]) -> str:
+    """The unit of a signal: the recipe's, else the header's. S04 where neither says, S05 where both differ."""
+    where = f"{table.source}, signal {name}"
+    headers = {table.units[column] for column in columns if column in table.units}
+    if spec.unit is not None:
+        for header in headers:
+            known = (_known(header), _known(spec.unit))
+            if None not in known and known[0] != known[1]:
+                raise InputRejected("S05", f"the header says '{header}', the recipe says '{spec.unit}'", where=where, remedy="correct one of them")
+        return spec.unit
+    if len(headers) == 1:
+        unit = headers.pop()
+        checks.append(Check.of("S06", "ok", f"unit '{unit}' taken from the header", where=where))
+        return unit
+    wanted = schema.unit_of(name)
+    if not assume:
+        raise InputRejected("S04", f"no unit; say what the numbers of {name} are in", where=where,
+                            remedy=f'add unit = "{wanted}" (or what it is) to signals.{name}, or pass --assume-units if they are SI')
+    checks.append(Check.of("S04", "warn", f"no unit; taken as {wanted}, as --assume-units says", where=where))
+    return wanted
+
+
+def _known(unit: str) -> object:
+    return UNITS.get(unit.replace("Nm", "N m"))
+
+
+def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot: RobotDescription, drive: Drive | None,
+               trust_units: bool = False) -> Converted:
+    """All signals of a part in SI, joint side.
+
+    Raises:
+        InputRejected: S05 unit of another quantity, S07 degrees declared as radians, S10 current without constant.
+    """
+    steps: list[str] = []
+    altered: list[str] = []
+    checks: list[Check] = []
+    n = robot.n_joints
+    signals: dict[str, Signal] = {}
+    for name, raw in part.signals.items():
+        spec = recipe.signals[name]
+        values = _unwrapped(part, name, raw, spec, altered, checks)
+        values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where) * _per_joint(spec.sign, n, f"signals.{name}.sign", recipe.where)
+        values, current = _in_si(part, name, values, spec, units[name], drive, n, recipe, steps)
+        if current is not None and "current" not in recipe.signals:
+            signals["current"] = Signal(current, "A", schema.SIGNALS["current"][1])
+        values = _through_drive(name, values, spec, recipe, drive, steps)
+        _refuse_wrong_kind(part, name, units[name], spec, recipe, robot)
+        offset = _per_joint(spec.offset, n, f"signals.{name}.offset", recipe.where)
+        if offset.any():
+            steps.append(f"{name}: offset {', '.join(f'{x:.6g}' for x in offset)} added")
+        law = recipe.controller.law if recipe.controller else None
+        signals[name] = Signal(values + offset, schema.unit_of(name, law), schema.SIGNALS[name][1])
+    if not trust_units:
+        _refuse_degrees(part, signals["q"].values, units["q"], robot)
+    return Converted(signals, tuple(steps), tuple(altered), tuple(checks))
+
+
+def _unwrapped(part: Recording, name: str, raw: Array, spec: SignalSpec, altered: list[str], checks: list[Check]) -> Array:
+    """D07: a counter that starts again is followed through; a jump of more than half its range is a rollover."""
+    if spec.wrap is None:
+        return raw
+    turns = np.round(np.diff(raw, axis=0) / spec.wrap)
+    if not turns.any():
+        return raw
+    for joint in np.flatnonzero(turns.any(axis=0)):
+        count = int(np.abs(turns[:, joint]).sum())
+        at = part.listed(np.flatnonzero(turns[:, joint]) + 1)
+        checks.append(Check.of("D07", "warn", f"{count} rollovers of {spec.wrap:g} unwrapped ({at})", where=part.column(name, int(joint))))
+        altered.append(f"{name} of joint {joint + 1}: {count} rollovers of {spec.wrap:g} unwrapped")
+    return raw - spec.wrap * np.concatenate([np.zeros((1, raw.shape[1])), np.cumsum(turns, axis=0)])
+
+
+def _in_si(part: Recording, name: str, values: Array, spec: SignalSpec, unit: str, drive: Drive | None, n: int, recipe: Recipe,
+           steps: list[str]) -> tuple[Array, Array | None]:
+    """SI values still on their side of the drive; and the current, where torque was recorded as current."""
+    where = f"{part.where}, signal {name}"
+    quantity = schema.SIGNALS[name][0]
+    if quantity == "excitation":
+        quantity = "torque" if recipe.controller and recipe.controller.law in ("pd", "pd+feedforward") else "acceleration"
+    if unit in ("counts", "counts/s") and quantity in ("position", "velocity"):
+        if spec.counts_per_rev is None:
+            raise InputRejected("S05", "counts without counts_per_rev", where=where, remedy=f"add counts_per_rev to signals.{name}")
+        steps.append(f"{name}: {unit} at {spec.counts_per_rev} counts a revolution to {schema.unit_of(name)}")
+        return values * (2.0 * math.pi / _per_joint(spec.counts_per_rev, n, f"signals.{name}.counts_per_rev", recipe.where)), None
+    known = UNITS.get(unit)
+    if quantity == "torque" and known is not None and known.quantity == "current":
+        constants = drive.torque_constant if drive else None
+        if constants is None:
+            raise InputRejected("S10", f"{name} is recorded in {unit}, motor current instead of torque", where=where,
+                                remedy="add [drive] torque_constant = … [N m/A]")
+        current = known.factor * values
+        steps.append(f"{name}: {unit} times {', '.join(f'{k:g}' for k in constants)} N m/A")
+        return current * np.array(constants), current if name == "tau" else None
+    found = to_si(unit, quantity, where=where)
+    if not found.is_si:
+        steps.append(f"{name}: {unit} to {schema.unit_of(name)}")
+    return found.factor * values + found.offset, None
+
+
+def _motor_side(name: str, spec: SignalSpec, recipe: Recipe) -> bool:
+    moved = schema.SIGNALS[name][0] in (*_MOTION, "torque")
+    return moved and (spec.side or ("motor" if recipe.drive.transmission is not None else "joint")) == "motor"
+
+
+def _through_drive(name: str, values: Array, spec: SignalSpec, recipe: Recipe, drive: Drive | None, steps: list[str]) -> Array:
+    """q_joint = N⁻¹ q_motor, tau_joint = Nᵀ tau_motor."""
+    if not _motor_side(name, spec, recipe):
+        return values
+    if drive is None or drive.transmission is None:
+        raise UsageError("C02", f"'signals.{name}' is on the motor side, but there is no drive.transmission", where=recipe.where,
+                         remedy="add [drive] transmission = the gear ratios")
+    matrix = np.array(drive.transmission)
+    if schema.SIGNALS[name][0] in _MOTION:
+        steps.append(f"{name}: motor to joint side by the inverse of the transmission")
+        return np.asarray(np.linalg.solve(matrix, values.T).T, dtype=np.float64)
+    steps.append(f"{name}: motor to joint side by the transposed transmission")
+    return values @ matrix
+
+
+def _refuse_wrong_kind(part: Recording, name: str, unit: str, spec: SignalSpec, recipe: Recipe, robot: RobotDescription) -> None:
+    """S05: an angle for a joint that slides, a length for one that turns."""
+    quantity = schema.SIGNALS[name][0]
+    if quantity not in (*_MOTION, "torque") or _motor_side(name, spec, recipe) or (unit in UNITS and UNITS[unit].quantity == "current"):
+        return
+    for j, revolute in enumerate(robot.revolute):
+        if revolute == (unit in _LINEAR):
+            raise InputRejected("S05", f"'{unit}' for joint {j + 1} '{robot.joints[j].name}', which is {robot.joints[j].type}",
+                                where=part.column(name, j), remedy=f"declare its unit, such as {schema.joint_unit(name, revolute)}")
+
+
+def _refuse_degrees(part: Recording, q: Array, unit: str, robot: RobotDescription) -> None:
+    """S07: declared radians that leave the joint's range by far, and would lie in it as degrees."""
+    if unit != "rad":
+        return
+    for j, joint in enumerate(robot.joints):
+        low, high = joint.position
+        span = float(np.ptp(q[:, j]))
+        if not joint.revolute or not (math.isfinite(low) and math.isfinite(high)) or span <= 4.0 * math.pi:
+            continue
+        slack = 0.05 * (high - low)
+        as_degrees = np.deg2rad(q[:, j])
+        if as_degrees.min() >= low - slack and as_degrees.max() <= high + slack:
+            raise InputRejected("S07", f"moves over {span:.4g} declared rad, its limits are {low:.4g} to {high:.4g} rad: looks like degrees",
+                                where=part.column("q", j), remedy='declare unit = "deg", or pass --trust-units')

@@ -1,0 +1,147 @@
+"""Read the numeric arrays of a MAT file, v5 (scipy) or v7.3 (HDF5); objects and functions are never built.
+
+Structures are opened one level: field q of structure data is the column "data.q". Both run in a guarded child.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import struct
+import warnings
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected
+
+__all__ = ["BUDGET", "read_mat5", "read_mat73"]
+
+Arrays = dict[str, npt.NDArray[np.generic]]
+
+BUDGET = 4 << 30  # [B] of samples in one file; a ten-minute log of seven joints at 5 kHz has 0.5 GB
+_MOST_MEMBERS = 2000
+_NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical")
+_HARMLESS = (*_NUMERIC, "char", "cell", "struct", "sparse")
+_DAMAGE = (ValueError, TypeError, IndexError, KeyError, OSError, OverflowError, EOFError, AttributeError, NotImplementedError,
+           struct.error, zlib.error, ZeroDivisionError, RuntimeError, AssertionError, MemoryError)
+
+
+def _damaged(source: str) -> InputRejected:
+    return InputRejected("F08", "truncated or damaged MAT file", where=source, remedy="copy it again, or save it again from MATLAB")
+
+
+def read_mat5(data: bytes, source: str) -> Arrays:
+    """The numeric variables of a MAT file of version 4 to 7.
+
+    Raises:
+        InputRejected: F08 truncated or damaged, S03 a variable twice, X05 larger than a recording, X07 objects only.
+    """
+    from scipy.io import loadmat, whosmat
+    from scipy.io.matlab import MatReadError, MatReadWarning
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", MatReadWarning)
+            listed = whosmat(io.BytesIO(data))
+            names = _wanted(listed, source)
+            loaded = loadmat(io.BytesIO(data), variable_names=names, mat_dtype=True, struct_as_record=True, squeeze_me=False)
+    except MatReadWarning as problem:
+        raise InputRejected("S03", f"a variable is there twice: {problem}", where=source, remedy="save each variable once") from None
+    except (*_DAMAGE, MatReadError):
+        raise _damaged(source) from None
+    found: Arrays = {}
+    for name in names:
+        if name not in loaded:
+            raise _damaged(source)
+        found |= _opened(name, loaded[name])
+    return found
+
+
+def _wanted(listed: list[tuple[str, tuple[int, ...], str]], source: str) -> list[str]:
+    """X05, X07: what may be loaded, judged by its header."""
+    declared = sum(8 * math.prod(shape) for _, shape, kind in listed if kind in _NUMERIC)
+    if declared > BUDGET or any(size < 0 for _, shape, _ in listed for size in shape):
+        raise InputRejected("X05", f"declares {declared} bytes of samples", where=source, remedy="split the recording")
+    names = [name for name, _, kind in listed if kind in (*_NUMERIC, "struct") and not name.startswith("__")]
+    foreign = [f"{name} ({kind})" for name, _, kind in listed if kind not in _HARMLESS]
+    if not names:
+        if foreign:
+            raise InputRejected("X07", f"holds only objects, which are never built: {', '.join(foreign)}", where=source,
+                                remedy="save the signals as numeric arrays, or timetables as struct of arrays")
+        raise InputRejected("S12", "no numeric variable", where=source, remedy="save the signals as numeric arrays")
+    return names
+
+
+def _opened(name: str, value: Any) -> Arrays:
+    """A variable, or the fields of a 1x1 structure; cells and deeper structures stay closed."""
+    if not isinstance(value, np.ndarray):
+        return {}
+    if value.dtype.names is None:
+        return {name: value}
+    if value.size != 1:
+        return {}
+    fields = {field: value[field].reshape(-1)[0] for field in value.dtype.names}
+    return {f"{name}.{field}": inner for field, inner in fields.items()
+            if isinstance(inner, np.ndarray) and inner.dtype.names is None and inner.dtype.kind in "fiubc"}
+
+
+def read_mat73(path: Path, source: str) -> Arrays:
+    """The numeric variables of a MAT file of version 7.3, or of any plain HDF5 file. Runs in the guarded child.
+
+    Raises:
+        InputRejected: F08, X01 external link, X02 external storage, X03 virtual data, X04 too many members, X05 too large.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            members = _scan(file, "", source)
+            declared = sum(dataset.nbytes for dataset in members.values())
+            if declared > BUDGET or declared > 1100 * path.stat().st_size + (64 << 20):
+                raise InputRejected("X05", f"declares {declared} bytes of samples", where=source, remedy="split the recording")
+            return {name: _read(dataset) for name, dataset in members.items()}
+    except InputRejected:
+        raise
+    except (*_DAMAGE, UnicodeError):
+        raise _damaged(source) from None
+
+
+def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:
+    import h5py
+
+    found: dict[str, Any] = {}
+    for count, name in enumerate(group):
+        if count > _MOST_MEMBERS:
+            raise InputRejected("X04", f"more than {_MOST_MEMBERS} members", where=source, remedy="save the signals alone")
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            raise InputRejected("X01", f"external link '{prefix}{name}' refused", where=source, remedy="store the data in the file itself")
+        if name in ("#refs#", "#subsystem#") or not isinstance(link, h5py.HardLink):
+            continue
+        kind = group.get(name, getclass=True)
+        if kind is h5py.Group and prefix.count(".") < 1:
+            found |= _scan(group[name], f"{prefix}{name}.", source)
+        elif kind is h5py.Dataset and (dataset := _usable(group[name], f"{prefix}{name}", source)) is not None:
+            found[f"{prefix}{name}"] = dataset
+    return found
+
+
+def _usable(dataset: Any, name: str, source: str) -> Any:
+    """X02, X03: a data set of plain numbers stored in this file; None for text, references and empty ones."""
+    if dataset.id.get_create_plist().get_external_count() > 0:
+        raise InputRejected("X02", f"'{name}' lies in another file: refused", where=source, remedy="store the data in the file itself")
+    if dataset.is_virtual:
+        raise InputRejected("X03", f"'{name}' is virtual: refused", where=source, remedy="store the data in the file itself")
+    plain = dataset.dtype.kind in "fiub" and dataset.shape is not None and "MATLAB_empty" not in dataset.attrs
+    cell = dataset.attrs.get("MATLAB_class", b"double") in (b"char", "char", b"cell", "cell", b"function_handle", "function_handle")
+    return dataset if plain and not cell and 1 <= len(dataset.shape) <= 2 else None
+
+
+def _read(dataset: Any) -> npt.NDArray[np.generic]:
+    values = np.asarray(dataset[()])
+    # MATLAB stores by columns: what HDF5 calls (n, samples) is a (samples, n) matrix.
+    return values.T if "MATLAB_class" in dataset.attrs else values

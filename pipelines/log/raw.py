@@ -1,0 +1,150 @@
+"""A recording as it was found: named columns of numbers, with everything a message needs to point back into the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import Check, InputRejected, did_you_mean
+from pipelines.log.experiment import Array
+
+__all__ = ["RawTable", "columns_of_arrays", "expand"]
+
+_WIDEST_MATRIX = 64  # more joints than any arm: what is wider is not "one column a joint"
+
+
+@dataclass(frozen=True, eq=False)
+class RawTable:
+    """Columns of equal length. `rows` numbers the samples as they stood in the file, so that one left out leaves a hole."""
+
+    source: str
+    columns: Mapping[str, Array]
+    rows: npt.NDArray[np.int64]  # (samples,) 0-based
+    units: Mapping[str, str] = field(default_factory=dict)  # what a header says
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # matrix -> its columns
+    text: Mapping[str, str] = field(default_factory=dict)  # columns that are not numbers -> an example
+    lines: npt.NDArray[np.int64] | None = None  # (samples,) line numbers, in a text file
+    breaks: tuple[int, ...] = ()  # index of the first sample after damage: the clock of a fixed rate is lost there
+    checks: tuple[Check, ...] = ()
+    sha256: str = ""
+
+    def place(self, index: int) -> str:
+        """Where sample `index` stands in the file, in words."""
+        return f"row {int(self.rows[index]) + 1}" if self.lines is None else f"line {int(self.lines[index])}"
+
+    def name_of(self, column: str | int) -> str:
+        """The name of a column asked for by name or by 1-based number.
+
+        Raises:
+            InputRejected: S01, there is none; S12, it does not hold numbers.
+        """
+        names = [*self.columns, *self.text]
+        if isinstance(column, int):
+            ordered = list(self.columns)
+            if not 1 <= column <= len(ordered):
+                raise InputRejected("S01", f"no column {column}; the file has {len(ordered)} columns of numbers", where=self.source)
+            return ordered[column - 1]
+        if column in self.text:
+            raise InputRejected("S12", f"column '{column}' holds no numbers but '{self.text[column]}'", where=self.source,
+                                remedy="export it as numbers, or choose another column")
+        if column not in self.columns:
+            raise InputRejected("S01", f"no column '{column}'{did_you_mean(column, names)}; there are {', '.join(names[:40])}",
+                                where=self.source, remedy=f"correct the recipe, or pass --map q_1='{names[0] if names else '…'}'")
+        return column
+
+
+def expand(table: RawTable, columns: str | int | tuple[str | int, ...], n: int, signal: str,
+           instead: Mapping[int, str] | None = None) -> tuple[str, ...]:
+    """The names of the `n` columns that hold `signal`: a list, a pattern such as "Joint_{j}", or the name of a matrix.
+
+    `instead` names the column of single joints (1-based) differently: what --map says.
+
+    Raises:
+        InputRejected: S01 a column is missing, S02 there are not `n` of them, S12 one holds no numbers.
+    """
+    if isinstance(columns, str) and "{j}" in columns:
+        if (further := columns.replace("{j}", str(n + 1))) in table.columns:
+            have = next(j for j in range(n + 1, 1000) if columns.replace("{j}", str(j + 1)) not in table.columns)
+            _wrong_count(table, signal, have, n, f"'{further}' is there as well")
+        columns = tuple(columns.replace("{j}", str(j)) for j in range(1, n + 1))
+    elif isinstance(columns, str) and columns not in table.columns and columns in table.groups:
+        columns = table.groups[columns]
+    chosen = (columns,) if isinstance(columns, str | int) else columns
+    if len(chosen) != n:
+        _wrong_count(table, signal, len(chosen), n, "the recipe names " + ", ".join(str(c) for c in chosen))
+    return tuple(table.name_of((instead or {}).get(j, column)) for j, column in enumerate(chosen, start=1))
+
+
+def _wrong_count(table: RawTable, signal: str, have: int, n: int, why: str) -> None:
+    raise InputRejected("S02", f"{have} columns for {signal}, but the robot has {n} joints ({why})", where=table.source,
+                        remedy="name the robot this was recorded on, or list the columns of its joints")
+
+
+def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str) -> RawTable:
+    """A table from named arrays of one or two dimensions (NPY, MAT), time along whichever axis is clearly longer.
+
+    Raises:
+        InputRejected: S11 where an array can be read both ways, S12 where none holds real numbers.
+    """
+    checks: list[Check] = []
+    columns: dict[str, Array] = {}
+    groups: dict[str, tuple[str, ...]] = {}
+    text: dict[str, str] = {}
+    for name, array in arrays.items():
+        if (problem := _not_real(array)) is not None:
+            text[name] = problem
+            continue
+        matrix = _upright(name, array, source, checks)
+        if matrix is None:
+            continue
+        names = (name,) if matrix.shape[1] == 1 else tuple(f"{name}_{j + 1}" for j in range(matrix.shape[1]))
+        groups[name] = names
+        columns |= {key: np.ascontiguousarray(matrix[:, j], dtype=np.float64) for j, key in enumerate(names)}
+    if not columns:
+        found = ", ".join(f"{name} ({what})" for name, what in text.items()) or "nothing"
+        raise InputRejected("S12", f"no array of real numbers; there is {found}", where=source,
+                            remedy="save plain numeric arrays, one row a sample")
+    length = max(len(column) for column in columns.values())
+    for name in [key for key, column in columns.items() if len(column) != length]:
+        text[name] = f"{len(columns.pop(name))} numbers, not {length} samples"
+    return RawTable(source, columns, np.arange(length), groups=groups, text=text, checks=tuple(checks))
+
+
+def _not_real(array: npt.NDArray[np.generic]) -> str | None:
+    """Why an array is not a signal, in words; None where it is one."""
+    if array.dtype.kind not in "fiub":
+        return {"c": "complex numbers", "O": "objects", "U": "text", "S": "text"}.get(array.dtype.kind, str(array.dtype))
+    if array.dtype.kind in "iu" and array.size and max(abs(int(array.max())), abs(int(array.min()))) > 2**53:
+        return f"{array.dtype} beyond 2^53, which a real number of 64 bit cannot hold exactly"
+    if array.ndim > 2 or array.ndim == 0:
+        return f"an array of {array.ndim} dimensions"
+    return None
+
+
+def _upright(name: str, array: npt.NDArray[np.generic], source: str, checks: list[Check]) -> npt.NDArray[np.generic] | None:
+    """S11: (samples, columns), or None for a scalar or something too wide to be a signal."""
+    matrix = array[:, None] if array.ndim == 1 else array
+    rows, wide = matrix.shape
+    if matrix.size <= 1:
+        return None
+    if rows >= 4 * wide or wide == 1 or (rows > wide and wide <= 3):
+        return matrix if wide <= _WIDEST_MATRIX else None
+    if wide >= 4 * rows:
+        if rows > _WIDEST_MATRIX:
+            return None
+        if rows > 1:
+            checks.append(Check.of("S11", "warn", f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}: time along the long side",
+                                   where=source, remedy="store one row a sample"))
+        return matrix.T
+    raise InputRejected("S11", f"'{name}' has shape {matrix.shape}: which side is time cannot be told", where=source,
+                        remedy="store one row a sample, with many more samples than columns")
+
+
+def header_unit(name: str) -> tuple[str, str]:
+    """("q1", "deg") from "q1 [deg]" or "q1 (deg)"; the unit is empty where the header says none."""
+    found = re.fullmatch(r"\s*(.*?)\s*[\[(]\s*([^\[\]()]{1,20})\s*[\])]\s*", name)
+    return (found.group(1), found.group(2)) if found and found.group(1) else (name.strip(), "")

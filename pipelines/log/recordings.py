@@ -1,0 +1,231 @@
+"""Gather what a recipe speaks of: its robot, its files, and the samples of each recording on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.errors import Check, InputRejected, NothingMatched, UsageError, did_you_mean
+from pipelines.log import filenames
+from pipelines.log.clock import time_of
+from pipelines.log.experiment import Array
+from pipelines.log.joint_side import drive_of, unit_declared
+from pipelines.log.raw import RawTable, expand
+from pipelines.log.recipe import FileSpec, Recipe, TableSpec, find_recipe, parse_recipe
+from pipelines.log.repair import Recording
+from pipelines.log.robot import Drive, RobotDescription, load_robot, parse_robot
+from pipelines.log.sources import read_table
+
+__all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
+
+Map = Mapping[str, Mapping[int, str]]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One recording: the file that a pattern matched, and the files that go with it."""
+
+    case: FileSpec | None
+    groups: Mapping[str, str]
+    primary: str  # relative to the source folder
+    tables: Mapping[str, RawTable]  # the same, of every file
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """Everything `import` reads."""
+
+    recipe: Recipe
+    recipe_path: Path
+    folder: Path
+    robot: RobotDescription
+    drive: Drive | None
+    sources: tuple[Source, ...]
+    tables: tuple[tuple[TableSpec, Mapping[str, str], RawTable], ...] = ()
+    ignored: tuple[str, ...] = ()
+    paths: tuple[Path, ...] = ()
+    assume_units: bool = False
+
+
+def collect(recipe_name: str | Path, source: str | None, robot: str | None, tell: Callable[[str], None]) -> Material:
+    """Read the recipe, its robot and every file it matches.
+
+    Raises:
+        NothingMatched: C06, no file fits. UsageError, InputRejected, EnvironmentFault: as the readers say.
+    """
+    path = find_recipe(recipe_name)
+    try:
+        recipe = replace(parse_recipe(path.read_text(encoding="utf-8"), path), where=str(path))
+    except (OSError, UnicodeDecodeError) as problem:
+        raise UsageError("C04", f"cannot be read: {problem}", where=path, remedy="give a recipe, a TOML file") from None
+    folder = Path(source) if source else path.parent
+    arm = _robot(recipe, folder, path, robot)
+    drive = drive_of(recipe.drive, arm, path)
+    names = filenames.files_below(folder)
+    cases = [*recipe.file, *([FileSpec(recipe.log.match)] if recipe.log.match else [])]
+    read: dict[str, RawTable] = {}
+
+    def table_of(name: str) -> RawTable:
+        if name not in read:
+            tell(f"reading {name}")
+            read[name] = read_table(filenames.inside(folder, name, path), recipe.format)
+        return read[name]
+
+    sources = [_source(case, groups, name, recipe, table_of, names, path)
+               for name in names if (hit := _case(cases, name)) is not None for case, groups in [hit]]
+    tables = [(spec, groups, table_of(name)) for name in names for spec in recipe.table
+              if (groups := filenames.match(spec.match, name)) is not None]
+    if not sources and not tables:
+        patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
+        raise NothingMatched("C06", f"no file matches {patterns}", where=folder, remedy="give the folder of the recordings with --source")
+    return Material(recipe, path, folder, replace(arm, drive=drive), drive, tuple(sources), tuple(tables),
+                    tuple(name for name in names if name not in read and (folder / name).resolve() != path.resolve()),
+                    (path, *(folder / name for name in read)))
+
+
+def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] | None:
+    for case in cases:
+        if (groups := filenames.match(case.match, name)) is not None:
+            return None if case.skip else (case, groups)
+    return None
+
+
+def _source(case: FileSpec, groups: dict[str, str], name: str, recipe: Recipe, table_of: Callable[[str], RawTable],
+            names: tuple[str, ...], where: Path) -> Source:
+    wanted = [_file_of(recipe, signal, groups, name, where) for signal in recipe.signals]
+    for other in wanted:
+        if other not in names:
+            raise InputRejected("S01", f"'{other}' is missing, which belongs to '{name}'{did_you_mean(other, names)}", where=where,
+                                remedy="copy it beside, or correct file = … in [signals]")
+    return Source(case, groups, name, {file: table_of(file) for file in dict.fromkeys([name, *wanted])})
+
+
+def _file_of(recipe: Recipe, signal: str, groups: Mapping[str, str], primary: str, where: object) -> str:
+    template = recipe.signals[signal].file
+    if template is None:
+        return primary
+    beside = Path(primary).parent / filenames.fill(template, groups, where)
+    return beside.as_posix()
+
+
+def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> RobotDescription:
+    """The robot of [robot]: a file beside the data or the recipe, a shipped one, or written out in the recipe."""
+    if override:
+        return load_robot(override)
+    table = dict(recipe.robot)
+    use = table.pop("use", None)
+    if use is None:
+        import tomli_w
+
+        return parse_robot(tomli_w.dumps(table), where=path)
+    for key in table:
+        if key not in ("name", "gravity"):
+            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, ('name', 'gravity'))}", where=path,
+                             remedy="beside use, name and gravity can be given; write the rest in the description")
+    if not isinstance(use, str) or not use.strip():
+        raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path, remedy="fill it in")
+    found = next((place / use for place in (folder, path.parent) if (place / use).is_file()), None)
+    robot = load_robot(found if found is not None else use)
+    if "name" in table:
+        robot = replace(robot, name=str(table["name"]))
+    gravity = table.get("gravity")
+    if gravity is None:
+        return robot
+    if not (isinstance(gravity, list | tuple) and len(gravity) == 3 and all(isinstance(g, int | float) for g in gravity)):
+        raise UsageError("C02", f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]", where=path)
+    return replace(robot, gravity=(float(gravity[0]), float(gravity[1]), float(gravity[2])))
+
+
+def parse_map(entries: tuple[str, ...], recipe: Recipe) -> Map:
+    """--map q_1=Joint_1: single columns named differently from the recipe.
+
+    Raises:
+        UsageError: C02, not of that form.
+    """
+    found: dict[str, dict[int, str]] = {}
+    for entry in entries:
+        left, equals, column = entry.partition("=")
+        signal, _, joint = left.strip().rpartition("_")
+        if left.strip() == "t":
+            signal, joint = "t", "1"
+        if not equals or not column.strip() or not joint.isdigit() or (signal not in recipe.signals and signal != "t"):
+            known = ", ".join([*recipe.signals, "t"])
+            raise UsageError("C02", f"'{entry}' is not signal_joint=column", where="--map", remedy=f"write --map q_1=Joint_1; signals: {known}")
+        found.setdefault(signal, {})[int(joint)] = column.strip()
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """A recording before any repair: one part a clock, units as declared, columns as used."""
+
+    recordings: tuple[Recording, ...]
+    units: Mapping[str, str]
+    columns: Mapping[str, tuple[str, ...]]
+    checks: tuple[Check, ...]
+
+
+def assemble(source: Source, material: Material, mapped: Map, assume_units: bool = False) -> Assembled:
+    """Pick columns, units and time of every file of a recording, and bring files of one clock together.
+
+    Raises:
+        InputRejected: S01-S05, S08, S12, S16, T06.
+    """
+    recipe, n = material.recipe, material.robot.n_joints
+    time = replace(recipe.time, column=mapped["t"][1]) if "t" in mapped else recipe.time
+    checks: list[Check] = [check for table in source.tables.values() for check in table.checks]
+    units: dict[str, str] = {}
+    columns: dict[str, tuple[str, ...]] = {}
+    recordings: list[Recording] = []
+    for file, table in source.tables.items():
+        here = [s for s in recipe.signals if _file_of(recipe, s, source.groups, source.primary, recipe.where) == file]
+        for signal in here:
+            spec = recipe.signals[signal]
+            columns[signal] = expand(table, spec.where or 1, n, signal, mapped.get(signal))
+            units[signal] = unit_declared(signal, spec, table, columns[signal], assume_units, checks)
+        if not here and file != source.primary:
+            continue
+        own_clock = time.column is None or file == source.primary or isinstance(time.column, int) or time.column in table.columns
+        t, said = time_of(table, time, assume_units) if own_clock else (np.full(table.rows.size, np.nan), [])
+        checks += said
+        signals: dict[str, Array] = {s: np.column_stack([table.columns[c] for c in columns[s]]) for s in here}
+        places = table.rows + 1 if table.lines is None else table.lines
+        recordings.append(Recording(t, signals, {s: columns[s] for s in here}, places, table.source, time.column is not None and own_clock,
+                                    "row" if table.lines is None else "line", table.breaks))
+    joined = _joined(recordings, list(source.tables.values()), time.column is not None, checks)
+    if len(joined) > 1 and recipe.resample is None:
+        raise InputRejected("T06", "the files have different time stamps", where=", ".join(source.tables),
+                            remedy="add [resample] rate = … to bring them on one clock")
+    return Assembled(joined, units, columns, tuple(checks))
+
+
+def _joined(recordings: list[Recording], tables: list[RawTable], clocked: bool, checks: list[Check]) -> tuple[Recording, ...]:
+    """Files whose rows belong together become one recording; files with clocks of their own stay apart."""
+    first, rows = recordings[0], tables[0].rows
+    apart: list[Recording] = []
+    for other, table in zip(recordings[1:], tables[1:], strict=True):
+        if clocked and other.clocked and not (other.t.shape == first.t.shape and np.array_equal(other.t, first.t, equal_nan=True)):
+            apart.append(other)
+            continue
+        _refuse_unequal(first, other, int(rows[-1]), int(table.rows[-1]), clocked and not other.clocked, checks)
+        common, a, b = np.intersect1d(rows, table.rows, assume_unique=True, return_indices=True)
+        breaks = tuple((np.flatnonzero(np.diff(common) > 1) + 1).tolist())
+        first = replace(first, t=first.t[a], places=first.places[a], columns={**first.columns, **other.columns}, breaks=breaks,
+                        signals={**{k: v[a] for k, v in first.signals.items()}, **{k: v[b] for k, v in other.signals.items()}})
+        rows = common
+    kept = [r for r in (first, *apart) if r.signals]
+    return tuple(kept)
+
+
+def _refuse_unequal(first: Recording, other: Recording, a: int, b: int, one_clock: bool, checks: list[Check]) -> None:
+    """S16: files without clocks of their own belong together row by row, so they must be equally long."""
+    if a == b:
+        return
+    where = f"{first.where}, {other.where}"
+    if one_clock or abs(a - b) > max(1, 1e-3 * max(a, b)):
+        raise InputRejected("S16", f"{a + 1} and {b + 1} samples: not of one recording", where=where,
+                            remedy="give files of the same run, or files with time stamps of their own and [resample]")
+    checks.append(Check.of("T06", "warn", f"{a + 1} and {b + 1} samples; the rows both have are used, counted from the start", where=where))

@@ -1,0 +1,210 @@
+"""Mend a recording where mending is honest, refuse it where it is not, and say every time what was done.
+
+Samples go in, samples come out: nothing is ever filled in. What is missing leaves a gap in time; a clock that was set
+back ends one log and begins the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import Check, InputRejected
+from pipelines.log.experiment import Array
+
+__all__ = ["Limits", "Recording", "mend", "split_at_gaps"]
+
+FEWEST = 11  # samples: with fewer there is no motion to speak of, and no log
+_MOST_STEPS = 3  # of the clock
+_SHORTEST_PART = 0.1  # of all samples
+_MOST_MISSING = 0.2
+_ABSURD = 1e18
+_SENTINELS = (-999.0, -9999.0, -99999.0, 999.0, 9999.0, 99999.0)
+
+Index = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Signals on one clock, still in recorded units."""
+
+    t: Array  # (samples,) [s]
+    signals: Mapping[str, Array]  # name -> (samples, joints)
+    columns: Mapping[str, tuple[str, ...]]  # name -> the file's column of each joint, for messages
+    places: Index  # (samples,) line or row of each sample in the file
+    where: str
+    clocked: bool = True  # the file has a column of time; else a rate was declared
+    word: str = "row"  # what `places` counts: "line" or "row"
+    breaks: tuple[int, ...] = ()  # samples before which the file is damaged
+
+    def take(self, chosen: slice | npt.NDArray[np.bool_]) -> Recording:
+        kept = np.flatnonzero(chosen) if isinstance(chosen, np.ndarray) else np.arange(self.t.size)[chosen]
+        breaks = tuple(sorted({int(np.searchsorted(kept, b)) for b in self.breaks} - {0, kept.size}))
+        return replace(self, t=self.t[chosen], signals={name: values[chosen] for name, values in self.signals.items()},
+                       places=self.places[chosen], breaks=breaks)
+
+    def listed(self, which: Index) -> str:
+        """Lines or rows in words, the first few."""
+        shown = ", ".join(str(self.places[i]) for i in which[:5])
+        return f"{self.word}{'s' if which.size != 1 else ''} {shown}{' …' if which.size > 5 else ''}"
+
+    def column(self, name: str, joint: int) -> str:
+        return f"{self.where}, column '{self.columns[name][joint]}'"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a recipe says of missing samples and gaps."""
+
+    missing: tuple[float, ...] = ()
+    longest_gap: float | None = None  # [s]; default 20 samples
+    resampled: bool = False
+
+
+def mend(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], tuple[Check, ...]]:
+    """The parts of a recording that can be logs, and what was done to get them.
+
+    Raises:
+        InputRejected: T01, T02, T04, T08, D02, D03: what cannot be mended.
+    """
+    checks: list[Check] = []
+    if recording.t.size < 2:
+        raise InputRejected("T08", f"{recording.t.size} sample{'s' if recording.t.size != 1 else ''}", where=recording.where, remedy="record again")
+    recording = _mark_missing(recording, limits.missing, checks)
+    recording = _drop_missing(recording, checks)
+    recording = _drop_duplicates(recording, checks)
+    parts = _split_at_steps(recording, checks)
+    for part in parts:
+        _report_clock(part, limits, checks)
+    return parts, tuple(checks)
+
+
+def _mark_missing(recording: Recording, missing: tuple[float, ...], checks: list[Check]) -> Recording:
+    """D03: declared sentinels become NaN; infinite, absurd and undeclared sentinel-like numbers are refused."""
+    signals = {}
+    for name, values in recording.signals.items():
+        values = values.copy()
+        if missing:
+            hit = np.isin(values, np.array(missing))
+            if (count := int(hit.sum())) > 0:
+                values[hit] = np.nan
+                checks.append(Check.of("D03", "repair", f"{count} numbers of {name} are declared missing values", where=recording.where))
+        for joint in range(values.shape[1]):
+            _refuse_absurd(recording, name, joint, values[:, joint])
+        signals[name] = values
+    return replace(recording, signals=signals)
+
+
+def _refuse_absurd(recording: Recording, name: str, joint: int, values: Array) -> None:
+    bad = np.flatnonzero(np.isinf(values) | (np.abs(values) >= _ABSURD))
+    remedy = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
+    if bad.size:
+        raise InputRejected("D03", f"{values[bad[0]]:g} in {recording.listed(bad)}", where=recording.column(name, joint),
+                            remedy=remedy.format(f"{values[bad[0]]:g}"))
+    for sentinel in _SENTINELS:
+        hit = values == sentinel
+        rest = np.abs(values[~hit & np.isfinite(values)])
+        if hit.any() and rest.size and rest.max() < abs(sentinel) / 5.0:
+            raise InputRejected("D03", f"{sentinel:g} in {recording.listed(np.flatnonzero(hit))} looks like 'no sample', nothing else comes near it",
+                                where=recording.column(name, joint), remedy=remedy.format(f"{sentinel:g}"))
+
+
+def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
+    """D01, D02: samples with a hole are left out, which leaves a gap in time; a channel of holes is refused."""
+    lost = ~np.isfinite(recording.t)
+    if lost.all():
+        raise InputRejected("D02", "no time stamp is a number", where=recording.where, remedy="choose another column of time")
+    for name, values in recording.signals.items():
+        holes = np.isnan(values)
+        for joint in np.flatnonzero(holes.mean(axis=0) > _MOST_MISSING):
+            share = holes[:, joint].mean()
+            raise InputRejected("D02", "holds no number at all" if share == 1.0 else f"{100 * share:.0f} % of its samples are missing",
+                                where=recording.column(name, int(joint)), remedy="choose another column, or record again")
+        lost |= holes.any(axis=1)
+    if not lost.any():
+        return recording
+    which = np.flatnonzero(lost)
+    if lost.mean() > _MOST_MISSING:
+        raise InputRejected("D02", f"{which.size} of {lost.size} samples have a missing value", where=recording.where, remedy="record again")
+    checks.append(Check.of("D01", "repair", f"{which.size} of {lost.size} samples with a missing value left out ({recording.listed(which)})",
+                           where=recording.where))
+    return recording.take(~lost)
+
+
+def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
+    """T02: a sample written twice is dropped; one stamp with two values is refused."""
+    again = np.concatenate([[False], np.diff(recording.t) == 0.0])
+    if not again.any():
+        return recording
+    which = np.flatnonzero(again)
+    differ = np.zeros(which.size, dtype=bool)
+    for values in recording.signals.values():
+        differ |= (values[which] != values[which - 1]).any(axis=1)
+    if differ.any():
+        raise InputRejected("T02", f"{int(differ.sum())} time stamps stand twice with different values ({recording.listed(which[differ])})",
+                            where=recording.where, remedy="record time with more digits, or import by rate instead of the column")
+    checks.append(Check.of("T02", "repair", f"{which.size} samples that stand twice dropped ({recording.listed(which)})", where=recording.where))
+    return recording.take(~again)
+
+
+def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recording, ...]:
+    """T01: where the clock was set back (or, without a clock, lines are lost) one part ends and another begins."""
+    back = np.flatnonzero(np.diff(recording.t) < 0.0) + 1
+    if back.size > _MOST_STEPS:
+        raise InputRejected("T01", f"time runs backwards {back.size} times ({recording.listed(back)})", where=recording.where,
+                            remedy="sort the file by time, or choose another column of time")
+    cuts = sorted({*map(int, back), *(() if recording.clocked else recording.breaks)})
+    if not cuts:
+        return (_long_enough(recording),)
+    parts = [recording.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, recording.t.size], strict=True)]
+    kept = tuple(part for part in parts if part.t.size >= max(FEWEST, _SHORTEST_PART * recording.t.size))
+    dropped = recording.t.size - sum(part.t.size for part in kept)
+    code, why = ("T01", "time steps back") if back.size else ("F09", "lines are lost and no clock says how many")
+    checks.append(Check.of(code, "repair", f"{why} at {recording.listed(np.array(cuts))}: split into {len(kept)} part{'s' if len(kept) != 1 else ''}"
+                           f"{f', {dropped} samples of short parts left out' if dropped else ''}", where=recording.where))
+    if not kept:
+        _long_enough(parts[0])
+    return kept
+
+
+def _long_enough(recording: Recording) -> Recording:
+    if recording.t.size < FEWEST:
+        raise InputRejected("T08", f"{recording.t.size} samples left; a log needs {FEWEST}", where=recording.where, remedy="record longer")
+    return recording
+
+
+def _report_clock(part: Recording, limits: Limits, checks: list[Check]) -> None:
+    """T03, T04, T05: lost samples and uneven time are said; they stay as gaps of `t`, for no sample is invented."""
+    steps = np.diff(part.t)
+    median = float(np.median(steps))
+    jitter = float(np.percentile(np.abs(steps - median), 95)) / median
+    gaps = np.flatnonzero(steps > (1.5 if jitter < _MOST_MISSING else 3.0) * median)
+    longest = _longest_gap(part, limits)
+    lost = int(np.round(steps[gaps] / median - 1.0).sum())
+    if lost:
+        share = 100.0 * lost / (lost + part.t.size)
+        checks.append(Check.of("T03", "warn", f"{lost} samples ({share:.2g} %) are lost in {gaps.size} gaps after {part.listed(gaps)}", where=part.where))
+    wide = gaps[steps[gaps] > longest]
+    if wide.size:
+        if steps[wide].sum() > 0.5 * (part.t[-1] - part.t[0]):
+            raise InputRejected("T04", f"gaps of up to {steps.max():.4g} s make more than half of the recording", where=part.where, remedy="record again")
+        checks.append(Check.of("T04", "repair" if limits.resampled else "warn", f"{wide.size} gaps longer than {longest:.4g} s, the longest "
+                               f"{steps.max():.4g} s after {part.listed(wide[:1])}; {'split there' if limits.resampled else 'kept as gaps of time'}",
+                               where=part.where))
+    if jitter > 0.05 and not limits.resampled:
+        checks.append(Check.of("T05", "warn", f"time is uneven: 95 % of the steps lie within {100 * jitter:.0f} % of {median:.6g} s",
+                               where=part.where, remedy="add [resample] rate = … for an even grid"))
+
+
+def _longest_gap(part: Recording, limits: Limits) -> float:
+    return limits.longest_gap if limits.longest_gap is not None else 20.0 * float(np.median(np.diff(part.t)))
+
+
+def split_at_gaps(part: Recording, limits: Limits) -> tuple[Recording, ...]:
+    """The stretches between gaps longer than the limit: nothing is ever interpolated across one (T04)."""
+    cuts = (np.flatnonzero(np.diff(part.t) > _longest_gap(part, limits)) + 1).tolist()
+    stretches = [part.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, part.t.size], strict=True)]
+    return tuple(s for s in stretches if s.t.size >= max(FEWEST, _SHORTEST_PART * part.t.size / (len(cuts) + 1))) or (part,)

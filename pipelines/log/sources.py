@@ -1,0 +1,106 @@
+"""Read a recorded file by what it is, not by what it is called: text, NPY, MAT v5 or v7.3."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.errors import Check, InputRejected
+from pipelines.log.arrays import read_npy
+from pipelines.log.atomic import fault_of
+from pipelines.log.dialect import TextFormat
+from pipelines.log.files import regular_file
+from pipelines.log.guard import Answer, guarded
+from pipelines.log.matlab import read_mat5, read_mat73
+from pipelines.log.raw import RawTable, columns_of_arrays
+from pipelines.log.tabular import read_text
+
+__all__ = ["read_table"]
+
+_LARGEST = 2 << 30  # [B]
+_ENDINGS = {"npy": (".npy",), "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5"), "text": ()}
+_REFUSED = ((b"PAR1", "F06", "a Parquet file", "rrrid convert and inspect read logs; import reads CSV, MAT and NPY"),
+            (b"PK\x03\x04", "X12", "an archive (zip, xlsx or npz)", "unpack it, or export the sheet as CSV"),
+            (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
+            (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"))
+
+
+def read_table(path: Path, text: TextFormat | None = None) -> RawTable:
+    """Everything numeric in a recorded file.
+
+    Raises:
+        InputRejected: the file is damaged, hostile or holds no table; the code says which.
+        EnvironmentFault: no permission.
+    """
+    status = regular_file(path)
+    if status.st_size > _LARGEST:
+        raise InputRejected("X05", f"{status.st_size} bytes; import reads files up to {_LARGEST}", where=path, remedy="split the recording")
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with os.fdopen(handle, "rb") as file:
+            data = file.read(_LARGEST + 1)
+    except OSError as problem:
+        raise fault_of(problem, path) from None
+    source = path.name
+    kind = _kind(data, source)
+    table = _read(kind, data, path, source, text)
+    checks = table.checks
+    named = {ending: what for what, endings in _ENDINGS.items() for ending in endings}.get(path.suffix.lower(), "text")
+    if path.suffix.lower() not in _ENDINGS[kind] and named != kind:
+        checks = (Check.of("F06", "warn", f"named '{path.suffix}', but its content is {kind}; read as that", where=source), *checks)
+    return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
+
+
+def _kind(data: bytes, source: str) -> str:
+    """F06: what the first bytes say."""
+    for magic, code, what, remedy in _REFUSED:
+        if data.startswith(magic):
+            raise InputRejected(code, f"{what}, not a recording", where=source, remedy=remedy)
+    if data.startswith(b"\x93NUMPY"):
+        return "npy"
+    if data[:1] == b"\x80" and data[1:2] in (b"\x02", b"\x03", b"\x04", b"\x05"):
+        raise InputRejected("X07", "a pickle, which is never opened", where=source, remedy="save plain numbers as NPY or CSV")
+    if data.startswith(b"\x89HDF\r\n\x1a\n") or data.startswith(b"MATLAB 7.3"):
+        return "mat73"
+    if data.startswith(b"MATLAB 5.0") or _is_mat4(data, source):
+        return "mat5"
+    return "text"
+
+
+def _is_mat4(data: bytes, source: str) -> bool:
+    return source.lower().endswith(".mat") and len(data) > 20 and b"\0" in data[:4]
+
+
+def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
+    if kind == "text":
+        return read_text(data, source, text)
+    if kind == "npy":
+        return columns_of_arrays(read_npy(data, source), source)
+    if kind == "mat5":
+        import scipy.io  # noqa: F401  imported before the fork, so that every child has it
+
+        return _in_child(lambda: columns_of_arrays(read_mat5(data, source), source), path)
+    import h5py  # noqa: F401
+
+    return _in_child(lambda: columns_of_arrays(read_mat73(path, source), source), path)
+
+
+def _in_child(read: Callable[[], RawTable], path: Path) -> RawTable:
+    """The table, read where a crash or a flood of memory costs a child process only."""
+    def work() -> Answer:
+        table = read()
+        about = {"names": list(table.columns), "text": dict(table.text), "groups": {k: list(v) for k, v in table.groups.items()},
+                 "checks": [check.as_dict() for check in table.checks]}
+        return Answer(about, {str(i): values for i, values in enumerate(table.columns.values())})
+
+    answer = guarded(work, path)
+    about = answer.about
+    columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
+    return RawTable(path.name, columns, np.arange(len(next(iter(columns.values())))), text=about["text"],
+                    groups={key: tuple(names) for key, names in about["groups"].items()},
+                    checks=tuple(Check(**check) for check in about["checks"]))
