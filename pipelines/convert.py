@@ -93,7 +93,8 @@ def report(result: Result) -> Report:
                   tuple((c.name, c.source, c.file, c.samples, c.joints) for c in result.logs),
                   caption="Each was read back after writing and is equal to its source, sample for sample and attribute for attribute."
                   if not all(c.file.startswith("csv") for c in result.logs) else "Numbers are written with all their digits.")
-    return Report("Convert", f"{n} log{'s' if n != 1 else ''} converted.", "good", sections=(Section("Logs", tables=(table,)),))
+    verdict = f"{n} log{'s' if n != 1 else ''} converted."
+    return Report("Convert", verdict, "good", sections=(Section("Logs", tables=(table,)),))
 
 
 STAGE = Stage("convert", "Convert logs from one container to the other", Settings, compute, report, read_logs, write)

@@ -195,7 +195,8 @@ def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request,
     about = {
         "tool": "rrrid", "version": VERSION, "command": stage.name,
         "settings": encode(settings)[0] if dataclasses.is_dataclass(settings) else {},
-        "options": {"strict": request.strict, "assume_units": request.assume_units, "robot": request.robot, "format": request.format},
+        "options": {"strict": request.strict, "assume_units": request.assume_units, "robot": request.robot,
+                    "format": request.format},
         "inputs": {str(path): value for path, value in hashes.items()}, "outputs": outputs,
         "python": platform.python_version(), "libraries": _libraries(),
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(started)), "duration": time.time() - started,
@@ -227,7 +228,8 @@ def refuse_foreign(out: Path, inputs: Iterable[Path], force: bool = False) -> No
         ours = set(about["outputs"]) | {PROVENANCE} if about.get("tool") == "rrrid" else set()
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         ours = set()
-    foreign = sorted(p.relative_to(out).as_posix() for p in out.rglob("*") if not p.is_dir() and p.relative_to(out).as_posix() not in ours)
+    there = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
+    foreign = sorted(there - ours)
     if foreign and not (force and ours):
         raise UsageError("C05", f"holds files that rrrid did not write there: {', '.join(foreign[:3])}", where=out,
                          remedy="choose another folder with --out, or move them")
@@ -239,7 +241,8 @@ def slug(text: str) -> str:
     import re
 
     plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:71]
-    reserved = plain.split(".")[0].upper() in {"CON", "PRN", "AUX", "NUL", *(f"{p}{i}" for p in ("COM", "LPT") for i in range(1, 10))}
+    reserved = plain.split(".")[0].upper() in {"CON", "PRN", "AUX", "NUL",
+                                               *(f"{p}{i}" for p in ("COM", "LPT") for i in range(1, 10))}
     if plain == text and plain and not reserved:
         return plain
     return f"{plain or 'x'}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"

@@ -49,7 +49,8 @@ def inspect(logs: LogPaths, common: Common) -> None:
 @with_common
 def import_(
     common: Common,
-    recipe: Annotated[str | None, typer.Argument(help="Recipe: a TOML file, or the name of a shipped one.", show_default=False)] = None,
+    recipe: Annotated[str | None,
+                      typer.Argument(help="Recipe: a TOML file, or the name of a shipped one.", show_default=False)] = None,
     source: Annotated[Path | None, typer.Option(help="Folder the recordings are in. [the recipe's]")] = None,
     map: Annotated[list[str] | None, typer.Option(help="Column to take for a signal: q_1=Joint_1. Repeatable.")] = None,
     guess: Annotated[Path | None, typer.Option(help="Draft a recipe for this recording, with the evidence; print it.")] = None,
@@ -93,7 +94,8 @@ def _guess(path: Path, common: Common) -> None:
 
     drafted = guess_recipe(path)
     if common.out is not None:
-        raise UsageError("C02", "--guess prints its draft", where="--out", remedy="redirect it: rrrid import --guess FILE > recipe.toml")
+        raise UsageError("C02", "--guess prints its draft", where="--out",
+                         remedy="redirect it: rrrid import --guess FILE > recipe.toml")
     if common.json:
         from pipelines.log.results import encode, json_text
 

@@ -34,9 +34,11 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
     for where, table in (*_from_file(config), *_from_sets(sets)):
         for name, options in table.items():
             if name not in stages:
-                raise UsageError("C01", f"'{name}' is no stage{did_you_mean(name, stages)}", where=where, remedy="write STAGE.OPTION")
+                raise UsageError("C01", f"'{name}' is no stage{did_you_mean(name, stages)}", where=where,
+                                 remedy="write STAGE.OPTION")
             if not isinstance(options, Mapping):
-                raise UsageError("C01", f"'{name}' is a stage, not an option", where=where, remedy=f"write [{name}] and its options below")
+                raise UsageError("C01", f"'{name}' is a stage, not an option", where=where,
+                                 remedy=f"write [{name}] and its options below")
             if name == stage:
                 chosen |= {key: _value(kind, key, value, f"{where}, {name}.{key}") for key, value in options.items()}
     return kind(**(chosen | {key: value for key, value in given.items() if value is not None}))
@@ -72,21 +74,24 @@ def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
     hints = typing.get_type_hints(kind)
     if name not in hints:
         known = [field.name for field in dataclasses.fields(kind)]
-        raise UsageError("C01", f"no such option{did_you_mean(name, known)}", where=where, remedy=f"there are: {', '.join(known) or 'none'}")
+        raise UsageError("C01", f"no such option{did_you_mean(name, known)}", where=where,
+                         remedy=f"there are: {', '.join(known) or 'none'}")
     wanted = hints[name]
     options = typing.get_args(wanted) if typing.get_origin(wanted) in (typing.Union, types.UnionType) else (wanted,)
     for option in options:
         fits, converted = _as_kind(option, value)
         if fits:
             return converted
-    raise UsageError("C02", f"{value!r} is not a {getattr(options[0], '__name__', options[0])}", where=where, remedy="correct the value")
+    raise UsageError("C02", f"{value!r} is not a {getattr(options[0], '__name__', options[0])}", where=where,
+                     remedy="correct the value")
 
 
 def _as_kind(kind: Any, value: Any) -> tuple[bool, Any]:
     if kind is bool or isinstance(value, bool):
         return kind is bool and isinstance(value, bool), value
     if kind is float:
-        return isinstance(value, int | float) and math.isfinite(value), value if isinstance(value, str) else float(value) if isinstance(value, int | float) else value
+        fits = isinstance(value, int | float) and math.isfinite(value)
+        return fits, float(value) if fits else value
     if kind in (int, str):
         return isinstance(value, kind), value
     if kind is Path:

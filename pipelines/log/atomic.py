@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import platform
 import secrets
 import shutil
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -50,7 +52,8 @@ def write_file(path: Path, fill: Callable[[Path], None]) -> None:
     with environment_faults(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         # The ending stays: writers choose the container by it.
-        draft = path.parent / f"{_MARK}{os.getpid()}-{secrets.token_hex(4)}{path.suffix}"
+        _sweep(path.parent)
+        draft = path.parent / f"{_prefix()}{os.getpid()}-{secrets.token_hex(4)}{path.suffix}"
         try:
             fill(draft)
             _sync(draft)
@@ -64,14 +67,12 @@ def write_file(path: Path, fill: Callable[[Path], None]) -> None:
 def staging_folder(target: Path) -> Path:
     """An empty hidden folder beside `target`, to be filled and given to `replace_folder`.
 
-    What a killed process left behind for the same target is swept away first.
+    What a killed process left behind there is swept away first.
     """
     with environment_faults(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-        for left in target.parent.glob(f"{_MARK}*-{target.name}"):
-            if not _alive(left):
-                shutil.rmtree(left, ignore_errors=True)
-        folder = target.parent / f"{_MARK}{os.getpid()}-{secrets.token_hex(4)}-{target.name}"
+        _sweep(target.parent)
+        folder = target.parent / f"{_prefix()}{os.getpid()}-{secrets.token_hex(4)}"
         folder.mkdir()
         return folder
 
@@ -94,10 +95,31 @@ def replace_folder(staging: Path, target: Path) -> None:
         _sync(target.parent)
 
 
-def _alive(left: Path) -> bool:
-    """Is the process that made this staging folder still running?"""
-    number = left.name.removeprefix(_MARK).split("-")[0]
-    return number.isdigit() and Path(f"/proc/{number}").exists() and int(number) != os.getpid()
+def _prefix() -> str:
+    """The beginning of this machine's drafts: another machine's processes cannot be asked whether they live."""
+    return f"{_MARK}{zlib.crc32(platform.node().encode()):08x}-"
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what killed processes of this machine left behind in `folder`."""
+    for left in folder.glob(f"{_prefix()}*"):
+        number = left.name.removeprefix(_prefix()).split("-")[0]
+        if not number.isdigit() or _alive(int(number)):
+            continue
+        if left.is_dir():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _exchange(a: Path, b: Path) -> bool:

@@ -186,7 +186,8 @@ def from_parts(groups: Mapping[str, object], signals: Mapping[str, Signal], *, w
     if not isinstance(robot, str):
         raise InputRejected("S01", "the robot description is missing", where=where, remedy="a log explains itself: write /robot")
     values = _checked(groups.get("attributes"), _ATTRIBUTES, where)
-    controller = Controller(**_checked(groups["controller"], _CONTROLLER, f"{where}, controller")) if "controller" in groups else None
+    controller = Controller(**_checked(groups["controller"], _CONTROLLER,
+                                       f"{where}, controller")) if "controller" in groups else None
     derived = Derived(**_checked(groups["derived"], _DERIVED, f"{where}, derived")) if "derived" in groups else None
     return ExperimentLog(**values, robot_text=robot, signals=signals, controller=controller, derived=derived, source=where)
 
@@ -202,10 +203,12 @@ def _checked(found: object, known: Mapping[str, tuple[Kind, bool]], where: str) 
     for name, (kind, required) in known.items():
         if name not in found:
             if required:
-                raise InputRejected("S01", f"attribute '{name}' is missing", where=where, remedy="write it, or import the recording again")
+                raise InputRejected("S01", f"attribute '{name}' is missing", where=where,
+                                    remedy="write it, or import the recording again")
             continue
         try:
             values[name] = kind(found[name])
         except _WrongKind as wanted:
-            raise InputRejected("S20", f"attribute '{name}' is {found[name]!r}, not {wanted}", where=where, remedy="correct it") from None
+            raise InputRejected("S20", f"attribute '{name}' is {found[name]!r}, not {wanted}", where=where,
+                                remedy="correct it") from None
     return values

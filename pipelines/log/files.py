@@ -164,7 +164,8 @@ def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
         with path.open("rb") as file:
             file.seek(max(0, size - 4))
             if file.read() != _PARQUET_MAGIC:
-                raise InputRejected("F07", "truncated: no footer", where=path, remedy="copy the file again from where it was recorded")
+                raise InputRejected("F07", "truncated: no footer", where=path,
+                                    remedy="copy the file again from where it was recorded")
     else:
         raise InputRejected("F06", "neither HDF5 nor Parquet", where=path,
                             remedy="rrrid reads logs in .h5 and .parquet, and imports .csv, .txt, .mat and .npy by a recipe")
@@ -234,12 +235,13 @@ def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
     for entry in entries:
         if entry.name.startswith("."):
             continue
-        if entry.is_symlink() and not entry.resolve().is_relative_to(root):
-            checks.append(Check.of("X11", "warn", "link out of the folder passed over", where=entry))
+        linked = entry.is_symlink()
+        if linked and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
+            checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry))
         elif entry.is_dir():
-            if not entry.is_symlink() and not (entry / _PROVENANCE).is_file():
+            if not (entry / _PROVENANCE).is_file():
                 found += _below(entry, root, checks)
-        elif entry.suffix.lower() in ENDINGS and not (entry.is_symlink() and not entry.exists()):
+        elif entry.suffix.lower() in ENDINGS and entry.exists():
             found.append(entry)
     return found
 

@@ -7,6 +7,7 @@ memory that both share, and everything else as JSON: nothing that a hijacked chi
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import mmap
 import os
@@ -100,6 +101,7 @@ def _serve(work: Callable[[], Answer], send: int, store: int, budget: int) -> No
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         _limit_memory(budget)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # HDF5 prints its error stack there
+        faulthandler.disable()  # a crash here is the parent's to tell
         try:
             answer = work()
             reply: dict[str, Any] = {"about": answer.about, "arrays": _store(answer.arrays, store)}
@@ -135,7 +137,7 @@ def _store(arrays: Mapping[str, Array], store: int) -> dict[str, list[int]]:
     for name, values in arrays.items():
         flat = np.ascontiguousarray(values, dtype=np.float64)
         places[name] = [offset, *flat.shape]
-        view = memoryview(flat).cast("B") if flat.size else memoryview(b"")
+        view = flat.reshape(-1).view(np.uint8).data
         while view:
             written = os.pwrite(store, view, offset)
             offset, view = offset + written, view[written:]
@@ -144,7 +146,7 @@ def _store(arrays: Mapping[str, Array], store: int) -> dict[str, list[int]]:
 
 def _listen(receive: int, deadline: float) -> tuple[bytes, bool]:
     """Everything the child says until it closes its end; False where the time ran out first."""
-    parts = []
+    parts: list[bytes] = []
     while True:
         ready, _, _ = select.select([receive], [], [], max(0.0, deadline - time.monotonic()))
         if not ready:
@@ -157,9 +159,11 @@ def _listen(receive: int, deadline: float) -> tuple[bytes, bool]:
 
 def _answer(text: bytes, complete: bool, status: int, store: int, path: Path, limit: float) -> Answer:
     if not complete:
-        raise InputRejected("F03", f"reading did not end within {limit:.0f} s, the file is damaged", where=path, remedy="copy the file again")
+        raise InputRejected("F03", f"reading did not end within {limit:.0f} s, the file is damaged", where=path,
+                            remedy="copy the file again")
     if os.WIFSIGNALED(status):
-        raise InputRejected("F03", f"the reading library crashed on it (signal {os.WTERMSIG(status)}), the file is damaged", where=path,
+        raise InputRejected("F03", f"the reading library crashed on it (signal {os.WTERMSIG(status)}), the file is damaged",
+                            where=path,
                             remedy="copy the file again")
     reply = json.loads(text)
     if "error" in reply:

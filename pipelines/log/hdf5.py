@@ -102,7 +102,8 @@ def _version(attributes: dict[str, object], where: str) -> None:
         raise InputRejected("F06", f"an HDF5 file, but not an experiment log: its format is {form!r}", where=where,
                             remedy="use 'rrrid import' with a recipe to make a log of a recording")
     if not isinstance(version, int) or version != schema.FORMAT_VERSION:
-        raise InputRejected("F11", f"format_version {version}; this program understands version {schema.FORMAT_VERSION}", where=where,
+        raise InputRejected("F11", f"format_version {version}; this program understands version {schema.FORMAT_VERSION}",
+                            where=where,
                             remedy="update rrrid, or write the log in that version")
 
 
@@ -112,14 +113,17 @@ def _refuse_links(group: Any, known: tuple[str, ...], where: str) -> None:
 
     for count, name in enumerate(group):
         if count > _MANY_ATTRIBUTES:
-            raise InputRejected("X04", f"more than {_MANY_ATTRIBUTES} members", where=where, remedy="a log holds robot, controller and signals")
+            raise InputRejected("X04", f"more than {_MANY_ATTRIBUTES} members", where=where,
+                                remedy="a log holds robot, controller and signals")
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
-            raise InputRejected("X01", f"external link '{name}' to another file refused", where=where, remedy="store the data in the log itself")
+            raise InputRejected("X01", f"external link '{name}' to another file refused", where=where,
+                                remedy="store the data in the log itself")
         if isinstance(link, h5py.SoftLink):
             raise InputRejected("X04", f"soft link '{name}' refused", where=where, remedy="store the data in the log itself")
         if name not in known:
-            raise InputRejected("S19", f"'{name}' is not in format version {schema.FORMAT_VERSION}", where=where, remedy="remove it")
+            raise InputRejected("S19", f"'{name}' is not in format version {schema.FORMAT_VERSION}", where=where,
+                                remedy="remove it")
 
 
 def _group(file: Any, name: str, where: str) -> Any:
@@ -163,7 +167,8 @@ def _robot_text(file: Any, where: str) -> str:
     import h5py
 
     if file.get("robot", getclass=True) is not h5py.Dataset:
-        raise InputRejected("S01", "the robot description /robot is missing", where=where, remedy="a log explains itself: write /robot")
+        raise InputRejected("S01", "the robot description /robot is missing", where=where,
+                            remedy="a log explains itself: write /robot")
     dataset = file["robot"]
     if dataset.shape != () or h5py.check_string_dtype(dataset.dtype) is None or _foreign_storage(dataset):
         raise InputRejected("S20", "/robot is not a scalar text", where=where)
@@ -189,7 +194,8 @@ def _within_budget(signals: Any, file_size: int, where: str) -> None:
             raise InputRejected("S19", "not a data set", where=place)
         dataset = signals[name]
         if foreign := _foreign_storage(dataset):
-            raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=place, remedy="store the data in the log itself")
+            raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=place,
+                                remedy="store the data in the log itself")
         if dataset.dtype.kind not in "fiu" or dataset.dtype.itemsize > 8 or dataset.ndim not in (1, 2):
             raise InputRejected("S12", f"type {dataset.dtype} of shape {dataset.shape}, not real numbers over samples", where=place,
                                 remedy="store float64 of shape (samples, joints)")
@@ -225,7 +231,8 @@ def _signal(dataset: Any, where: str) -> Signal:
     try:
         stored = dataset[()]
     except OSError as problem:
-        code, what = ("F04", "checksum mismatch, the data are damaged") if "filter" in str(problem) or "etcher" in str(problem) else (
+        code, what = ("F04",
+                      "checksum mismatch, the data are damaged") if "filter" in str(problem) or "etcher" in str(problem) else (
             "F02", f"the data cannot be read: {problem}")
         raise InputRejected(code, what, where=where, remedy="copy the file again from where it was recorded") from None
     return Signal(as_reals(stored, where), str(attributes.get("units", "")), str(attributes.get("long_name", "")))
@@ -246,7 +253,8 @@ def _explain(problem: BaseException, path: Path) -> InputRejected:
     if found := re.search(r"eof = (\d+).*stored_eof = (\d+)", text):
         return InputRejected("F02", f"truncated: {found[1]} of {found[2]} bytes", where=path, remedy=again)
     if "h5clear" in text or "already open for write" in text or "object header" in text:
-        return InputRejected("F03", "not closed properly by the program that wrote it", where=path, remedy="try 'h5clear -s FILE', or record again")
+        return InputRejected("F03", "not closed properly by the program that wrote it", where=path,
+                             remedy="try 'h5clear -s FILE', or record again")
     if isinstance(problem, MemoryError):
         return InputRejected("X05", "needs more memory than a log may", where=path, remedy="split the recording")
     return InputRejected("F02", f"damaged: {text or type(problem).__name__}", where=path, remedy=again)

@@ -100,7 +100,8 @@ def write_series(path: Path, series: Mapping[str, Array]) -> None:
     with h5py.File(path, "w", libver=("v110", "v110")) as file:
         file.attrs["format"] = "rrrid-result"
         for name, values in series.items():
-            file.create_dataset(name, data=values, compression="gzip", compression_opts=1, shuffle=True, fletcher32=True, track_times=False)
+            file.create_dataset(name, data=values, compression="gzip", compression_opts=1, shuffle=True, fletcher32=True,
+                                track_times=False)
 
 
 def read_series(path: Path) -> dict[str, Array]:

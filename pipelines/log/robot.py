@@ -117,7 +117,7 @@ class _Reader:
             if key not in known:
                 self.wrong(key, f"is not a key of the format{did_you_mean(key, known)}", code="C01")
 
-    def text(self, key: str, default: str | None = None, among: Iterable[str] | None = None) -> str:
+    def text(self, key: str, default: str | None = None, among: tuple[str, ...] | None = None) -> str:
         value = self.table.get(key, default)
         if not isinstance(value, str) or not value.strip():
             self.wrong(key, "must be a text that is not empty" if key in self.table else "is missing")
@@ -138,9 +138,10 @@ class _Reader:
 
     def numbers(self, key: str, size: int, infinite: bool = False) -> tuple[float, ...]:
         value = self.table.get(key)
-        if not isinstance(value, list) or len(value) != size:
+        entries: list[object] = value if isinstance(value, list) else []
+        if len(entries) != size:
             self.wrong(key, f"must be a list of {size} numbers")
-        inner = _Reader({f"{key}[{i}]": v for i, v in enumerate(value)}, self.path, self.fail, self.where)  # type: ignore[arg-type]
+        inner = _Reader({f"{key}[{i}]": entry for i, entry in enumerate(entries)}, self.path, self.fail, self.where)
         return tuple(inner.number(k, infinite=infinite) for k in inner.table)
 
 
@@ -189,9 +190,9 @@ def _joint(read: _Reader, convention: str) -> Joint:
     geometric = {} if convention == "urdf" else {key: read.number(key) for key in ("a", "alpha", "d", "offset")}
     if convention == "urdf" and "offset" in read.table:
         geometric = {"offset": read.number("offset")}
-    position = read.numbers("position", 2, infinite=True) if "position" in read.table else (-math.inf, math.inf)
-    if position[0] >= position[1]:
-        read.wrong("position", f"its lower end {position[0]} is not below its upper end {position[1]}")
+    low, high = read.numbers("position", 2, infinite=True) if "position" in read.table else (-math.inf, math.inf)
+    if low >= high:
+        read.wrong("position", f"its lower end {low} is not below its upper end {high}")
     limits = {key: read.number(key, default=math.inf, low=0.0, infinite=True)
               for key in ("velocity", "acceleration", "torque")}
     for key, value in limits.items():
@@ -199,7 +200,7 @@ def _joint(read: _Reader, convention: str) -> Joint:
             read.wrong(key, "is 0: the joint could never move")
     resolution = read.number("encoder_resolution", low=0.0) if "encoder_resolution" in read.table else None
     link = _link(_Reader(read.table["link"], f"{read.path}.link", read.fail, read.where)) if "link" in read.table else None
-    return Joint(read.text("name"), read.text("type", among=("revolute", "prismatic")), position=position,
+    return Joint(read.text("name"), read.text("type", among=("revolute", "prismatic")), position=(low, high),
                  encoder_resolution=resolution, link=link, **geometric, **limits)
 
 
@@ -215,10 +216,11 @@ def _drive(table: object, n: int, fail: type[RrridError], where: str) -> Drive |
     read.only(_DRIVE_KEYS)
     matrix = None
     if "transmission" in read.table:
-        rows = read.table["transmission"]
-        if not isinstance(rows, list) or len(rows) != n:
+        value = read.table["transmission"]
+        rows: list[object] = value if isinstance(value, list) else []
+        if len(rows) != n:
             read.wrong("transmission", f"must hold {n} rows of {n} numbers")
-        inner = _Reader({f"transmission[{i}]": row for i, row in enumerate(rows)}, "drive", fail, where)  # type: ignore[arg-type]
+        inner = _Reader({f"transmission[{i}]": row for i, row in enumerate(rows)}, "drive", fail, where)
         matrix = tuple(inner.numbers(key, n) for key in inner.table)
     constants = read.numbers("torque_constant", n) if "torque_constant" in read.table else None
     return Drive(matrix, constants)

@@ -62,12 +62,13 @@ def refuse_unlike_format(log: ExperimentLog) -> None:
 def _controller_shapes(log: ExperimentLog, n: int, where: str) -> None:
     if log.controller is None:
         return
-    shapes = {key: (n,) for key in ("kp", "kd", "ki", "output_limit", "torque_resolution")} | {"observer_gain": (n, 3)}
+    shapes = dict.fromkeys(("kp", "kd", "ki", "output_limit", "torque_resolution"), (n,)) | {"observer_gain": (n, 3)}
     for key, shape in shapes.items():
         value = getattr(log.controller, key)
         if value is not None and value.shape != shape:
             raise InputRejected("S20", f"controller: {key} has shape {value.shape}, not {shape}", where=where)
-    if log.controller.law in ("pd", "pd+feedforward", "computed-torque") and (log.controller.kp is None or log.controller.kd is None):
+    if log.controller.law in ("pd", "pd+feedforward",
+                              "computed-torque") and (log.controller.kp is None or log.controller.kd is None):
         raise InputRejected("S20", f"controller: law {log.controller.law} without kp and kd", where=where,
                             remedy="write the gains, or law 'unknown'")
 
@@ -79,7 +80,8 @@ def _required_signals(log: ExperimentLog) -> None:
     missing = [name for name in required if name not in log.signals]
     if missing:
         hints = "".join(did_you_mean(name, set(log.signals) - set(known)) for name in missing)
-        raise InputRejected("S01", f"signal {', '.join(missing)} missing{hints}; there are {', '.join(sorted(log.signals)) or 'none'}",
+        raise InputRejected("S01",
+                            f"signal {', '.join(missing)} missing{hints}; there are {', '.join(sorted(log.signals)) or 'none'}",
                             where=where, remedy="rename it, or import the recording with --map")
     for name in log.signals:
         if name not in known:

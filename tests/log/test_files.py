@@ -1,0 +1,160 @@
+"""A log is the same log in either container, and the files are what the format says."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
+from pipelines.log.experiment import Signal
+from pipelines.log.files import find_logs, open_log, write_log
+from tests.log.logs import random_log, small_log
+
+BOTH = pytest.mark.parametrize("ending", [".h5", ".parquet"])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_there_and_back_is_bit_for_bit(tmp_path: Path, seed: int) -> None:
+    """HDF5 to Parquet and back keeps every sample's bits and every attribute, and the same bytes of HDF5 come out."""
+    log = random_log(np.random.default_rng(seed))
+    first, second, third = tmp_path / "a.h5", tmp_path / "b.parquet", tmp_path / "c.h5"
+    write_log(first, log)
+    write_log(second, open_log(first).log)
+    write_log(third, open_log(second).log)
+    assert open_log(third).log == log
+    assert open_log(second).log == log
+    assert first.read_bytes() == third.read_bytes()
+
+
+def test_equality_notices_one_bit_and_one_attribute() -> None:
+    """Equality is strict enough for the test above to be able to fail."""
+    log = small_log()
+    q = log.q.copy()
+    q[7, 1] = np.nextafter(q[7, 1], 9.0)
+    assert replace(log, signals={**log.signals, "q": Signal(q, "rad", log.signals["q"].long_name)}) != log
+    assert replace(log, torque=None) != log
+    assert replace(log, controller=replace(log.controller, delay=0)) != log
+    assert replace(log, controller=replace(log.controller, kp=np.array([1500, 1100, 140.0000001]))) != log
+
+
+def test_independent_checker_accepts_what_is_written(tmp_path: Path, shared: Path) -> None:
+    """The strict checker, written apart from the project, finds no fault."""
+    write_log(tmp_path / "small.h5", small_log())
+    done = subprocess.run([sys.executable, shared / "tools/check_log.py", tmp_path], capture_output=True, text=True, check=False)
+    assert done.stdout == "1 checked, 0 faulty\n"
+    assert done.returncode == 0
+
+
+def test_layout_is_the_formats(tmp_path: Path) -> None:
+    """Chunks of (65536, 1), gzip-1, shuffle, fletcher32; Parquet with zstd, byte-stream-split and no dictionary."""
+    log = small_log(samples=70_000)
+    write_log(tmp_path / "a.h5", log)
+    write_log(tmp_path / "a.parquet", log)
+    with h5py.File(tmp_path / "a.h5") as file:
+        q = file["signals/q"]
+        assert (q.chunks, q.compression, q.compression_opts, q.shuffle, q.fletcher32) == ((65536, 1), "gzip", 1, True, True)
+    column = pq.ParquetFile(tmp_path / "a.parquet").metadata.row_group(0).column(1)
+    assert column.compression == "ZSTD"
+    assert column.path_in_schema == "q_1"
+    assert "BYTE_STREAM_SPLIT" in column.encodings
+    assert not column.has_dictionary_page
+
+
+@BOTH
+def test_a_newer_version_is_refused_by_name(tmp_path: Path, ending: str) -> None:
+    """F11: the message names the version this program understands."""
+    path = tmp_path / f"a{ending}"
+    write_log(path, small_log())
+    if ending == ".h5":
+        with h5py.File(path, "a") as file:
+            file.attrs["format_version"] = 2
+    else:
+        table = pq.read_table(path)
+        text = table.schema.metadata[b"rrrid"].replace(b'"format_version":1', b'"format_version":2')
+        pq.write_table(table.replace_schema_metadata({b"rrrid": text}), path)
+    with pytest.raises(InputRejected, match=r"RRID-F11 .*format_version 2; this program understands version 1"):
+        open_log(path)
+
+
+def test_a_foreign_log_without_digest_is_read_with_one_warning(tmp_path: Path) -> None:
+    """F05: other programs' logs may lack the digest; that is said once, and the numbers are theirs."""
+    path = tmp_path / "a.h5"
+    write_log(path, small_log())
+    with h5py.File(path, "a") as file:
+        del file.attrs["digest"]
+    opened = open_log(path)
+    assert opened.log == small_log()
+    assert [(check.code, check.level) for check in opened.checks] == [("RRID-F05", "warn")]
+
+
+def test_matlab_style_attributes_are_understood(tmp_path: Path) -> None:
+    """Programs that know only doubles and fixed-length bytes write the same log."""
+    path, log = tmp_path / "a.h5", small_log(experiment="friction", joint=2)
+    write_log(path, log)
+    with h5py.File(path, "a") as file:
+        del file.attrs["digest"]
+        file.attrs["joint"] = 2.0
+        file.attrs["role"] = np.bytes_("identify")
+        file.attrs["controller"] if False else None
+        file["controller"].attrs["delay"] = np.float32(1.0)
+    assert open_log(path).log == log
+
+
+@BOTH
+@pytest.mark.parametrize(("change", "code", "words"), [
+    ({"joint": 4, "experiment": "friction"}, "S20", "outside 1"),
+    ({"joint": 1}, "S20", "does not have"),
+    ({"experiment": "friction"}, "S20", "needs"),
+    ({"recorded": "yesterday"}, "S20", "ISO 8601"),
+    ({"posture": np.zeros(2)}, "S20", "posture has 2"),
+])
+def test_a_writer_refuses_what_is_not_a_log(tmp_path: Path, ending: str, change: dict[str, object], code: str, words: str) -> None:
+    """Nothing reaches the disk that a reader would have to refuse."""
+    with pytest.raises(InputRejected, match=f"RRID-{code} .*{words}"):
+        write_log(tmp_path / f"a{ending}", small_log(**change))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_ending_is_a_usage_error(tmp_path: Path) -> None:
+    """The ending chooses the container; another one is refused with the two that are."""
+    with pytest.raises(UsageError, match=r"RRID-C02 .*\.h5 or \.parquet"):
+        write_log(tmp_path / "a.mat", small_log())
+
+
+def test_find_logs_passes_over_what_is_not_meant(tmp_path: Path) -> None:
+    """Hidden files, temporary files, rrrid's own output and links out of the folder are no inputs."""
+    for name in ("a.h5", "deep/b.parquet", ".rrrid-tmp-1-x.h5", "own/logs/c.h5", "outside/d.h5"):
+        (tmp_path / "in" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "in" / name).write_bytes(b"x")
+    (tmp_path / "in/outside").rename(tmp_path / "outside")
+    (tmp_path / "in/own/provenance.json").write_text("{}")
+    (tmp_path / "in/link.h5").symlink_to(tmp_path / "outside/d.h5")
+    (tmp_path / "in/loop").symlink_to(tmp_path / "in")
+    paths, checks = find_logs([tmp_path / "in"])
+    assert [p.relative_to(tmp_path / "in").as_posix() for p in paths if "loop" not in p.parts] == ["a.h5", "deep/b.parquet"]
+    assert {(c.code, Path(c.where).name) for c in checks} == {("RRID-X11", "link.h5"), ("RRID-X11", "loop")}
+    assert [p.name for p in find_logs([tmp_path / "in/own"])[0]] == ["c.h5"]
+
+
+def test_nothing_there_is_said(tmp_path: Path) -> None:
+    """C06 and C04: an empty folder matches nothing (5); a path that does not exist is a wrong call (2)."""
+    with pytest.raises(NothingMatched, match="RRID-C06"):
+        find_logs([tmp_path])
+    with pytest.raises(UsageError, match="RRID-C04"):
+        find_logs([tmp_path / "nowhere"])
+
+
+def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """F13: exit 6. (Root may read everything, so the operating system's answer is set here.)"""
+    path = tmp_path / "a.h5"
+    write_log(path, small_log())
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(EnvironmentFault, match="RRID-F13 .*permission denied"):
+        open_log(path)
