@@ -1,6 +1,6 @@
 """Read and write model.json: robot, base parameters, friction, effects, and the range of the logs behind them.
 
-    model = read_model(path)         frozen, checked against the schema
+    model = read_model(path)         from a file, or by the bare name of one that is shipped ("rrr"); frozen, checked
     text  = model_text(model)        the canonical text: equal models give equal bytes
     model_schema()                   the JSON Schema, for others
 
@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NoReturn
 
-from pipelines.errors import InputRejected, UsageError, did_you_mean
+from pipelines.errors import InputRejected, did_you_mean
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -131,19 +131,23 @@ def model_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def read_model(path: str | Path) -> ModelFile:
+def read_model(source: str | Path) -> ModelFile:
     """Read a model file.
 
     Raises:
         UsageError: there is no such file (C04).
-        InputRejected: it is no model file (S18), or one of a later version (F11).
+        InputRejected: it is no model file (S18), or one of a later version (F11), or no regular file at all.
+        EnvironmentFault: no permission.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise UsageError("C04", "no such model file", where=path, remedy="a fit writes model.json where it writes")
+    from pipelines.log.files import regular_file
+    from pipelines.log.shipped import shipped
+
+    path = Path(source)
+    if not path.exists():
+        path = shipped("models", str(source))
+    if (size := regular_file(path).st_size) > _LARGEST:
+        raise InputRejected("S18", f"{size} bytes are too many for a model file", where=path)
     try:
-        if path.stat().st_size > _LARGEST:
-            raise InputRejected("S18", f"{path.stat().st_size} bytes are too many for a model file", where=path)
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
         raise InputRejected("S18", f"the model file cannot be read: {problem}", where=path) from None
@@ -180,9 +184,26 @@ def parse_model(text: str, where: object = "") -> ModelFile:
     if version != FORMAT_VERSION or isinstance(version, bool):
         wrong(f"its \"format_version\" is {version}, not {FORMAT_VERSION}")
     try:
-        return _adapter().validate_json(text)
+        model = _adapter().validate_json(text)
     except ValidationError as problem:
         wrong(_first_fault(problem.errors(include_url=False)[0]))
+    for fault in _implausible(model):
+        wrong(fault)
+    return model
+
+
+def _implausible(model: ModelFile) -> Iterator[str]:
+    """What no schema sees: a spread below zero, a range that ends before it begins, a name that stands twice."""
+    effects = (*model.friction, *model.effects)
+    spreads = [(p.name, p.std) for p in model.base_parameters]
+    spreads += [(f"{e.effect}.{name}", value.std) for e in effects for name, value in e.parameters.items()]
+    yield from (f"the std of {name} is {std}" for name, std in spreads if std is not None and std < 0)
+    names = [p.name for p in model.base_parameters]
+    yield from (f"base parameter {name} stands twice" for name in names if names.count(name) > 1)
+    for key in ("speed", "acceleration", "posture", "temperature"):
+        for one in getattr(model.validity, key, None) or ():
+            if one is not None and one[0] > one[1]:
+                yield f"validity.{key} runs from {one[0]} to {one[1]}"
 
 
 def _first_fault(fault: ErrorDetails) -> str:

@@ -78,6 +78,9 @@ def changed(change: Callable[[dict[str, Any]], object]) -> Callable[[str], str]:
     (changed(lambda t: t["base_parameters"][2].update(origin="guessed")), "S18", "origin"),
     (changed(lambda t: t["friction"][0]["parameters"]["f1"].pop("unit")), "S18", "f1.unit is missing"),
     (changed(lambda t: t["validity"].update(speed=[[0.0]])), "S18", "validity.speed"),
+    (changed(lambda t: t["validity"].update(speed=[[1.0, -1.0]])), "S18", "validity.speed runs"),
+    (changed(lambda t: t["base_parameters"][2].update(std=-0.1)), "S18", "std of p3 is -0.1"),
+    (changed(lambda t: t["base_parameters"].append(t["base_parameters"][0])), "S18", "p1 stands twice"),
 ])
 def test_what_is_no_model_is_refused(example: Path, edit: Callable[[str], str], code: str, message: str) -> None:
     """Broken, foreign, newer or mistyped: one error that names the place."""
@@ -95,6 +98,13 @@ def test_files_that_cannot_be_models(tmp_path: Path) -> None:
     (tmp_path / "bytes.json").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputRejected, match="RRID-S18"):
         read_model(tmp_path / "bytes.json")
+    with pytest.raises(InputRejected, match="RRID-F12"):
+        read_model(tmp_path)
+
+
+def test_the_example_is_found_by_its_name(example: Path) -> None:
+    """As robots and recipes are."""
+    assert read_model("rrr") == read_model(example)
 
 
 def test_defaults_may_be_left_out() -> None:
