@@ -97,6 +97,18 @@ def test_another_body_keeps_the_friction(arm: Arm, motion: Motion) -> None:
     assert {parameter.origin for parameter in heavier.base} == {"assumed"}
 
 
+def test_any_serial_arm_is_modelled_alike(motion: Motion) -> None:
+    """The RRR arm with a tool goes through the general recursion: other base parameters, the same torque and parts."""
+    robot = load_robot("rrr")
+    closed, general = Arm.from_links(robot), Arm.from_links(replace(robot, tool=(0.0, 0.0, 0.1)))
+    assert type(closed.body) is not type(general.body)
+    ours, theirs = closed.torque_parts(motion), general.torque_parts(motion)
+    for part in ("inertia", "coriolis", "gravity"):
+        assert np.abs(getattr(ours, part) - getattr(theirs, part)).max() <= 1e-11 * np.abs(ours.total).max()
+    back = Arm.from_model(parse_model(model_text(general.to_model())))
+    np.testing.assert_array_equal(back.torque(motion), general.torque(motion))
+
+
 def test_unknown_links_are_refused() -> None:
     """A description without links is no model; the message names the joints."""
     robot = load_robot("rrr")
