@@ -240,12 +240,12 @@ def slug(text: str) -> str:
     import hashlib
     import re
 
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:71]
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:69]
     reserved = plain.split(".")[0].upper() in {"CON", "PRN", "AUX", "NUL",
                                                *(f"{p}{i}" for p in ("COM", "LPT") for i in range(1, 10))}
     if plain == text and plain and not reserved:
         return plain
-    return f"{plain or 'x'}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
+    return f"{'x-' if reserved else ''}{plain or 'x'}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
 
 
 def tilde(value: Any) -> Any:

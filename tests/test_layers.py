@@ -1,0 +1,129 @@
+"""A line imports only lines below it, each library has one door, and nothing heavy is imported at start-up."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPO = Path(__file__).resolve().parents[1]
+
+# The layers from the bottom up (design.md). The longest prefix that fits decides.
+LAYERS = {
+    "pipelines.errors": 0,
+    "pipelines.log": 1,
+    "pipelines.fit": 2, "pipelines.signal": 2,
+    "pipelines.model.parameter": 2,
+    "pipelines.model.rigid": 3,
+    "pipelines.model.effects": 4,
+    "pipelines.model": 5,
+    "pipelines.report": 6,
+    "pipelines.stage": 7,
+    "pipelines": 8,
+    "rrrid_cli": 9,
+}
+CALL_STAGES = {"pipelines.run", "pipelines.batch"}
+DOORS = {
+    "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": "pipelines.log",
+    "pandas": "pipelines.log", "pyarrow": "pipelines.log", "filterpy": "pipelines.signal.kalman", "mujoco": "pipelines.bench",
+    "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody",
+}
+HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
+
+
+def _name(path: Path) -> str:
+    parts = path.relative_to(REPO).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {_name(path): path for folder in ("pipelines", "rrrid_cli") for path in sorted((REPO / folder).rglob("*.py"))}
+
+
+def _imports(path: Path) -> set[str]:
+    """Every module that `path` imports, anywhere in it, in full."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            whole = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in MODULES else str(node.module) for name in whole}
+    return found
+
+
+def _layer(module: str) -> int:
+    return max(((len(prefix), rank) for prefix, rank in LAYERS.items() if f"{module}.".startswith(f"{prefix}.")))[1]
+
+
+def _toolbox(module: str) -> str:
+    """The folder that a module belongs to: within one, modules may import each other."""
+    return max((prefix for prefix in LAYERS if f"{module}.".startswith(f"{prefix}.")), key=len)
+
+
+def _breaches(module: str, imported: set[str]) -> list[str]:
+    """What of `imported` the module may not import."""
+    wrong = []
+    for name in imported & set(MODULES):
+        if module.startswith("pipelines.bench"):
+            allowed = name.startswith(("pipelines.bench", "pipelines.log", "pipelines.errors"))
+        elif name.startswith("pipelines.bench"):
+            allowed = False
+        elif module.startswith("pipelines.model.effects."):
+            allowed = _layer(name) < 4 or name in ("pipelines.model.effects", "pipelines.model.effects.base")
+        elif _layer(module) == 8:
+            allowed = _layer(name) < 8 or name == "pipelines" or module in CALL_STAGES
+        else:
+            allowed = _layer(name) < _layer(module) or _toolbox(name) == _toolbox(module)
+        wrong += [] if allowed or name == module else [f"{module} imports {name}"]
+    return wrong
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_line_imports_only_lines_below(module: str) -> None:
+    """The import rule of design.md; stages and effects do not import each other."""
+    assert _breaches(module, _imports(MODULES[module])) == []
+
+
+def test_the_rule_can_be_broken() -> None:
+    """Each kind of breach is seen: upwards, sideways between stages, between effects, out of the bench."""
+    for module, imported in (("pipelines.log.files", "pipelines.model.rigid.body"), ("pipelines.convert", "pipelines.inspect"),
+                             ("pipelines.model.effects.coulomb", "pipelines.model.effects.viscous"),
+                             ("pipelines.signal", "pipelines.fit"), ("pipelines.bench.plant", "pipelines.model.arm"),
+                             ("pipelines.report.render", "pipelines.stage")):
+        assert imported in MODULES
+        assert _breaches(module, {imported}) == [f"{module} imports {imported}"]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_each_library_has_one_door(module: str) -> None:
+    """matplotlib only in the report, h5py and pandas only in the log, typer only in the command line, pickle nowhere."""
+    for name in _imports(MODULES[module]):
+        door = DOORS.get(name.split(".")[0])
+        assert door is None or f"{module}.".startswith(f"{door}."), f"{module} imports {name}, whose door is {door}"
+
+
+def test_importing_everything_imports_nothing_heavy() -> None:
+    """Heavy libraries load inside the function that needs them, and importing a module prints and writes nothing."""
+    names = [module for module in MODULES if not module.startswith("pipelines.bench")]
+    code = f"import sys\nfor m in {names}: __import__(m)\nprint(sorted(set({HEAVY}) & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPO, check=False)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_help_imports_no_numpy() -> None:
+    """`rrrid --help` needs neither NumPy nor h5py."""
+    code = "import rrrid_cli.main, sys; print(sorted({'numpy', 'h5py', 'rich', 'pipelines.stage'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPO, check=False)
+    assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_every_module_says_what_it_is(module: str) -> None:
+    """The docstring's first line is the title: reports and `--help` reuse it."""
+    first = (ast.get_docstring(ast.parse(MODULES[module].read_text(encoding="utf-8"))) or "").partition("\n")[0]
+    assert len(first) > 15
+    assert first.endswith((".", ":")) or "." in first
