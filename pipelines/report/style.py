@@ -1,0 +1,176 @@
+"""How figures and numbers look: colours every eye can tell apart, plain text, digits that mean something.
+
+Colours: Okabe and Ito 2008, "Color Universal Design". Text in figures is drawn as outlines of the font that matplotlib
+ships, so a figure looks the same on every screen and printer and no name in it can be read as mark-up.
+"""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import math
+import os
+import shutil
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from pipelines.errors import clean
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
+
+__all__ = ["BLACK", "BLUE", "COLOURS", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILLION", "figure_style",
+           "format_number", "format_unit", "log_ticks", "printable", "with_std"]
+
+BLACK: Final = "#1a1f24"
+GREY: Final = "#5b6670"
+BLUE: Final = "#0072b2"
+VERMILLION: Final = "#d55e00"
+GREEN: Final = "#009e73"
+ORANGE: Final = "#e69f00"
+SKY: Final = "#56b4e9"
+PURPLE: Final = "#cc79a7"
+COLOURS: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE)  # in the order they are told apart best
+
+_RC: Final[dict[Any, Any]] = {
+    "text.parse_math": False,  # names of channels come from files: "$a_{" is a name, not a formula
+    "svg.fonttype": "path",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "xtick.labelsize": 8.5, "ytick.labelsize": 8.5,
+    "legend.fontsize": 8.5, "legend.frameon": False, "legend.handlelength": 1.4, "legend.borderaxespad": 0.2,
+    "text.color": BLACK, "axes.labelcolor": BLACK, "axes.titlecolor": BLACK, "axes.edgecolor": GREY,
+    "xtick.color": GREY, "ytick.color": GREY, "xtick.labelcolor": BLACK, "ytick.labelcolor": BLACK,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7, "axes.axisbelow": True,
+    "axes.grid": True, "grid.color": "#dfe4e8", "grid.linewidth": 0.6, "axes.titlelocation": "left",
+    "axes.formatter.limits": (-4, 5), "axes.formatter.useoffset": False,
+    "xtick.major.size": 3.0, "ytick.major.size": 3.0, "xtick.major.width": 0.7, "ytick.major.width": 0.7,
+    # a lone sample between two gaps is a very short line; only its round ends make it visible
+    "lines.linewidth": 1.1, "lines.solid_capstyle": "round", "lines.solid_joinstyle": "round",
+    "figure.facecolor": "white", "savefig.facecolor": "white", "figure.dpi": 100.0,
+}
+
+
+def printable(text: object, limit: int = 400) -> str:
+    """`text` as one line that any file, browser and font can take.
+
+    Names read from a damaged file may hold halves of surrogate pairs: UTF-8 cannot write them and
+    matplotlib fails on them.
+    """
+    return clean(str(text).encode("utf-8", "replace").decode("utf-8"), limit)
+
+
+def format_unit(unit: str) -> str:
+    """A unit as people read it: "rad/s^2" becomes "rad/s²"."""
+    return printable(unit, 40).replace("^2", "²").replace("^3", "³").replace("^-1", "⁻¹")
+
+
+def format_number(value: float | None, digits: int = 4) -> str:
+    """`value` with `digits` significant digits and no empty zeros; a dash where there is none."""
+    if value is None or math.isnan(value):
+        return "–"
+    if item := getattr(value, "item", None):  # NumPy's integers and truth values are no int and no bool
+        value = item()
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if isinstance(value, int):
+        return _grouped(f"{value:d}")
+    mantissa, exponent = _split(float(value), digits)
+    if value != 0.0 and not -3 <= exponent <= 5:
+        return f"{_trimmed(mantissa)} × 10{_raised(exponent)}"
+    return _grouped(_trimmed(f"{float(value):.{max(0, digits - 1 - exponent)}f}"))
+
+
+def with_std(value: float | None, std: float | None) -> str:
+    """Value and standard deviation to the same decimal place, the deviation with two digits: "1.930 ± 0.020"."""
+    if value is None or std is None or not math.isfinite(value) or math.isnan(std) or std == 0.0:
+        return format_number(value)
+    if math.isinf(std):
+        return f"{format_number(value)} ± ∞"
+    last = _split(std, 2)[1] - 1  # decimal place of the deviation's second digit
+    first = max(_split(value, 17)[1] if value else last + 1, last + 1)
+    if first - last > 9 or abs(first) > 300:  # both to one place would be a row of zeros, or not a number
+        return f"{format_number(value, 10)} ± {format_number(std, 2)}"
+    if -3 <= first <= 5:
+        parts = [_grouped(f"{round(number, -last):.{max(0, -last)}f}") for number in (value, std)]
+        return " ± ".join(parts)
+    parts = [_grouped(f"{number / 10.0**first:.{first - last}f}") for number in (value, std)]
+    return f"({' ± '.join(parts)}) × 10{_raised(first)}"
+
+
+def _split(value: float, digits: int) -> tuple[str, int]:
+    mantissa, exponent = f"{value:.{max(1, digits) - 1}e}".split("e")
+    return mantissa.replace("-", "−"), int(exponent)
+
+
+def _trimmed(number: str) -> str:
+    return number.rstrip("0").rstrip(".") if "." in number else number
+
+
+def _grouped(number: str) -> str:
+    """A true minus, and thin spaces between thousands from 10 000 on."""
+    whole, point, rest = number.partition(".")
+    sign, whole = ("−", whole[1:]) if whole.startswith("-") else ("", whole)
+    if sign and not (whole + rest).strip("0"):
+        sign = ""
+    if len(whole) > 4:
+        whole = f"{int(whole):,}".replace(",", "\u202f")
+    return sign + whole + point + rest
+
+
+def _raised(exponent: int) -> str:
+    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def log_ticks(axis: Axis) -> None:
+    """Label powers of ten on a logarithmic axis as plain text; matplotlib's own labels are formulas."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    def label(value: float, _position: int | None = None) -> str:
+        return format_number(int(value)) if 1.0 <= value < 1e4 else f"10{_raised(round(math.log10(value)))}"
+
+    axis.set_major_formatter(FuncFormatter(label))
+    axis.set_minor_formatter(NullFormatter())
+
+
+@contextmanager
+def figure_style(salt: str) -> Iterator[None]:
+    """Draw in the report's style, whatever the user's own matplotlib settings say.
+
+    Args:
+        salt: makes the identifiers inside the SVG of one figure differ from those of the next, and equal on every run.
+    """
+    _prepare_matplotlib()
+    import matplotlib
+
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        # A glyph the font lacks, a panel too narrow for its labels: the reader sees it, the terminal need not.
+        warnings.simplefilter("ignore", UserWarning)
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_RC | {"svg.hashsalt": salt})
+        yield
+
+
+def _prepare_matplotlib() -> None:
+    """Give matplotlib a folder it may write to and keep its remarks on fonts and caches to itself."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    if "MPLCONFIGDIR" in os.environ or _writable_home():
+        return
+    folder = tempfile.mkdtemp(prefix="rrrid-matplotlib-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ["MPLCONFIGDIR"] = folder
+
+
+def _writable_home() -> bool:
+    try:
+        home = Path.home()
+    except RuntimeError:  # no HOME and no entry for this user
+        return False
+    folders = [Path(os.environ.get(name) or home / below) / "matplotlib"
+               for name, below in (("XDG_CONFIG_HOME", ".config"), ("XDG_CACHE_HOME", ".cache"))]
+    return all(os.access(next(p for p in (folder, *folder.parents) if p.exists()), os.W_OK) for folder in folders)

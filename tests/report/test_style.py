@@ -1,0 +1,49 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipelines.report.style import format_number, format_unit, printable, with_std
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    (None, "–"), (math.nan, "–"), (math.inf, "∞"), (-math.inf, "−∞"), (0.0, "0"), (-0.0, "0"), (0, "0"), (True, "yes"),
+    (1.93, "1.93"), (2.0, "2"), (-2.5, "−2.5"), (0.012345, "0.01235"), (0.001, "0.001"), (123456.7, "123\u202f457"),
+    (9999.6, "10\u202f000"), (60000, "60\u202f000"), (-60000, "−60\u202f000"), (1234, "1234"), (1.2e-5, "1.2 × 10⁻⁵"),
+    (-3.1416e8, "−3.142 × 10⁸"), (np.float64(0.5), "0.5"), (np.int64(12345), "12\u202f345"), (np.bool_(True), "yes")])
+def test_format_number(value: float | None, text: str) -> None:
+    assert format_number(value) == text
+
+
+@pytest.mark.parametrize(("value", "std", "text"), [
+    (1.93, 0.02, "1.930 ± 0.020"), (0.0996, 0.0996, "0.10 ± 0.10"), (1.93, None, "1.93"), (1.93, 0.0, "1.93"),
+    (1.93, math.inf, "1.93 ± ∞"), (None, 0.1, "–"), (1234.5, 123.0, "1230 ± 120"), (0.0, 0.02, "0.000 ± 0.020"),
+    (-1e-9, 0.02, "0.000 ± 0.020"), (1.234e-5, 2e-7, "(1.234 ± 0.020) × 10⁻⁵"), (3.0, 40.0, "3 ± 40"),
+    (-41.37, 0.5, "−41.37 ± 0.50"), (5.0e7, 1e5, "(5.000 ± 0.010) × 10⁷"), (1.0, 1e-14, "1 ± 1 × 10⁻¹⁴")])
+def test_with_std(value: float | None, std: float | None, text: str) -> None:
+    assert with_std(value, std) == text
+
+
+@given(st.floats(), st.one_of(st.floats(min_value=0.0), st.just(math.nan)))
+def test_every_pair_of_numbers_has_a_short_text(value: float, std: float) -> None:
+    assert 0 < len(format_number(value)) <= 20
+    assert 0 < len(with_std(value, std)) <= 50
+
+
+@given(st.floats(-1e5, 1e5, allow_subnormal=False))
+def test_four_digits_are_kept(value: float) -> None:
+    text = format_number(value).replace("−", "-").replace("\u202f", "")
+    for sign, plain in zip("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789", strict=True):
+        text = text.replace(sign, plain)
+    assert float(text.replace(" × 10", "e")) == pytest.approx(value, rel=5.1e-4, abs=1e-300)
+
+
+def test_units_and_texts() -> None:
+    assert format_unit("rad/s^2") == "rad/s²"
+    assert printable("a\x1b[31m\udc80\nb") == "a[31m? b"
