@@ -18,7 +18,7 @@ Cell = str | int | float | None
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under named columns. A unit stands in the column's name: "torque [N m]". Numbers are formatted on drawing."""
+    """Rows under named columns. A unit stands in a column's name: "torque [N m]". Numbers are formatted when drawn."""
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -33,7 +33,7 @@ class Figure:
     name: str  # file name without ending
     caption: str  # says what to see
     draw: Callable[[Any], None] = field(compare=False)
-    size: tuple[float, float] = (7.2, 3.6)  # [inch]
+    size: tuple[float, float] = (6.0, 3.2)  # [inch]; six inches wide: its words are legible on a phone as well
     alt: str = ""  # for readers who do not see it; the caption where empty
 
 

@@ -1,0 +1,97 @@
+"""The page in a real browser: nothing overflows on a phone, everything is drawn, and it prints."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.report.render import write_report
+from tests.report.demo import FOOTER, demo_report
+
+pytestmark = pytest.mark.slow
+
+WIDTHS = (320, 390, 768, 1200)
+# The copy that is measured may run a script; the page itself may not.
+PROBE = """<script>addEventListener("load", () => parent.postMessage({
+  width: innerWidth, page: document.documentElement.scrollWidth,
+  figures: [...document.querySelectorAll(".drawing svg")].map(svg => svg.getBoundingClientRect().width),
+  tables: [...document.querySelectorAll(".scroll")].map(box => box.scrollWidth - box.clientWidth),
+  text: Math.min(...[...document.querySelectorAll("p,td,th,dd")].map(e => parseFloat(getComputedStyle(e).fontSize))),
+}, "*"))</script>"""
+HARNESS = """<body style="margin:0"><pre id="found"></pre>%s<script>
+const found = []; addEventListener("message", e => { found.push(e.data); document.getElementById("found").textContent =
+JSON.stringify(found); });</script>"""
+
+
+def chromium(folder: Path, page: Path, *options: str) -> str:
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    assert program, "this test needs chromium: apt-get install -y chromium"
+    done = subprocess.run(
+        [program, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+         "--hide-scrollbars", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+         f"--user-data-dir={folder / 'profile'}", *options, page.as_uri()], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def pixels(path: Path) -> np.ndarray:
+    from matplotlib.image import imread
+
+    return np.round(imread(path)[:, :, :3] * 255.0).astype(int)
+
+
+def amount(picture: np.ndarray, colour: str) -> int:
+    wanted = [int(colour[i:i + 2], 16) for i in (1, 3, 5)]
+    return int((np.abs(picture - wanted).max(axis=2) <= 3).sum())
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    return write_report(demo_report(), folder, FOOTER)[0]
+
+
+def test_no_width_makes_the_page_scroll_sideways(page: Path, tmp_path: Path) -> None:
+    text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page.read_text("utf-8"))
+    probe, harness = tmp_path / "probe.html", tmp_path / "harness.html"
+    probe.write_text(text.replace("</body>", PROBE + "</body>"), "utf-8")
+    frames = [f'<iframe src="{probe.as_uri()}" style="width:{width}px;height:800px;border:0"></iframe>' for width in WIDTHS]
+    harness.write_text(HARNESS % "".join(frames), "utf-8")
+    dom = chromium(tmp_path, harness, "--virtual-time-budget=10000", "--dump-dom")
+    match = re.search(r'<pre id="found">(.*?)</pre>', dom)
+    assert match
+    found = sorted(json.loads(match[1]), key=lambda frame: frame["width"])
+    assert [frame["width"] for frame in found] == list(WIDTHS)
+    for frame in found:
+        assert frame["page"] <= frame["width"]
+        assert all(0.8 * min(frame["width"], 736) <= width <= frame["width"] for width in frame["figures"])
+        assert frame["text"] >= 13.0
+    assert max(found[-1]["tables"]) <= 0, "on a desk every table is seen whole"
+    assert max(found[0]["tables"]) > 0, "on a phone a wide one scrolls inside its box"
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+def test_verdict_and_figures_are_on_the_screen(page: Path, tmp_path: Path, width: int) -> None:
+    frame, shot = tmp_path / "frame.html", tmp_path / "shot.png"
+    frame.write_text(f'<body style="margin:0"><iframe src="{page.as_uri()}" '
+                     f'style="width:{width}px;height:4000px;border:0"></iframe>', "utf-8")
+    chromium(tmp_path, frame, "--window-size=1300,4000", f"--screenshot={shot}")
+    picture = pixels(shot)
+    assert amount(picture[:400], "#fff3d6") > 10_000, "the verdict's ground"
+    assert amount(picture[:400], "#7d5200") > 500, "its sign and word"
+    assert amount(picture, "#0072b2") > 5_000, "bars and lines"
+    assert amount(picture, "#d55e00") > 300, "flagged samples"
+
+
+def test_the_page_prints(page: Path, tmp_path: Path) -> None:
+    paper = tmp_path / "paper.pdf"
+    chromium(tmp_path, page, "--no-pdf-header-footer", f"--print-to-pdf={paper}")
+    content = paper.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert 4 <= len(re.findall(rb"/Type\s*/Page\b", content)) <= 6

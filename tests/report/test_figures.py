@@ -1,0 +1,141 @@
+"""Figures tell the truth about long and damaged logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from pipelines.errors import Check
+from pipelines.report.figures import draw_joint_signals, envelope, joint_axes, merge_spans, true_spans
+from pipelines.report.render import render_report
+from pipelines.report.report import Figure, Report, Section
+from pipelines.report.sections import (
+    checks_table,
+    interval_figure,
+    joint_signal_figure,
+    level_tone,
+    timeline_figure,
+)
+
+SIGNALS = arrays(np.float64, st.integers(0, 400), elements=st.one_of(
+    st.floats(-1e3, 1e3), st.just(np.nan), st.just(np.inf)))
+
+
+def drawn(figure: Figure) -> str:
+    files = render_report(Report("", "", sections=(Section("", figures=(figure,)),)), {})
+    return files[f"figures/{figure.name}.svg"].decode()
+
+
+@given(SIGNALS, st.integers(2, 60))
+def test_an_envelope_keeps_every_extreme_and_every_gap(x: np.ndarray, points: int) -> None:
+    t = np.arange(x.size, dtype=float)
+    small_t, small = envelope(t, x, points)
+    assert small.size <= max(points, 7 * (points // 2 + 1), 0)
+    assert (np.diff(small_t) >= 0.0).all()
+    kept = np.isfinite(small)
+    assert (small[kept] == x[small_t[kept].astype(int)]).all(), "a point that was never measured"
+    assert np.isnan(small).any() == (~np.isfinite(x)).any()
+    width = max(1, -(-x.size // (points // 2)))
+    for start in range(0, x.size, width):
+        part = x[start:start + width][np.isfinite(x[start:start + width])]
+        inside = kept & (small_t >= start) & (small_t < start + width)
+        if part.size:
+            assert small[inside].min() == part.min()
+            assert small[inside].max() == part.max()
+
+
+@given(SIGNALS, st.integers(2, 60))
+def test_an_envelope_draws_no_line_across_a_gap(x: np.ndarray, points: int) -> None:
+    small_t, small = envelope(np.arange(x.size, dtype=float), x, points)
+    for (t0, t1), (x0, x1) in zip(pairwise(small_t), pairwise(small), strict=True):
+        if np.isfinite(x0) and np.isfinite(x1):
+            assert np.isfinite(x[int(t0):int(t1) + 1]).all()
+
+
+@given(arrays(np.float64, st.integers(0, 200), elements=st.sampled_from([1.0, np.nan])), st.integers(2, 60))
+def test_a_lone_sample_between_gaps_is_given_as_a_line(x: np.ndarray, points: int) -> None:
+    small = envelope(np.arange(x.size, dtype=float), x, points)[1]
+    runs = np.flatnonzero(np.diff(np.concatenate(([False], np.isfinite(small), [False])).astype(int))).reshape(-1, 2)
+    if np.isnan(x).any():
+        assert all(stop - start >= 2 for start, stop in runs)
+
+
+def test_a_short_signal_stays_as_it_is() -> None:
+    t = np.arange(100.0)
+    assert all(np.array_equal(a, b) for a, b in zip(envelope(t, t**2), (t, t**2), strict=True))
+
+
+def test_three_million_samples_become_a_few_points() -> None:
+    x = np.zeros(3_000_000)
+    x[1_234_567] = 7.0
+    t, small = envelope(np.arange(x.size) / 5000.0, x)
+    assert small.size <= 1300
+    assert t[small == 7.0] == pytest.approx([1_234_567 / 5000.0])
+
+
+def test_spans_of_a_mask_and_their_union() -> None:
+    t = np.arange(8.0)
+    spans = true_spans(t, np.array([1, 1, 0, 1, 0, 0, 0, 1], bool))
+    assert spans == [(0.0, 1.0), (3.0, 3.0), (7.0, 7.0)]
+    assert merge_spans(spans, 2.5) == [(0.0, 3.0), (7.0, 7.0)]
+    assert merge_spans([(2.0, 1.0), (np.nan, 3.0)], 0.0) == [(1.0, 2.0)]
+
+
+TIMES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "even": lambda t: t, "backwards": lambda t: t[::-1], "constant": lambda t: t * 0.0, "missing": lambda t: t * np.nan,
+    "one missing": lambda t: np.where(t == t[3], np.nan, t), "huge": lambda t: t * 1e300, "jumps": lambda t: t % 0.1}
+VALUES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "signal": np.sin, "all missing": lambda t: t * np.nan, "infinite": lambda t: t * np.inf, "zero": lambda t: t * 0.0,
+    "huge spike": lambda t: np.where(t == t[5], 1e308, np.sin(t)), "far and small": lambda t: 1e6 + 1e-9 * np.sin(t)}
+
+
+@pytest.mark.parametrize(("times", "values"), [*((times, "signal") for times in TIMES),
+                                               *(("even", values) for values in VALUES), ("jumps", "all missing")])
+@pytest.mark.filterwarnings("ignore:invalid value encountered in multiply:RuntimeWarning")
+def test_a_damaged_log_can_be_drawn(times: str, values: str) -> None:
+    base = np.arange(2000) / 1000.0
+    t, x = TIMES[times](base), VALUES[values](base)[:, None]
+    assert "<path" in drawn(joint_signal_figure("a", "", t, x, "rad", flagged=~np.isfinite(x)))
+    assert "<path" in drawn(interval_figure("b", "", t, 1e-3))
+
+
+@pytest.mark.parametrize("samples", [0, 1, 2])
+def test_a_log_of_hardly_a_sample_can_be_drawn(samples: int) -> None:
+    t = np.arange(samples) / 1000.0
+    assert "<path" in drawn(joint_signal_figure("a", "", t, np.zeros((samples, 2)), "rad"))
+    assert "<path" in drawn(interval_figure("b", "", t, 1e-3))
+    assert "<path" in drawn(timeline_figure("c", "", (0.0, 0.0), []))
+    assert "<path" in drawn(timeline_figure("d", "", (0.0, 0.0), [("gap", [(0.0, 0.0)])]))
+
+
+def test_a_long_log_makes_a_modest_figure() -> None:
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(300_000, 7))
+    svg = drawn(joint_signal_figure("noise", "", np.arange(300_000) / 5000.0, x, "N m", flagged=x > 2.5))
+    assert len(svg) < 450_000
+
+
+def test_two_signals_stand_side_by_side() -> None:
+    t = np.arange(50) / 100.0
+
+    def draw(drawing: Any) -> None:
+        for part, unit in zip(drawing.subfigures(1, 2), ("rad", "N m"), strict=True):
+            draw_joint_signals(joint_axes(part, 2), t, np.zeros((50, 2)), unit, quantity="q", flagged=t > 0.4)
+
+    assert "<path" in drawn(Figure("pair", "", draw))
+
+
+def test_the_worst_check_comes_first_and_sets_the_tone() -> None:
+    checks = [Check.of("F01", "ok", "fine"), Check.of("T05", "repair", "gap"), Check.of("S02", "reject", "missing")]
+    table = checks_table(checks)
+    assert [row[-1] for row in table.rows] == ["RRID-S02", "RRID-T05", "RRID-F01"]
+    assert table.tones == ("bad", "attention", "good")
+    assert level_tone(check.level for check in checks) == "bad"
+    assert level_tone(()) == "good"
