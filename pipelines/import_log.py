@@ -41,10 +41,11 @@ _PREVIEWS, _PREVIEW_POINTS = 3, 400
 
 @dataclass(frozen=True)
 class Settings:
-    """`source`: folder of the recordings, default the recipe's own. `map`: "q_1=Joint_1", columns named differently from
-    the recipe. `trust_units`: radians are radians, however large."""
+    """`recipe`: a TOML file or the name of a shipped one. `source`: folder of the recordings, default the recipe's own.
+    `map`: "q_1=Joint_1", columns named differently from the recipe. `trust_units`: radians are radians, however large."""
 
-    source: str | None = None
+    recipe: str = ""
+    source: Path | None = None
     map: tuple[str, ...] = ()
     trust_units: bool = False
 
@@ -101,9 +102,9 @@ class Result:
 
 def read(request: Request, settings: Settings) -> Inputs:
     """The recipe, its robot and every file it matches."""
-    if len(request.paths) != 1:
-        raise UsageError("C02", f"{len(request.paths)} recipes", where="rrrid import", remedy="give one recipe and --source DIR")
-    material = collect(request.paths[0], settings.source, request.robot, request.tell)
+    if not settings.recipe:
+        raise UsageError("C02", "no recipe", where="rrrid import", remedy="name one, or draft one with --guess FILE")
+    material = collect(settings.recipe, settings.source, request.robot, request.tell)
     material = replace(material, assume_units=request.assume_units)
     return Inputs(sources=material.paths, material=material, label=material.folder.absolute().name, robot_name=material.robot.name)
 
@@ -231,7 +232,7 @@ def _controller(material: Material) -> Controller | None:
     spec = material.recipe.controller
     if spec is None:
         return None
-    arrays = {key: np.array(value) for key in ("kp", "kd", "ki", "output_limit", "torque_resolution") if (value := getattr(spec, key)) is not None}
+    arrays: dict[str, Any] = {key: np.array(value) for key in ("kp", "kd", "ki", "output_limit", "torque_resolution") if (value := getattr(spec, key)) is not None}
     return Controller(law=spec.law, feedforward=spec.feedforward, velocity=spec.velocity, delay=spec.delay, **arrays)
 
 
@@ -286,10 +287,10 @@ def _treatment(result: Result) -> Section:
     tables = [Table(("log", "from", "done to the samples"), done)]
     if found:
         tables.append(Table(("code", "level", "where", "what", "remedy"), found))
-    text = (f"By recipe {result.recipe}.",)
+    text = [f"By recipe {result.recipe}."]
     if result.ignored:
-        text += (f"The recipe does not speak of {len(result.ignored)} files: {', '.join(result.ignored[:8])}{' …' if len(result.ignored) > 8 else ''}.",)
-    return Section("What was done to the data", text, tuple(tables))
+        text.append(f"The recipe does not speak of {len(result.ignored)} files: {', '.join(result.ignored[:8])}{' …' if len(result.ignored) > 8 else ''}.")
+    return Section("What was done to the data", tuple(text), tuple(tables))
 
 
 def _figure(item: ImportedLog, preview: Preview) -> Figure:

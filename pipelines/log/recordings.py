@@ -21,6 +21,8 @@ from pipelines.log.sources import read_table
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 
+_RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy")
+
 Map = Mapping[str, Mapping[int, str]]
 
 
@@ -50,7 +52,7 @@ class Material:
     assume_units: bool = False
 
 
-def collect(recipe_name: str | Path, source: str | None, robot: str | None, tell: Callable[[str], None]) -> Material:
+def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tell: Callable[[str], None]) -> Material:
     """Read the recipe, its robot and every file it matches.
 
     Raises:
@@ -61,8 +63,8 @@ def collect(recipe_name: str | Path, source: str | None, robot: str | None, tell
         recipe = replace(parse_recipe(path.read_text(encoding="utf-8"), path), where=str(path))
     except (OSError, UnicodeDecodeError) as problem:
         raise UsageError("C04", f"cannot be read: {problem}", where=path, remedy="give a recipe, a TOML file") from None
-    folder = Path(source) if source else path.parent
-    arm = _robot(recipe, folder, path, robot)
+    folder = source if source else path.parent
+    arm, described = _robot(recipe, folder, path, robot)
     drive = drive_of(recipe.drive, arm, path)
     names = filenames.files_below(folder)
     cases = [*recipe.file, *([FileSpec(recipe.log.match)] if recipe.log.match else [])]
@@ -82,8 +84,8 @@ def collect(recipe_name: str | Path, source: str | None, robot: str | None, tell
         patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
         raise NothingMatched("C06", f"no file matches {patterns}", where=folder, remedy="give the folder of the recordings with --source")
     return Material(recipe, path, folder, replace(arm, drive=drive), drive, tuple(sources), tuple(tables),
-                    tuple(name for name in names if name not in read and (folder / name).resolve() != path.resolve()),
-                    (path, *(folder / name for name in read)))
+                    tuple(name for name in names if name not in read and Path(name).suffix.lower() in _RECORDINGS),
+                    (path, *described, *(folder / name for name in read)))
 
 
 def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] | None:
@@ -111,16 +113,16 @@ def _file_of(recipe: Recipe, signal: str, groups: Mapping[str, str], primary: st
     return beside.as_posix()
 
 
-def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> RobotDescription:
-    """The robot of [robot]: a file beside the data or the recipe, a shipped one, or written out in the recipe."""
+def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tuple[RobotDescription, tuple[Path, ...]]:
+    """The robot of [robot]: a file beside the data or the recipe, a shipped one, or written out in the recipe; and its file."""
     if override:
-        return load_robot(override)
+        return load_robot(override), ()
     table = dict(recipe.robot)
     use = table.pop("use", None)
     if use is None:
         import tomli_w
 
-        return parse_robot(tomli_w.dumps(table), where=path)
+        return parse_robot(tomli_w.dumps(table), where=path), ()
     for key in table:
         if key not in ("name", "gravity"):
             raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, ('name', 'gravity'))}", where=path,
@@ -129,14 +131,15 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> Ro
         raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path, remedy="fill it in")
     found = next((place / use for place in (folder, path.parent) if (place / use).is_file()), None)
     robot = load_robot(found if found is not None else use)
+    files = () if found is None else (found,)
     if "name" in table:
         robot = replace(robot, name=str(table["name"]))
     gravity = table.get("gravity")
     if gravity is None:
-        return robot
+        return robot, files
     if not (isinstance(gravity, list | tuple) and len(gravity) == 3 and all(isinstance(g, int | float) for g in gravity)):
         raise UsageError("C02", f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]", where=path)
-    return replace(robot, gravity=(float(gravity[0]), float(gravity[1]), float(gravity[2])))
+    return replace(robot, gravity=(float(gravity[0]), float(gravity[1]), float(gravity[2]))), files
 
 
 def parse_map(entries: tuple[str, ...], recipe: Recipe) -> Map:
