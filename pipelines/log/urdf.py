@@ -85,7 +85,7 @@ def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
         InputRejected: the text is not the URDF of a serial arm.
     """
     source = Source("urdf_text", InputRejected)
-    way, tip = way_to(tree_of(urdf_text.encode(), source), tip_link, source)
+    way, tip = way_to(tree_of(urdf_text, source), tip_link, source)
     placed: list[JointPlacement] = []
     rotation, position = np.eye(3), np.zeros(3)
     for joint in way:

@@ -83,7 +83,7 @@ def _xacro(source: Source) -> RrridError:
                         remedy="expand it first: xacro arm.urdf.xacro > arm.urdf")
 
 
-def _parse(text: bytes, source: Source) -> Element:
+def _parse(text: bytes | str, source: Source) -> Element:
     """The XML tree, refusing every document type, and so every entity, before it takes effect."""
     if len(text) > _LARGEST:
         raise source.wrong(f"larger than {_LARGEST // 1_000_000} MB", code="X13")
@@ -116,7 +116,7 @@ def _parse(text: bytes, source: Source) -> Element:
     return builder.close()
 
 
-def tree_of(text: bytes, source: Source) -> Tree:
+def tree_of(text: bytes | str, source: Source) -> Tree:
     """Links and joints, each child with one parent and all of them under one root."""
     robot = _parse(text, source)
     if robot.tag != "robot":
