@@ -84,7 +84,7 @@ class _Filler:
 
         τ_j = w_j · n_i + v_j · f_i,    with f_i, n_i linear in the ten parameters of link i
 
-    which is Atkeson, An & Hollerbach 1986, eq. (12)-(15), with the projection done in the link's own frame.
+    as in Atkeson, An & Hollerbach 1986, but projected in the link's own frame, where the parameters are constant.
     """
 
     def __init__(self, chain: SerialChain, columns: Sequence[int] | None) -> None:
@@ -240,7 +240,7 @@ def mass_matrix(chain: SerialChain, q: Array, phi: Array) -> Array:
 def _spatial_inertia(values: Array) -> Array:
     """M (6, 6): momentum about the origin of a twist [w; v]: I w + h × v, m v + w × h.
 
-    Featherstone 2008, eq. (2.62).
+    Featherstone 2008, ch. 2 (rigid-body inertia).
     """
     mass, (hx, hy, hz) = values[0], values[1:4]
     ixx, iyy, izz, ixy, ixz, iyz = values[4:]

@@ -46,7 +46,7 @@ class Placement:
     def twist_matrix(self) -> Array:
         """X (6, 6) with [w'; v'] = X [w; v]: a twist about the old origin, seen about the new one in the new axes.
 
-        w' = Rᵀ w,  v' = Rᵀ (v + w × p).  Featherstone 2008, eq. (2.26), angular part first.
+        w' = Rᵀ w,  v' = Rᵀ (v + w × p).  Featherstone 2008, ch. 2 (Plücker transform, angular part first).
         """
         x, y, z = self.position
         lever = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # w × p = lever w

@@ -135,7 +135,7 @@ def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, g
                  memory: WalkingMemory) -> Iterator[LinkMotion]:
     """Walk out along the chain; dq, ddq (joints, samples).
 
-        V_i = X V + s q̇,   A_i = X A + s q̈ + V_i × s q̇        Featherstone 2008, eq. (5.14)-(5.15)
+        V_i = X V + s q̇,   A_i = X A + s q̈ + V_i × s q̇        Featherstone 2008, ch. 5 (recursive Newton-Euler)
 
     with X the change of frame and s the joint's twist. Acceleration, velocity and the twists of all joints so far are
     the columns of one array, so that every change of frame is one small matrix on many samples.
