@@ -4,7 +4,7 @@
 
 Theirs is one loop that fills one preallocated matrix. Ours, three ways:
 
-    all columns      every standard parameter, one array stored samples-fastest
+    all columns      every standard parameter, into one preallocated array stored samples-fastest
     base, in blocks  only the columns a fit needs, streamed as a fit takes them; Pinocchio cannot leave out any
     peer's layout    every column, copied into the peer's matrix (samples · joints, 10 · joints)
 
@@ -102,6 +102,7 @@ def compare(name: str, robot: RobotDescription, model: Any, samples: int) -> lis
     phi = serial.standard_parameters([joint.link for joint in robot.joints if joint.link is not None])
     motion = np.random.default_rng(7).uniform(-3.0, 3.0, (3, samples, n))
     theirs, copied = np.empty((samples * n, 10 * n)), np.empty((samples, n, 10 * n))
+    kept = np.empty((n, 10 * n, samples))
     p = body.base.combine @ phi
 
     def base() -> None:
@@ -116,7 +117,8 @@ def compare(name: str, robot: RobotDescription, model: Any, samples: int) -> lis
     peer.fill(theirs, *motion)
     error = _error(theirs[:few.shape[1] * n] @ peer.phi, exact)
     ways: list[tuple[str, Callable[[], object], np.ndarray]] = [
-        ("all columns", lambda: serial.regressor(body.chain, *motion), serial.regressor(body.chain, *few) @ phi),
+        ("all columns", lambda: serial.regressor(body.chain, *motion, out=kept),
+         serial.regressor(body.chain, *few) @ phi),
         (f"{len(p)} base columns, in blocks", base, body.regressor(*few) @ p),
         ("peer's layout", copy, serial.regressor(body.chain, *few) @ phi),
     ]

@@ -27,7 +27,7 @@ Array = npt.NDArray[np.float64]
 
 STANDARD = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 BLOCK = 4096  # samples handed on at once by `regressor_blocks`
-_CACHED = 4096  # samples worked on at once: fewer cost more in calls, more would leave the caches
+_AT_ONCE = 8192  # samples worked on at once at most: fewer cost more in calls, more no longer gain
 
 
 def standard_parameters(links: Sequence[LinkParameters]) -> Array:
@@ -35,18 +35,21 @@ def standard_parameters(links: Sequence[LinkParameters]) -> Array:
     return np.array([v for k in links for v in (k.mass, *(k.mass * c for c in k.com), *k.inertia)], dtype=float)
 
 
-def regressor(chain: SerialChain, q: Array, dq: Array, ddq: Array, columns: Sequence[int] | None = None) -> Array:
+def regressor(chain: SerialChain, q: Array, dq: Array, ddq: Array, columns: Sequence[int] | None = None,
+              out: Array | None = None) -> Array:
     """Y with τ = Y φ: (samples, joints, columns), for q, dq, ddq (samples, joints).
 
     `columns` chooses standard parameters by increasing index (10 · link + position in STANDARD); all of them otherwise.
-    The array is stored (joints, columns, samples), samples fastest: `Y.transpose(1, 2, 0)` is contiguous.
+    The array is stored (joints, columns, samples), samples fastest: `Y.transpose(1, 2, 0)` is contiguous, and so is
+    `out`, memory of that shape to write to.
     """
     samples = len(q)
-    # zeros, not empty: a joint does not feel the links before it, and pages never written cost no time
-    y = np.zeros((chain.n_joints, 10 * chain.n_joints if columns is None else len(columns), samples))
     fill = _Filler(chain, columns)
-    for start in range(0, samples, _CACHED):
-        part = slice(start, start + _CACHED)
+    # zeros, not empty: a joint does not feel the links before it, and pages never written cost no time
+    y = np.zeros((chain.n_joints, fill.columns, samples)) if out is None else out
+    if out is not None:
+        fill.clear(y)
+    for part in _parts(0, samples):
         fill(y[:, :, part], q[part], dq[part], ddq[part])
     return y.transpose(2, 0, 1)
 
@@ -57,15 +60,21 @@ def regressor_blocks(chain: SerialChain, q: Array, dq: Array, ddq: Array, column
 
     The array is written anew for every block: what is to be kept must be copied.
     """
-    buffer = np.zeros((chain.n_joints, 10 * chain.n_joints if columns is None else len(columns), min(block, len(q))))
     fill = _Filler(chain, columns)
+    buffer = np.zeros((chain.n_joints, fill.columns, min(block, len(q))))
     for first in range(0, len(q), block):
         whole = slice(first, min(first + block, len(q)))
         y = buffer[:, :, :whole.stop - first]
-        for start in range(0, y.shape[2], _CACHED):
-            part = slice(start + first, min(start + first + _CACHED, whole.stop))
-            fill(y[:, :, start:start + _CACHED], q[part], dq[part], ddq[part])
+        for part in _parts(first, whole.stop):
+            fill(y[:, :, part.start - first:part.stop - first], q[part], dq[part], ddq[part])
         yield whole, y
+
+
+def _parts(first: int, stop: int) -> Iterator[slice]:
+    """first … stop in parts of equal size but for the last: a short rest would cost as many calls as a full part."""
+    count = -(-(stop - first) // _AT_ONCE)
+    size = -(-(stop - first) // max(count, 1))
+    return (slice(first + k * size, min(first + (k + 1) * size, stop)) for k in range(count))
 
 
 def _by_link(chain: SerialChain, columns: Sequence[int] | None) -> list[list[int]]:
@@ -92,7 +101,17 @@ class _Filler:
         self.tables = [[table for table in (_MOMENT_WRENCH[:, [k for k in wanted if k < 4]],
                                             _INERTIA_WRENCH[:, [k - 4 for k in wanted if k >= 4]]) if table.size]
                        for wanted in _by_link(chain, columns)]
+        self.widths = [sum(table.shape[1] for table in tables) for tables in self.tables]
         self._take(0)
+
+    @property
+    def columns(self) -> int:
+        return sum(self.widths)
+
+    def clear(self, y: Array) -> None:
+        """Zero what no call writes: the columns of the links before each joint."""
+        for j in range(1, self.chain.n_joints):
+            y[j, :sum(self.widths[:j])] = 0.0
 
     def _take(self, samples: int) -> None:
         self.samples = samples
@@ -179,8 +198,7 @@ def inverse_dynamics(chain: SerialChain, q: Array, dq: Array, ddq: Array, phi: A
     """
     g = chain.gravity if gravity is None else gravity
     tau = np.empty(np.shape(q))
-    for start in range(0, len(q), _CACHED):
-        part = slice(start, start + _CACHED)
+    for part in _parts(0, len(q)):
         moves = turns(chain, rows(q[part]))
         wrenches = [_wrench(link, values) for link, values in
                     zip(link_motions(chain, moves, rows(dq[part]), rows(ddq[part]), g,
@@ -225,8 +243,7 @@ def mass_matrix(chain: SerialChain, q: Array, phi: Array) -> Array:
     """
     n = chain.n_joints
     d = np.zeros((n, n, len(q)))
-    for start in range(0, len(q), _CACHED):
-        part = slice(start, start + _CACHED)
+    for part in _parts(0, len(q)):
         still = np.zeros_like(rows(q[part]))
         for i, (link, values) in enumerate(zip(link_motions(chain, turns(chain, rows(q[part])), still, still,
                                                             np.zeros(3), walking_memory(chain, still.shape[1])),

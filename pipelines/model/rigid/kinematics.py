@@ -40,10 +40,10 @@ class Turn:
     sine: Array
     shift: Array  # (samples,) [m], prismatic only
 
-    def carry(self, twists: Array, work: Array | None = None) -> None:
+    def carry(self, twists: Array, scratch: Array | None = None) -> None:
         """Twists (6, count, samples) from before the joint to behind it, in place: Rz(q)ᵀ v, or v + w × z s.
 
-        `work` (2, 2, count, samples) is overwritten; without it new memory is taken.
+        `scratch`, of the same shape, is overwritten; without it new memory is taken.
         """
         if not self.revolute:
             twists[3] += twists[1] * self.shift
@@ -51,7 +51,8 @@ class Turn:
             return
         parts = twists.reshape(2, 3, *twists.shape[1:])
         x, y = parts[:, 0], parts[:, 1]
-        xs, ys = np.empty((2, *x.shape)) if work is None else work
+        spare = np.empty_like(twists) if scratch is None else scratch
+        xs, ys = spare[:2], spare[2:4]
         np.multiply(x, self.sine, out=xs)
         np.multiply(y, self.sine, out=ys)
         x *= self.cosine
@@ -99,7 +100,6 @@ class WalkingMemory:
 
     state: Array  # (6, columns, samples)
     other: Array
-    work: Array  # (4, columns, samples)
     with_twists: bool
 
 
@@ -127,8 +127,7 @@ def turns(chain: SerialChain, q: Array) -> list[Turn]:
 def walking_memory(chain: SerialChain, samples: int, with_twists: bool = True) -> WalkingMemory:
     """Memory for `link_motions` over this many samples at once."""
     columns = 2 + (chain.n_joints if with_twists else 0)
-    return WalkingMemory(np.empty((6, columns, samples)), np.empty((6, columns, samples)),
-                         np.empty((4, columns, samples)), with_twists)
+    return WalkingMemory(np.empty((6, columns, samples)), np.empty((6, columns, samples)), with_twists)
 
 
 def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, gravity: Array,
@@ -140,13 +139,13 @@ def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, g
     with X the change of frame and s the joint's twist. Acceleration, velocity and the twists of all joints so far are
     the columns of one array, so that every change of frame is one small matrix on many samples.
     """
-    state, other, work = memory.state, memory.other, memory.work
+    state, other = memory.state, memory.other
     state[:, :2] = 0.0
     state[3:, 0] = -gravity[:, None]
     for i, move in enumerate(moves):
         used = 2 + (i if memory.with_twists else 0)
         state, other = _through(chain.before[i], state, other, used)
-        move.carry(state[:, :used], work[:, :used].reshape(2, 2, used, -1))
+        move.carry(state[:, :used], other[:, :used])
         _drive(state[:, 0], state[:, 1], move.revolute, dq[i], ddq[i])
         if memory.with_twists:
             state[:, used] = 0.0
