@@ -274,7 +274,7 @@ def load_robot(source: str | Path) -> RobotDescription:
     path = Path(source)
     if not path.exists():
         path = shipped("robots", str(source))
-    if path.suffix == ".urdf":
+    if path.suffix.lower() in (".urdf", ".xacro"):
         from pipelines.log.urdf import import_urdf
 
         return import_urdf(path)

@@ -66,7 +66,7 @@ class Tree:
 
 
 def read(path: Path, source: Source) -> bytes:
-    if path.suffix == ".xacro":
+    if path.suffix.lower() == ".xacro":
         raise _xacro(source)
     try:
         if not path.is_file():  # a pipe or device would hang

@@ -202,8 +202,11 @@ def test_xacro_is_refused_with_the_way_out(tmp_path: Path, text: str) -> None:
 
 def test_a_xacro_file_is_refused_by_its_name(tmp_path: Path) -> None:
     """arm.urdf.xacro is not opened at all."""
-    with pytest.raises(UsageError, match="X13"):
-        import_urdf(tmp_path / "arm.urdf.xacro")
+    path = tmp_path / "arm.urdf.xacro"
+    path.write_text("")
+    for load in (import_urdf, load_robot):
+        with pytest.raises(UsageError, match="X13"):
+            load(path)
 
 
 def test_expanded_xacro_is_welcome(tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ def _urdf(robot: RobotDescription) -> tuple[tuple[Placement, ...], tuple[Placeme
 
 def _z_onto(axis: Array) -> Array:
     """A rotation (3, 3) whose third column is `axis`; exact where the axis is one of ±x, ±y, ±z."""
-    if axis[2] == 1.0:
+    if axis[2] == 1.0 and not axis[:2].any():
         return np.eye(3)
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(helper, axis)
