@@ -113,7 +113,7 @@ def table(name: str, convention: str, rows: list[tuple[str, float, float, float,
     return RobotDescription(name, GRAVITY, convention, joints, tool=(0.03, -0.02, 0.1))
 
 
-def _by_hand(robot: RobotDescription) -> Arm:
+def by_hand(robot: RobotDescription) -> Arm:
     """Joint by joint from the table, with Pinocchio's transforms."""
     model, behind, links = pin.Model(), pin.SE3.Identity(), []
     for i, joint in enumerate(robot.joints):
@@ -149,11 +149,11 @@ def tx40(shared: Path) -> Arm:
 
 
 ARMS: dict[str, Callable[[Path, Path], Arm]] = {
-    "rrr": lambda shared, folder: _by_hand(load_robot("rrr")),
+    "rrr": lambda shared, folder: by_hand(load_robot("rrr")),
     "tx40": lambda shared, folder: tx40(shared),
-    "seven-joints": lambda shared, folder: _by_hand(table("seven", "dh", SEVEN)),
-    "stanford": lambda shared, folder: _by_hand(table("stanford", "dh", STANFORD)),
-    "puma-mdh": lambda shared, folder: _by_hand(table("puma", "mdh", PUMA)),
-    "gantry-mdh": lambda shared, folder: _by_hand(table("gantry", "mdh", GANTRY)),
+    "seven-joints": lambda shared, folder: by_hand(table("seven", "dh", SEVEN)),
+    "stanford": lambda shared, folder: by_hand(table("stanford", "dh", STANFORD)),
+    "puma-mdh": lambda shared, folder: by_hand(table("puma", "mdh", PUMA)),
+    "gantry-mdh": lambda shared, folder: by_hand(table("gantry", "mdh", GANTRY)),
     "skew-urdf": lambda shared, folder: skew(folder),
 }

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pipelines.log.robot import load_robot
 from pipelines.model.rigid import chain as serial
 from pipelines.model.rigid.geometry import serial_chain
-from tests.model.rigid.serial_arms import ARMS, Arm, physical_links
+from tests.model.rigid.serial_arms import ARMS, HALF, Arm, by_hand, physical_links, table
 
 BAR = 1e-11  # of the largest torque
 
@@ -36,6 +39,29 @@ def test_regressor_and_recursion_equal_pinocchio(arm: Arm) -> None:
     largest = np.abs(theirs).max()
     assert np.abs(ours - theirs).max() <= BAR * largest
     assert np.abs(recursive - theirs).max() <= BAR * largest
+
+
+_ANGLES = st.sampled_from([0.0, HALF, -HALF, math.pi]) | st.floats(-3.0, 3.0)
+_LENGTHS = st.just(0.0) | st.floats(-0.5, 0.5)
+_ROW = st.tuples(st.sampled_from(["revolute", "prismatic"]), _ANGLES, _LENGTHS, _LENGTHS, _ANGLES)
+
+
+@given(st.lists(_ROW, min_size=1, max_size=5), st.sampled_from(["dh", "mdh"]), st.integers(0, 2**31))
+@settings(max_examples=60, deadline=None)
+def test_any_table_equals_pinocchio(rows: list[tuple[str, float, float, float, float]], convention: str,
+                                    seed: int) -> None:
+    """Whatever the table, distal or modified, turning or sliding: Pinocchio's torque, and a mass matrix like its own."""
+    arm = by_hand(table("any", convention, rows))
+    phi = physical_links(arm.n, np.random.default_rng(seed))
+    arm.load(phi)
+    q, dq, ddq = arm.states(5, seed)
+    chain, data = serial_chain(arm.robot), arm.model.createData()
+    theirs = np.array([pin.rnea(arm.model, data, p, dq[k], ddq[k]) for k, p in enumerate(arm.offset(q))])
+    bar = BAR * max(np.abs(theirs).max(), 1.0)
+    assert np.abs(serial.regressor(chain, q, dq, ddq) @ phi - theirs).max() <= bar
+    assert np.abs(serial.inverse_dynamics(chain, q, dq, ddq, phi) - theirs).max() <= bar
+    d = serial.mass_matrix(chain, q, phi)
+    np.testing.assert_allclose(d, d.transpose(0, 2, 1), atol=1e-12 * np.abs(d).max())
 
 
 @pytest.mark.parametrize("name", ["tx40", "puma-mdh", "gantry-mdh", "skew-urdf"])
@@ -95,7 +121,7 @@ def test_a_joint_does_not_feel_the_links_before_it(arm: Arm) -> None:
         assert not y[:, j, :10 * j].any()
 
 
-@pytest.mark.parametrize("samples", [0, 1, 4095, 4096, 4097, 9001])
+@pytest.mark.parametrize("samples", [0, 1, 4095, 4096, 4097, 9001, 16385])
 def test_blocks_are_the_whole(samples: int) -> None:
     """Block by block or at once, the regressor is the same to the last bit, whatever is left over at the end."""
     chain = serial_chain(load_robot("rrr"))
@@ -109,6 +135,16 @@ def test_blocks_are_the_whole(samples: int) -> None:
         seen += y.shape[2]
     assert seen == samples
     np.testing.assert_array_equal(whole, serial.regressor(chain, *motion)[:, :, columns])
+
+
+def test_memory_given_is_written_all_over(arm: Arm) -> None:
+    """Whatever stood in `out` before, afterwards it is the regressor."""
+    chain = serial_chain(arm.robot)
+    motion, columns = arm.states(50, seed=33), [k for k in range(10 * arm.n) if k % 3]
+    out = np.full((arm.n, len(columns), 50), np.nan)
+    y = serial.regressor(chain, *motion, columns, out=out)
+    assert np.shares_memory(y, out)
+    np.testing.assert_array_equal(y, serial.regressor(chain, *motion, columns))
 
 
 def test_memory_of_blocks_is_constant() -> None:
