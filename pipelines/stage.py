@@ -172,7 +172,7 @@ def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: 
 
         footer = {"command": f"rrrid {stage.name}", "version": VERSION}
         footer |= {f"input {path.name}": value[:16] for path, value in list(hashes.items())[:40]}
-        write_report(report, folder, footer)
+        write_report(tilde(report), folder, footer)
 
 
 def _text(path: Path, text: str) -> None:
@@ -255,4 +255,8 @@ def tilde(value: Any) -> Any:
         return value.replace(home, "~") if len(home) > 1 else value
     if isinstance(value, dict):
         return {tilde(key): tilde(item) for key, item in value.items()}
-    return [tilde(item) for item in value] if isinstance(value, list) else value
+    if isinstance(value, list | tuple):
+        return type(value)(tilde(item) for item in value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return dataclasses.replace(value, **{f.name: tilde(getattr(value, f.name)) for f in dataclasses.fields(value)})
+    return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,10 @@ def _write_attributes(owner: Any, attributes: dict[str, object]) -> None:
             owner.attrs[name] = value
 
 
-def read_parts(path: Path) -> tuple[str, ExperimentLog, str | None]:
-    """The container as it is: (version-checked log, digest it carries or None). Runs inside the guarded child.
+def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[ExperimentLog, str | None]:
+    """The container as it is: the log, with the signals of `only` or all, and the digest it carries or None.
+
+    Runs inside the guarded child.
 
     Raises:
         InputRejected: with the row of the table of bad inputs that fits.
@@ -68,14 +71,14 @@ def read_parts(path: Path) -> tuple[str, ExperimentLog, str | None]:
 
     try:
         with h5py.File(path, "r", locking=False) as file:
-            return _read_file(file, str(path))
+            return _read_file(file, str(path), only)
     except InputRejected:
         raise
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, UnicodeError, MemoryError) as problem:
         raise _explain(problem, path) from None
 
 
-def _read_file(file: Any, where: str) -> tuple[str, ExperimentLog, str | None]:
+def _read_file(file: Any, where: str, only: Collection[str] | None) -> tuple[ExperimentLog, str | None]:
     _refuse_links(file, ("robot", "signals", *_GROUPS), where)
     attributes = _attributes(file, where)
     _version(attributes, where)
@@ -91,9 +94,9 @@ def _read_file(file: Any, where: str) -> tuple[str, ExperimentLog, str | None]:
     signals = _group(file, "signals", where)
     _refuse_links(signals, tuple(signals), f"{where}, /signals")
     _within_budget(signals, Path(where).stat().st_size, where)
-    read = {name: _signal(signals[name], f"{where}, /signals/{name}") for name in signals}
-    checked = "checksummed" if all(s.fletcher32 for s in signals.values()) else "plain"
-    return checked, canonical.from_parts(groups, read, where=where), digest
+    read = {name: _signal(signals[name], f"{where}, /signals/{name}") for name in signals
+            if only is None or name in only}
+    return canonical.from_parts(groups, read, where=where), digest
 
 
 def _version(attributes: dict[str, object], where: str) -> None:

@@ -48,7 +48,8 @@ def read_mat5(data: bytes, source: str) -> Arrays:
             warnings.simplefilter("error", MatReadWarning)
             listed = whosmat(io.BytesIO(data))
             names = _wanted(listed, source)
-            loaded = loadmat(io.BytesIO(data), variable_names=names, mat_dtype=True, struct_as_record=True, squeeze_me=False)
+            # Not mat_dtype=True, the type MATLAB shows: it would drop imaginary parts; columns become real numbers later.
+            loaded = loadmat(io.BytesIO(data), variable_names=names, mat_dtype=False, struct_as_record=True, squeeze_me=False)
     except MatReadWarning as problem:
         raise InputRejected("S03", f"a variable is there twice: {problem}", where=source, remedy="save each variable once") from None
     except (*_DAMAGE, MatReadError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,10 @@ def _samples(column: Any) -> Any:
     return np.concatenate(parts) if parts else np.empty(0, kind)
 
 
-def read_parts(path: Path) -> tuple[str, ExperimentLog, str | None]:
-    """The container as it is: ("checksummed", log, digest it carries or None). Runs inside the guarded child.
+def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[ExperimentLog, str | None]:
+    """The container as it is: the log, with the signals of `only` or all, and the digest it carries or None.
+
+    Runs inside the guarded child.
 
     Raises:
         InputRejected: with the row of the table of bad inputs that fits.
@@ -73,8 +76,8 @@ def read_parts(path: Path) -> tuple[str, ExperimentLog, str | None]:
                             thrift_string_size_limit=_LONGEST_METADATA) as file:
             about = _about(file.schema_arrow, where)
             refuse_oversize(8 * file.metadata.num_rows * file.metadata.num_columns, path.stat().st_size, "X06", where)
-            names = _signal_columns(file.schema_arrow, where)
-            table = file.read(use_threads=False)
+            names = {name: columns for name, columns in _signal_columns(file.schema_arrow, where).items() if only is None or name in only}
+            table = file.read([column for columns in names.values() for column in columns], use_threads=False)
     except InputRejected:
         raise
     except (OSError, pa.ArrowException, ValueError, KeyError, UnicodeError, MemoryError) as problem:
@@ -85,7 +88,7 @@ def read_parts(path: Path) -> tuple[str, ExperimentLog, str | None]:
     groups = {key: about.pop(key) for key in ("controller", "derived", "robot") if key in about}
     signals = {name: _signal(table, columns, f"{where}, column {columns[0]}") for name, columns in names.items()}
     log = canonical.from_parts(groups | {"attributes": about}, signals, where=where)
-    return "checksummed", log, digest if isinstance(digest, str) else None
+    return log, digest if isinstance(digest, str) else None
 
 
 def _about(arrow_schema: Any, where: str) -> dict[str, Any]:

@@ -187,7 +187,7 @@ class Recipe:
 
     __pydantic_config__ = _STRICT
     robot: dict[str, Any]
-    signals: dict[str, SignalSpec]
+    signals: dict[str, SignalSpec] = field(default_factory=dict)
     time: TimeSpec = TimeSpec()
     log: LogSpec = LogSpec()
     file: tuple[FileSpec, ...] = ()
@@ -313,6 +313,9 @@ def _meaning(recipe: Recipe, where: object) -> None:
     references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]
     if len(references) not in (0, 3):
         raise UsageError("C02", f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together", where=where, remedy="map all three, or none")
+    no_logs = not recipe.log.match and not any(not case.skip for case in recipe.file)
+    if no_logs and recipe.table:
+        return  # maps alone: no clock, no signals
     for name in ("q", "tau"):
         if name not in recipe.signals:
             raise InputRejected("S01", f"the recipe maps no signal '{name}'", where=where, remedy=f"add {name} = {{ columns = …, unit = … }} to [signals]")
@@ -326,5 +329,5 @@ def _meaning(recipe: Recipe, where: object) -> None:
         raise UsageError("C02", "'time' has both rate and sample_time", where=where, remedy="give one of them")
     if recipe.time.column is None and recipe.time.rate is None and recipe.time.sample_time is None:
         raise UsageError("C02", "'time' has neither column nor rate", where=where, remedy="give the column of the time stamps, or the sampling rate [Hz]")
-    if not recipe.log.match and not any(not case.skip for case in recipe.file):
+    if no_logs:
         raise UsageError("C02", "the recipe matches no files", where=where, remedy='write match = "*.csv" in [log], or [[file]] cases')

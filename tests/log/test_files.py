@@ -158,3 +158,13 @@ def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr("os.access", lambda *_: False)
     with pytest.raises(EnvironmentFault, match="RRID-F13 .*permission denied"):
         open_log(path)
+
+
+@BOTH
+def test_a_part_of_a_log_is_the_part(tmp_path: Path, ending: str) -> None:
+    """Only the named signals are read, t, q and tau always among them; their samples are those of the whole."""
+    log = small_log()
+    write_log(tmp_path / f"a{ending}", log)
+    part = open_log(tmp_path / f"a{ending}", only=("q_ref",)).log
+    assert list(part.signals) == ["t", "q", "tau", "q_ref"]
+    assert all(part.signals[name] == log.signals[name] for name in part.signals)
