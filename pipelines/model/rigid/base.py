@@ -32,7 +32,7 @@ _SPARE = 6  # rows of torque for each column: enough that chance cannot make col
 # 1e-14; angles written with twelve digits ("1.57079632679") leave 5e-12; a link as short as 0.1 mm leaves 1e-5.
 _DEPENDENT = 1e-8
 _NO_COEFFICIENT = 1e-9
-_WORTH_WRITING = 1e-6
+_WORTH_WRITING = 3e-8  # no square or product of round lengths, so that rounding cannot tip it
 _UNITS = ("kg", "kg m", "kg m", "kg m") + 6 * ("kg m^2",)
 
 
@@ -118,7 +118,8 @@ def _combination(leading: int, row: Array) -> str:
     words = [_name(leading)]
     for k in np.flatnonzero(np.abs(row) > _WORTH_WRITING):
         if k != leading:
-            size = f"{abs(row[k]):.6g}"
+            # rounded twice: 0.1505² = 0.02265025 would else become …502 or …503 by the luck of the last bit
+            size = f"{round(float(abs(row[k])), 10):.6g}"
             words.append(f"{'-' if row[k] < 0.0 else '+'} {'' if size == '1' else size + ' '}{_name(int(k))}")
     return " ".join(words)
 

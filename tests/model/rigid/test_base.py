@@ -17,7 +17,7 @@ from pipelines.model.rigid import rrr
 from pipelines.model.rigid.base import BaseArm, base_set
 from pipelines.model.rigid.body import rigid_body
 from pipelines.model.rigid.geometry import serial_chain
-from tests.model.rigid.serial_arms import TX40, Arm, physical_links
+from tests.model.rigid.serial_arms import HALF, TX40, Arm, physical_links, table
 
 
 def _pinocchio_rank(arm: Arm) -> tuple[int, float]:
@@ -106,6 +106,15 @@ def test_the_set_does_not_depend_on_the_draw(arm: Arm) -> None:
     first, second = (base_set(chain, np.random.default_rng(seed)) for seed in (1, 2))
     assert first.chosen == second.chosen
     assert [p.combination for p in first.parameters] == [p.combination for p in second.parameters]
+
+
+def test_words_do_not_hang_on_the_last_bit() -> None:
+    """Millimetres squared, and coefficients halfway between two roundings, are written the same for every draw."""
+    rows = [("revolute", HALF, 0.1505, 0.001, 0.0), ("revolute", -HALF, 0.001, 0.1505, 0.0),
+            ("revolute", HALF, 0.1505, 0.001, 0.0), ("prismatic", 0.0, 0.001, 0.0, 0.0)]
+    chain = serial_chain(table("mm", "dh", rows))
+    words = {tuple(p.combination for p in base_set(chain, np.random.default_rng(seed)).parameters) for seed in range(20)}
+    assert len(words) == 1
 
 
 def test_limits_do_not_change_the_set(arm: Arm) -> None:
