@@ -110,7 +110,7 @@ def compare(name: str, robot: RobotDescription, model: Any, samples: int) -> lis
             pass
 
     def copy() -> None:
-        copied[:] = serial.regressor(body.chain, *motion)
+        copied[:] = serial.regressor(body.chain, *motion, out=kept)
 
     few = motion[:, :_JUDGED]
     exact = exact_torque(body.chain, *few, phi)

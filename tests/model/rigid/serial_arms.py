@@ -34,7 +34,7 @@ GANTRY = [("prismatic", 0.0, 0.0, 0.2, 0.05), ("prismatic", -HALF, 0.1, 0.0, 0.0
 # Skew axes, a shift, links fixed in the middle and at the end, an inertial with its own axes.
 SKEW_URDF = """<?xml version="1.0"?>
 <robot name="skew">
-  <link name="world"/><link name="stand"><inertial><mass value="7"/></inertial></link>
+  <link name="world"/><link name="stand"/>
   <joint name="bolt" type="fixed"><parent link="world"/><child link="stand"/><origin xyz="0.1 0 0.3" rpy="0.2 0 0"/></joint>
   <joint name="j1" type="continuous"><parent link="stand"/><child link="a"/><origin xyz="0 0.2 0" rpy="0.1 -0.3 0.5"/>
     <axis xyz="1 2 3"/></joint>
