@@ -137,6 +137,8 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed.
     """
     started = time.time()
+    if request.out is not None:
+        refuse_foreign(request.out, request.paths, request.force)
     inputs = stage.read(request, settings)
     out = request.out or Path("runs") / slug(inputs.robot_name) / slug(inputs.label) / stage.name
     refuse_foreign(out, request.paths, request.force)
@@ -217,7 +219,7 @@ def refuse_foreign(out: Path, inputs: Iterable[Path], force: bool = False) -> No
         UsageError: it is anything else.
     """
     for path in inputs:
-        if path.is_dir() and out.resolve().is_relative_to(path.resolve()):
+        if os.path.isdir(path) and out.resolve().is_relative_to(path.resolve()):
             raise UsageError("C05", f"lies inside the input {path}", where=out, remedy="choose another folder with --out")
     if out.is_symlink() or (out.exists() and not out.is_dir()):
         raise UsageError("C05", "is not a folder", where=out, remedy="choose another folder with --out")

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -109,10 +110,10 @@ def regular_file(path: Path) -> os.stat_result:
         status = path.stat()
     except FileNotFoundError:
         raise UsageError("C04", "no such file", where=path, remedy="check the path") from None
-    except OSError as problem:
+    except (OSError, ValueError) as problem:
+        if isinstance(problem, ValueError) or problem.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+            raise UsageError("C07", "not a path of this system", where=path, remedy="check the path") from None
         raise fault_of(problem, path) from None
-    except ValueError:
-        raise UsageError("C07", "not a path", where=path) from None
     if not stat.S_ISREG(status.st_mode):
         raise InputRejected("F12", "not a regular file", where=path, remedy="give a log, or a folder of logs")
     if not os.access(path, os.R_OK):
@@ -173,7 +174,7 @@ def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
                                     remedy="copy the file again from where it was recorded")
     else:
         raise InputRejected("F06", "neither HDF5 nor Parquet", where=path,
-                            remedy="rrrid reads logs in .h5 and .parquet, and imports .csv, .txt, .mat and .npy by a recipe")
+                            remedy="a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe")
     if ENDINGS.get(path.suffix.lower()) == container:
         return container, []
     return container, [Check.of("F06", "warn", f"named '{path.suffix}', but its content is {container}; read as that", where=path,
@@ -218,7 +219,7 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
     checks: list[Check] = []
     inputs = tuple(inputs)
     for path in inputs:
-        if not path.is_dir():
+        if not os.path.isdir(path):  # unlike Path.is_dir, it answers for a path that is none
             regular_file(path)
             found.append(path)
             continue

@@ -1,0 +1,225 @@
+"""The command line as a user meets it: one line for every error, the exit code promised, nothing else on stdout."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from pipelines.log.files import open_log, write_log
+from tests.log.logs import small_log
+
+RRRID = (sys.executable, "-m", "rrrid_cli.main")
+REPO = Path(__file__).resolve().parents[2]
+
+
+def rrrid(*words: object, cwd: Path, **more: object) -> subprocess.CompletedProcess[str]:
+    """Run the command in `cwd`, as a fresh process without a terminal."""
+    environment = os.environ | {"PYTHONPATH": str(REPO)}
+    environment |= more.pop("env", {})  # type: ignore[arg-type]
+    return subprocess.run([*RRRID, *map(str, words)], capture_output=True, text=True, cwd=cwd, check=False, timeout=120,
+                          stdin=subprocess.DEVNULL, env=environment, **more)  # type: ignore[call-overload, no-any-return]
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> Path:
+    """A folder `logs` with one good log."""
+    write_log(tmp_path / "logs/a.h5", small_log())
+    return tmp_path
+
+
+def test_a_command_leaves_a_folder_and_says_where(logs: Path) -> None:
+    """The default folder is runs/ROBOT/FOLDER/COMMAND, and the last line names the report."""
+    done = rrrid("convert", "logs", cwd=logs)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[-1] == "→ runs/rrr-tue/logs/convert/report.html"
+    folder = logs / "runs/rrr-tue/logs/convert"
+    assert open_log(folder / "logs/a.parquet").log == small_log()
+
+
+def test_json_is_alone_on_standard_output(logs: Path) -> None:
+    """--json: stdout is result.json's object and nothing else; words go to stderr."""
+    done = rrrid("convert", "logs", "--json", "--out", "out", cwd=logs)
+    assert json.loads(done.stdout) == json.loads((logs / "out/result.json").read_text())
+    assert "converted" in done.stderr
+
+
+@pytest.mark.parametrize(("words", "code", "exit_code"), [
+    (("convert", "nowhere"), "RRID-C04", 2),
+    (("convert", "empty"), "RRID-C06", 5),
+    (("convert", "logs/text.h5"), "RRID-F06", 3),
+    (("convert", "logs/a.h5", "--set", "convert.tp=csv"), "RRID-C01", 2),
+    (("convert", "logs/a.h5", "--set", "convret.to=csv"), "RRID-C01", 2),
+    (("convert", "logs/a.h5", "--set", "convert.to=3"), "RRID-C02", 2),
+    (("convert", "logs/a.h5", "--to", "xlsx"), "RRID-C02", 2),
+    (("convert", "logs/a.h5", "--format", "zip"), "RRID-C02", 2),
+    (("convert", "logs/a.h5", "--robot", "nobody"), "RRID-C04", 2),
+    (("convert", "logs/a.h5", "--config", "no.toml"), "RRID-C04", 2),
+    (("convert", "logs/a.h5", "--config", "evil.yaml"), "RRID-C03", 2),
+    (("convert", "logs", "--out", "logs/out"), "RRID-C05", 2),
+    (("import",), "RRID-C02", 2),
+    (("import", "no-such-recipe"), "RRID-C04", 2),
+])
+def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[str, ...], code: str, exit_code: int) -> None:
+    """No traceback reaches a user; with --json the same error stands on stdout as an object."""
+    (logs / "empty").mkdir()
+    (logs / "logs/text.h5").write_text("t,q\n1,2\n")
+    (logs / "evil.yaml").write_text("!!python/object/apply:os.system ['touch pwned']")
+    done = rrrid(*words, "--json", cwd=logs)
+    assert done.returncode == exit_code, done.stderr
+    assert done.stderr.startswith(f"rrrid: {code} ")
+    assert done.stderr.count("\n") == 1
+    error = json.loads(done.stdout)["error"]
+    assert error["code"] == code
+    assert error["where"]
+    assert error["remedy"]
+    assert not (logs / "pwned").exists()
+
+
+@pytest.mark.parametrize("words", [("convret",), ("convert",), ("convert", "logs", "--ot", "x")])
+def test_wrong_usage_is_exit_2(logs: Path, words: tuple[str, ...]) -> None:
+    """C01: a misspelt command or option, or a missing argument, ends in 2 with a usage line."""
+    done = rrrid(*words, cwd=logs)
+    assert done.returncode == 2
+    assert "Usage" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_settings_come_from_file_then_set_then_options(logs: Path) -> None:
+    """The last word has the command line; tables of other stages in the same file are left alone."""
+    (logs / "c.toml").write_text('[convert]\nto = "csv"\n[inspect]\n')
+    assert (logs / "x/csv").is_dir() is False
+    rrrid("convert", "logs", "--config", "c.toml", "--out", "x", cwd=logs)
+    assert (logs / "x/csv/a.csv").is_file()
+    rrrid("convert", "logs", "--config", "c.toml", "--set", "convert.to=h5", "--out", "y", cwd=logs)
+    assert (logs / "y/logs/a.h5").is_file()
+    rrrid("convert", "logs", "--set", "convert.to=h5", "--to", "parquet", "--out", "z", cwd=logs)
+    assert (logs / "z/logs/a.parquet").is_file()
+
+
+def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path) -> None:
+    """What nobody foresaw ends in 70, one line, and a file to report; --debug shows the traceback."""
+    code = ("import sys, pipelines.convert as c; from rrrid_cli import main; from dataclasses import replace\n"
+            "c.STAGE = replace(c.STAGE, compute=lambda inputs, settings: 1 / 0)\nsys.argv = ['rrrid', *sys.argv[1:]]\nmain.entry()")
+    environment = os.environ | {"PYTHONPATH": str(REPO), "TMPDIR": str(logs)}
+    done = subprocess.run([sys.executable, "-c", code, "convert", "logs"], capture_output=True, text=True, cwd=logs, env=environment,
+                          check=False)
+    assert done.returncode == 70
+    assert done.stderr.count("\n") == 1
+    (crash,) = logs.glob("rrrid-crash-*.txt")
+    assert "ZeroDivisionError" in crash.read_text()
+    assert crash.name in done.stderr
+    assert not (logs / "runs").exists()
+
+
+@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_cleanly(tmp_path: Path, number: signal.Signals, exit_code: int) -> None:
+    """P06: Ctrl-C and SIGTERM end within 5 s with their code, no half-written folder, no orphan."""
+    for i in range(60):
+        write_log(tmp_path / f"logs/{i}.h5", small_log(samples=20_000, seed=i))
+    environment = os.environ | {"PYTHONPATH": str(REPO)}
+    with subprocess.Popen([*RRRID, "convert", "logs", "--to", "csv", "-v"], cwd=tmp_path, env=environment, text=True,
+                          stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True) as process:
+        assert process.stderr is not None
+        while "writing csv/1" not in process.stderr.readline():
+            assert process.poll() is None
+        began = time.monotonic()
+        process.send_signal(number)
+        said = process.stderr.read()
+    assert process.returncode == exit_code
+    assert time.monotonic() - began < 5
+    assert "Traceback" not in said
+    assert [p.name for p in (tmp_path / "runs/rrr-tue/logs").iterdir()] == []
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
+def test_a_closed_pipe_is_no_error(logs: Path) -> None:
+    """`rrrid … --json | head -1` does not complain that its reader has left."""
+    line = f"{' '.join(RRRID)} convert logs --json | head -c 1"
+    done = subprocess.run(["bash", "-c", f"set -o pipefail; {line}"], capture_output=True, text=True, cwd=logs, check=False,
+                          env=os.environ | {"PYTHONPATH": str(REPO)})
+    assert "Traceback" not in done.stderr
+    assert "BrokenPipe" not in done.stderr
+
+
+def test_strange_paths_work(tmp_path: Path) -> None:
+    """C07: spaces, letters of any alphabet and a newline in a path; a path too long for the system is an error of ours."""
+    folder = tmp_path / "Prüf stand\n№ 1"
+    write_log(folder / "ä ö.h5", small_log(name="µ"))
+    done = rrrid("convert", folder, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 1
+    done = rrrid("convert", "x" * 300, cwd=tmp_path)
+    assert done.returncode in (2, 6)
+    assert "Traceback" not in done.stderr
+
+
+def test_hostile_names_reach_no_terminal(tmp_path: Path) -> None:
+    """X09: escape sequences and markup in a log's texts come out as harmless characters."""
+    write_log(tmp_path / "logs/a.h5", small_log(name="\x1b]0;owned\x07[/bold]$a_{", robot_name="../../\x1b[31mrobot"))
+    done = rrrid("convert", "logs", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "\x1b" not in done.stdout + done.stderr
+    assert all(p.is_relative_to(tmp_path / "runs") for p in tmp_path.rglob("provenance.json"))
+
+
+def test_archives_are_not_opened(tmp_path: Path) -> None:
+    """X12: a zip of logs is not unpacked; what can be read is said."""
+    import zipfile
+
+    with zipfile.ZipFile(tmp_path / "logs.zip", "w") as archive:
+        archive.writestr("../../evil.h5", "x")
+    done = rrrid("convert", "logs.zip", cwd=tmp_path)
+    assert done.returncode in (2, 3)
+    assert "neither HDF5 nor Parquet" in done.stderr
+
+
+def test_no_home_no_terminal_no_display(logs: Path) -> None:
+    """P13: HOME missing and read-only, no DISPLAY, a dumb terminal: the command works and says nothing else."""
+    (logs / "home").mkdir(mode=0o555)
+    for home in (logs / "home", Path("/nonexistent")):
+        done = rrrid("convert", "logs", "--out", "out", cwd=logs, env={"HOME": str(home), "TERM": "dumb", "DISPLAY": ""})
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_help_is_quick_and_plain(tmp_path: Path) -> None:
+    """Every command explains itself; the whole help needs at most 200 ms of CPU on an unloaded core (benchmarks/startup.py)."""
+    top = rrrid("--help", cwd=tmp_path).stdout
+    for command in ("run", "inspect", "import", "convert"):
+        assert f"  {command} " in top
+        assert "--out" in rrrid(command, "--help", cwd=tmp_path).stdout
+
+
+def test_schema_describes_the_shipped_model(tmp_path: Path, samples: Path) -> None:
+    """`rrrid schema model` prints a JSON schema that the full example fulfils."""
+    import jsonschema
+
+    schema = json.loads(rrrid("schema", "model", cwd=tmp_path).stdout)
+    jsonschema.validate(json.loads((samples / "models/rrr.json").read_text()), schema)
+
+
+def test_a_log_of_another_program_is_converted(tmp_path: Path) -> None:
+    """A log written by h5py alone, in another layout, without digest or checksums, becomes a full one, with one warning."""
+    log = small_log(controller=None)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for key in ("name", "experiment", "role", "origin", "robot_name", "sample_time"):
+            file.attrs[key] = getattr(log, key)
+        file.attrs["format"], file.attrs["format_version"] = "rrrid-log", 1
+        file["robot"] = log.robot_text
+        for name, signal in log.signals.items():
+            file[f"signals/{name}"] = np.asarray(signal.values, dtype="f8")
+            file[f"signals/{name}"].attrs["units"] = signal.units
+            file[f"signals/{name}"].attrs["long_name"] = signal.long_name
+    done = rrrid("convert", "a.h5", "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.count("RRID-F05") == 1
+    assert np.array_equal(open_log(tmp_path / "out/logs/a.parquet").log.q, log.q)
