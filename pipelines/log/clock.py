@@ -40,7 +40,7 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     steps = np.diff(finite)
     steps = steps[steps > 0]
     if finite.size < 2 or steps.size == 0:
-        raise InputRejected("T08", f"{finite.size} time stamps, none later than another", where=where, remedy="record again")
+        raise InputRejected("T08", f"{finite.size} time stamp{'s' if finite.size != 1 else ''}, none later than another", where=where, remedy="record again")
     median = float(np.median(steps))
     unit = spec.unit or table.units.get(name)
     checks: list[Check] = []
@@ -71,7 +71,7 @@ def plausible_units(median: float) -> list[str]:
 
 def _fitting(median: float, step: float) -> list[str]:
     fits = [unit for unit, factor in _UNITS.items() if abs(median * factor / step - 1.0) < _NEAR]
-    return fits + (["sample"] if abs(median - 1.0) < 1e-9 and "s" not in fits else [])
+    return fits or (["sample"] if abs(median - 1.0) < 1e-9 else [])
 
 
 def _detected(median: float, step: float | None, where: str, assume: bool, checks: list[Check]) -> str:

@@ -81,11 +81,11 @@ def files_below(folder: Path) -> tuple[str, ...]:
 
 
 def inside(folder: Path, relative: str, where: object) -> Path:
-    """The path of a file of the recording, which must lie inside its folder (X11)."""
-    path = folder / relative
-    if Path(relative).is_absolute() or not path.resolve().is_relative_to(folder.resolve()):
-        raise UsageError("X11", f"'{relative}' lies outside the source folder", where=where, remedy="keep the files of a recording together")
-    return path
+    """The path of a file of the recording, which its name must not lead out of the folder (X11); a link may, it is the user's."""
+    if Path(relative).is_absolute() or os.path.normpath(relative).startswith(".."):
+        raise UsageError("X11", f"'{relative}' lies outside the source folder", where=where,
+                         remedy="keep the files of a recording together")
+    return folder / relative
 
 
 def unique(names: Iterable[str]) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ marked "check:".
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,7 +66,7 @@ def _roles(table: RawTable, path: Path) -> dict[str, tuple[str, ...]]:
     """Which columns hold what, by their names; a column of time also by rising evenly. The file's name settles "Joint_1"."""
     found: dict[str, list[str]] = {}
     for name in table.columns:
-        word = re.sub(r"[\s.\-/]+", "_", name.strip()).lower()
+        word = re.sub(r"[^\w]+", "_", name.strip()).lower()
         role = next((role for role, pattern in _NAMES if re.fullmatch(pattern, word)), None)
         if role is not None:
             found.setdefault(role, []).append(name)
@@ -257,16 +257,22 @@ def _suffix(column: str, table: RawTable) -> str | None:
 
 
 def _sign(q: Array, tau: Array) -> Guess:
-    """Friction takes power out: over a run that comes back, torque times motion must be positive on every joint."""
-    moves: Callable[[Array], Array] = lambda x: np.diff(x, axis=0)  # noqa: E731
-    work = (moves(q) * 0.5 * (tau[1:] + tau[:-1])).sum(axis=0)
-    scale = np.abs(moves(q) * 0.5 * (tau[1:] + tau[:-1])).sum(axis=0)
-    share = work / np.where(scale > 0, scale, 1.0)
-    wrong = [str(j + 1) for j in np.flatnonzero(share < -0.1)]
+    """Friction takes power out: beside inertia, springs and a constant, torque must grow with speed on every joint."""
+    width = max(5, len(q) // 300)
+    smooth = np.ones(width) / width
+    share = np.zeros(q.shape[1])
+    for j in range(q.shape[1]):
+        position, torque = (np.convolve(x[:, j], smooth, mode="valid") for x in (q, tau))
+        speed = np.gradient(position)
+        columns = np.column_stack([speed, np.gradient(speed), position, np.ones(position.size)])
+        columns /= np.maximum(np.abs(columns).max(axis=0), 1e-300)
+        share[j] = np.linalg.lstsq(columns, torque, rcond=1e-9)[0][0] * np.std(columns[:, 0]) / max(float(np.std(torque)), 1e-300)
+    wrong = [str(j + 1) for j in np.flatnonzero(share < -0.02)]
     if wrong:
-        return Guess("sign = -1?", "likely", f"torque of joint {', '.join(wrong)} takes energy out of the motion; add sign there unless a transmission is negative")
-    if (share > 0.1).all():
-        return Guess("as recorded", "likely", "sign: torque puts energy into the motion of every joint, which friction takes out")
+        return Guess("sign = -1?", "likely", f"torque of joint {', '.join(wrong)} takes energy out of the motion where friction should: "
+                     "add sign = -1 there, unless its transmission is negative")
+    if (share > 0.02).all():
+        return Guess("as recorded", "likely", "sign: torque grows with speed on every joint, as friction asks for")
     return Guess("as recorded", "unsure", "sign: torque and motion do not tell")
 
 

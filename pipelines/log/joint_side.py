@@ -115,7 +115,7 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot:
             steps.append(f"{name}: offset {', '.join(f'{x:.6g}' for x in offset)} added")
         law = recipe.controller.law if recipe.controller else None
         signals[name] = Signal(values + offset, schema.unit_of(name, law), schema.SIGNALS[name][1])
-    if not trust_units:
+    if not trust_units and "q" in signals:
         _refuse_degrees(part, signals["q"].values, units["q"], robot)
     return Converted(signals, tuple(steps), tuple(altered), tuple(checks))
 

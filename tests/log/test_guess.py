@@ -1,0 +1,101 @@
+"""A drafted recipe is nearly right, says what it rests on, and runs once its blanks are filled."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.errors import UsageError
+from pipelines.log.evidence import rollover
+from pipelines.log.files import open_log
+from pipelines.log.guess import guess_recipe
+from pipelines.log.recipe import parse_recipe
+from tests.log.recording import good, run, text, write
+
+
+def drafted(folder: Path, content: str, name: str = "run.csv") -> str:
+    return guess_recipe(write(folder, content, name)).text
+
+
+def test_a_plain_recording_needs_only_its_robot(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    draft = guess_recipe(write(folder, text(good())))
+    assert draft.blanks == ("robot.use",)
+    outcome = run(folder, draft.text.replace("FILL IN\"", 'rrr"', 1).replace('says rrr"', "says", 1))
+    assert np.array_equal(open_log(outcome.folder / "logs" / "run.h5").log.q[:, 1], good()["q_2"])
+
+
+def test_a_blank_that_is_left_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="RRID-C0"):
+        run(tmp_path / "data", drafted(tmp_path / "data", text(good())))
+
+
+def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) -> None:
+    draft = guess_recipe(shared / "real" / "odrive" / "slow2_nocomp_0.csv")
+    assert draft.blanks == ("drive.torque_constant",)
+    recipe = parse_recipe(draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551"))
+    assert (recipe.time.column, recipe.time.unit) == ("t_s", "s")
+    assert (recipe.signals["q"].unit, recipe.signals["q"].counts_per_rev) == ("counts", 8192)
+    assert recipe.signals["tau"].unit == "A"
+    assert recipe.resample is not None
+    assert recipe.resample.rate == 400.0
+    text_ = draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551")
+    (tmp_path / "recipe.toml").write_text(text_)
+    from pipelines.import_log import STAGE, Settings
+    from pipelines.stage import Request, run_stage
+
+    request = Request((), tmp_path / "out", no_report=True)
+    outcome = run_stage(STAGE, request, Settings(recipe=str(tmp_path / "recipe.toml"), source=shared / "real" / "odrive"))
+    assert outcome.result.logs[0].samples == 4000
+
+
+@pytest.mark.parametrize("name", ["pos_read_data.csv", "curr_data.csv"])
+def test_the_tx40_draft_finds_both_files_and_the_motor_side(shared: Path, name: str) -> None:
+    draft = guess_recipe(shared / "real" / "tx40" / name)
+    assert draft.blanks == ("time.rate",)
+    recipe = parse_recipe(draft.text.replace('rate = "FILL IN"', "rate = 5000"))
+    assert recipe.robot["use"] == "tx40.urdf"
+    assert recipe.log.match == "pos_read_data.csv"
+    assert (recipe.signals["q"].columns, recipe.signals["q"].unit, recipe.signals["tau"].file) == ("Joint_{j}", "rad", "curr_data.csv")
+    assert "starts at 32, -45 times pi/2" in draft.text
+
+
+def test_a_map_is_recognised(shared: Path) -> None:
+    assert "[[table]]" in guess_recipe(shared / "real" / "odrive" / "holding_current_forward.csv").text
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_time_is_told_by_a_plausible_rate(tmp_path: Path, unit: str, factor: float) -> None:
+    columns = good()
+    draft = drafted(tmp_path, text(columns | {"t": columns["t"] * factor + 5.0 * factor}))
+    assert f'unit = "{unit}"' in draft.split("[signals]")[0]
+
+
+def test_degrees_are_told_by_a_recorded_velocity(tmp_path: Path) -> None:
+    columns = good()
+    degrees = {f"q_{j}": np.rad2deg(columns[f"q_{j}"]) for j in (1, 2, 3)}
+    speeds = {f"dq_{j}": np.gradient(columns[f"q_{j}"], columns["t"]) for j in (1, 2, 3)}
+    assert 'columns = "q_{j}", unit = "deg"' in drafted(tmp_path, text({**columns, **degrees, **speeds}))
+    assert 'columns = "q_{j}", unit = "rad"' in drafted(tmp_path, text({**columns, **speeds}))
+
+
+def test_a_flipped_torque_is_noticed(tmp_path: Path) -> None:
+    columns = good()
+    draft = drafted(tmp_path, text(columns | {"tau_2": -columns["tau_2"]}))
+    assert "torque of joint 2 takes energy out of the motion" in draft
+    assert "as friction asks for" in drafted(tmp_path, text(columns))
+
+
+@pytest.mark.parametrize(("size", "found"), [(8192.0, 8192.0), (360.0, 360.0), (2 * np.pi, 2 * np.pi)])
+def test_a_rollover_is_told_by_jumps_of_one_size(size: float, found: float) -> None:
+    assert rollover(np.mod(np.linspace(0, 3.7 * size, 3000), size)[:, None]) == pytest.approx(found)
+    assert rollover(np.sin(np.linspace(0, 9, 3000))[:, None]) is None
+
+
+def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
+    columns = good()
+    odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "torque #1": columns["tau_1"]}
+    draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
+    assert parse_recipe(draft.text).signals["q"].column

@@ -1,0 +1,231 @@
+"""MAT and NumPy files: numbers come out exactly, everything else is refused before it is built."""
+
+from __future__ import annotations
+
+import io
+import pickle
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.arrays import read_npy
+from pipelines.log.matlab import read_mat5
+from pipelines.log.raw import columns_of_arrays
+from pipelines.log.sources import read_table
+from tests.log.recording import good, text
+
+
+def signals() -> dict[str, np.ndarray[Any, Any]]:
+    columns = good()
+    return {"t": columns["t"], "q": np.column_stack([columns[f"q_{j}"] for j in (1, 2, 3)]),
+            "tau": np.column_stack([columns[f"tau_{j}"] for j in (1, 2, 3)])}
+
+
+def mat5(path: Path, content: dict[str, Any], **options: Any) -> Path:
+    scipy.io.savemat(path, content, **options)
+    return path
+
+
+def mat73(path: Path, transposed: bool = True) -> Path:
+    """As MATLAB writes -v7.3: a user block with the version, arrays by columns, a class attribute."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in signals().items():
+            matrix = np.atleast_2d(values) if values.ndim == 1 else values.T if transposed else values
+            file.create_dataset(name, data=matrix).attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    return path
+
+
+def npy(array: np.ndarray[Any, Any], pickled: bool = False) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, array, allow_pickle=pickled)
+    return buffer.getvalue()
+
+
+def assert_good(path: Path) -> None:
+    table = read_table(path)
+    assert all(np.array_equal(table.columns[name], values) for name, values in good().items())
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_mat5_is_read_exactly(tmp_path: Path, compressed: bool) -> None:
+    assert_good(mat5(tmp_path / "run.mat", signals(), do_compression=compressed))
+
+
+def test_a_structure_is_opened_one_level(tmp_path: Path) -> None:
+    table = read_table(mat5(tmp_path / "run.mat", {"data": signals(), "note": "hello"}))
+    assert np.array_equal(table.columns["data.q_2"], good()["q_2"])
+    assert table.groups["data.q"] == ("data.q_1", "data.q_2", "data.q_3")
+
+
+def test_mat73_is_read_exactly(tmp_path: Path) -> None:
+    assert_good(mat73(tmp_path / "run.mat"))
+
+
+def test_f06_a_mat_file_of_another_name_is_read_with_a_warning(tmp_path: Path) -> None:
+    path = mat5(tmp_path / "run.mat", signals())
+    path.rename(tmp_path / "run.csv")
+    assert [c.code for c in read_table(tmp_path / "run.csv").checks] == ["RRID-F06"]
+
+
+def test_f06_text_named_mat_is_read_with_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "run.mat").write_text(text(good()))
+    table = read_table(tmp_path / "run.mat")
+    assert [c.code for c in table.checks] == ["RRID-F06"]
+    assert np.array_equal(table.columns["q_1"], good()["q_1"])
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.7, 0.999])
+@pytest.mark.parametrize("version", ["5", "5z", "7.3"])
+def test_f08_a_truncated_mat_file_is_refused_in_one_way(tmp_path: Path, version: str, share: float) -> None:
+    path = mat73(tmp_path / "run.mat") if version == "7.3" else mat5(tmp_path / "run.mat", signals(), do_compression=version == "5z")
+    whole = path.read_bytes()
+    path.write_bytes(whole[: max(130, int(share * len(whole)))])
+    with pytest.raises(InputRejected, match="RRID-(F08 run.mat: truncated or damaged MAT file|S12)"):
+        read_table(path)
+
+
+def test_s12_complex_numbers_are_no_signal(tmp_path: Path) -> None:
+    table = read_table(mat5(tmp_path / "run.mat", signals() | {"z": 1j * signals()["t"]}))
+    with pytest.raises(InputRejected, match="RRID-S12.*'z'.*complex"):
+        table.name_of("z")
+
+
+def test_s12_integers_beyond_the_mantissa_are_refused() -> None:
+    table = columns_of_arrays({"n": np.arange(50) + 2**60, "q": np.arange(50.0)}, "run.npy")
+    with pytest.raises(InputRejected, match="RRID-S12.*2\\^53"):
+        table.name_of("n")
+
+
+def test_s11_a_matrix_that_lies_on_its_side_is_turned() -> None:
+    table = columns_of_arrays({"q": signals()["q"].T}, "run.npy")
+    assert np.array_equal(table.columns["q_3"], good()["q_3"])
+    assert [(c.code, c.level) for c in table.checks] == [("RRID-S11", "warn")]
+
+
+def test_s11_a_square_matrix_is_refused() -> None:
+    with pytest.raises(InputRejected, match="RRID-S11.*which side is time"):
+        columns_of_arrays({"q": np.zeros((20, 20))}, "run.npy")
+
+
+def test_x01_an_external_link_is_refused(tmp_path: Path) -> None:
+    path = mat73(tmp_path / "run.mat")
+    with h5py.File(path, "r+") as file:
+        file["secret"] = h5py.ExternalLink("other.h5", "/q")
+    with pytest.raises(InputRejected, match="RRID-X01.*'secret'"):
+        read_table(path)
+
+
+def test_x02_external_storage_is_refused(tmp_path: Path) -> None:
+    path = mat73(tmp_path / "run.mat")
+    with h5py.File(path, "r+") as file:
+        file.create_dataset("leak", (4,), "f8", external=[("/etc/passwd", 0, 32)])
+    with pytest.raises(InputRejected, match="RRID-X02.*'leak'"):
+        read_table(path)
+
+
+def test_x03_virtual_data_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        layout = h5py.VirtualLayout((10,), "f8")
+        layout[:] = h5py.VirtualSource("missing.h5", "q", (10,))
+        file.create_virtual_dataset("q", layout)
+    with pytest.raises(InputRejected, match="RRID-X03"):
+        read_table(path)
+
+
+def test_x05_a_huge_declared_data_set_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("q", (10**9, 6), "f8", chunks=(65536, 1), compression="gzip")
+    with pytest.raises(InputRejected, match="RRID-X05"):
+        read_table(path)
+
+
+def test_x07_objects_are_never_unpickled(tmp_path: Path) -> None:
+    class Bomb:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return Path.touch, (tmp_path / "exploded",)
+
+    (tmp_path / "run.npy").write_bytes(npy(np.array([Bomb()], dtype=object), pickled=True))
+    (tmp_path / "run.pkl").write_bytes(pickle.dumps(Bomb()))
+    for name in ("run.npy", "run.pkl"):
+        with pytest.raises(InputRejected, match="RRID-X07"):
+            read_table(tmp_path / name)
+    assert not (tmp_path / "exploded").exists()
+
+
+def test_npy_fields_are_read_by_name(tmp_path: Path) -> None:
+    columns = signals()
+    array = np.zeros(len(columns["t"]), dtype=[("t", "f8"), ("q", "f8", (3,)), ("tau", "f8", (3,))])
+    for name, values in columns.items():
+        array[name] = values
+    (tmp_path / "run.npy").write_bytes(npy(array))
+    assert_good(tmp_path / "run.npy")
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_npy_columns_are_read_by_number(order: Any) -> None:
+    table = columns_of_arrays(read_npy(npy(np.asarray(signals()["q"], order=order)), "run.npy"), "run.npy")
+    assert np.array_equal(table.columns[table.name_of(2)], good()["q_2"])
+
+
+def test_f02_a_truncated_npy_file_says_how_much_is_there() -> None:
+    content = npy(signals()["q"])
+    with pytest.raises(InputRejected, match=rf"RRID-F02.*{len(content) - 9} of {len(content)} bytes"):
+        read_npy(content[:-9], "run.npy")
+
+
+def test_x05_a_header_that_declares_too_much_is_refused() -> None:
+    content = npy(signals()["q"]).replace(b"(1200, 3)", b"(9**99,3)").replace(b"9**99", b"99999")
+    with pytest.raises(InputRejected, match="RRID-F02"):
+        read_npy(content, "run.npy")
+
+
+@given(data=st.data())
+@settings(max_examples=200, deadline=None)
+def test_no_mutation_of_an_npy_file_escapes(data: st.DataObject) -> None:
+    content = bytearray(npy(signals()["q"][:30]))
+    for _ in range(data.draw(st.integers(1, 6))):
+        content[data.draw(st.integers(0, 200))] = data.draw(st.integers(0, 255))
+    try:
+        columns_of_arrays(read_npy(bytes(content), "run.npy"), "run.npy")
+    except (InputRejected, UsageError):
+        return
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@given(data=st.data())
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_mutation_of_a_mat_file_escapes(compressed: bool, data: st.DataObject) -> None:
+    buffer = io.BytesIO()
+    scipy.io.savemat(buffer, {name: values[:25] for name, values in signals().items()}, do_compression=compressed)
+    content = bytearray(buffer.getvalue())
+    for _ in range(data.draw(st.integers(1, 6))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    try:
+        read_mat5(bytes(content[: data.draw(st.integers(0, len(content)))]), "run.mat")
+    except (InputRejected, UsageError):
+        return
+
+
+@given(data=st.data())
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_mutation_of_an_hdf5_mat_file_escapes(tmp_path: Path, data: st.DataObject) -> None:
+    path = mat73(tmp_path / "run.mat")
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 6))):
+        content[data.draw(st.integers(0, 6000))] = data.draw(st.integers(0, 255))
+    path.write_bytes(bytes(content))
+    try:
+        read_table(path)
+    except (InputRejected, UsageError):
+        return

@@ -1,0 +1,195 @@
+"""Text files are read for what they are; damage is counted and named; spreadsheet remains are refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.raw import RawTable
+from pipelines.log.tabular import read_text
+from tests.log.recording import good, lines, text
+
+
+def parse(content: str | bytes) -> RawTable:
+    return read_text(content.encode() if isinstance(content, str) else content, "run.csv")
+
+
+def levels(table: RawTable) -> dict[str, str]:
+    return {check.code.removeprefix("RRID-"): check.level for check in table.checks}
+
+
+def equal(table: RawTable, rows: slice = slice(None)) -> bool:
+    return all(np.array_equal(table.columns[name], values[rows]) for name, values in good().items())
+
+
+def test_every_digit_of_a_plain_file_is_read() -> None:
+    table = parse(text(good()))
+    assert equal(table)
+    assert not table.checks
+    assert table.place(0) == "line 2"
+
+
+def with_commas(content: str) -> str:
+    return content.replace(",", ";").replace(".", ",")
+
+
+DIALECTS: dict[str, Callable[[str], bytes]] = {
+    "semicolon and decimal comma": lambda s: with_commas(s).encode(),
+    "tab": lambda s: s.replace(",", "\t").encode(),
+    "tab and decimal comma": lambda s: s.replace(",", "\t").replace(".", ",").encode(),
+    "blanks": lambda s: s.replace(",", "   ").encode(),
+    "bar": lambda s: s.replace(",", "|").encode(),
+    "byte order mark": lambda s: b"\xef\xbb\xbf" + s.encode(),
+    "UTF-16 with mark": lambda s: s.encode("utf-16"),
+    "UTF-16 without mark": lambda s: s.encode("utf-16-le"),
+    "windows line ends": lambda s: s.replace("\n", "\r\n").encode(),
+    "old mac line ends": lambda s: s.replace("\n", "\r").encode(),
+    "quotes": lambda s: "\n".join(",".join(f'"{c}"' for c in line.split(",")) for line in s.splitlines()).encode() + b"\n",
+    "comments above": lambda s: b"# robot 7\n# 2024\n" + s.encode(),
+    "header in a comment": lambda s: b"# " + s.encode(),
+    "words above the table": lambda s: b"Exported by LoggerPro\n\n" + s.encode(),
+}
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_f16_a_dialect_is_found_out(name: str) -> None:
+    """F16: the same numbers in any dialect are the same samples."""
+    assert equal(parse(DIALECTS[name](text(good()))))
+
+
+@pytest.mark.parametrize("name", ["semicolon and decimal comma", "byte order mark", "UTF-16 with mark", "UTF-16 without mark",
+                                  "words above the table"])
+def test_f16_an_unusual_dialect_is_said(name: str) -> None:
+    assert levels(parse(DIALECTS[name](text(good())))).get("F16") == "warn"
+
+
+def test_f16_two_numbers_a_line_with_decimal_commas_are_two_columns() -> None:
+    """`0,001;1,5` is what pandas alone reads as one column."""
+    table = parse("t;q\n" + "".join(f"0,{i:03d};1,{i:03d}\n" for i in range(50)))
+    assert table.columns["t"][7] == 0.007
+    assert table.columns["q"][7] == 1.007
+
+
+def test_f16_comma_as_delimiter_and_decimal_is_refused() -> None:
+    with pytest.raises(InputRejected, match=r"RRID-F16.*line 2 has 4 cells under 2 names.*semicolon"):
+        parse("t,q\n" + "0,001,1,5\n" * 30)
+
+
+def test_f16_a_nul_byte_is_refused_with_its_line() -> None:
+    content = text(good()).encode()
+    with pytest.raises(InputRejected, match=r"RRID-F16.*NUL byte in line 2\b"):
+        parse(content[:100] + b"\0" + content[100:])
+
+
+def test_f09_nul_bytes_at_the_end_are_a_lost_power_supply() -> None:
+    table = parse(text(good()).encode() + b"\0" * 512)
+    assert equal(table)
+    assert levels(table) == {"F09": "repair"}
+
+
+@pytest.mark.parametrize("cell", ["#REF!", "#DIV/0!", "#N/A", "=A2+1", "@SUM(A1)"])
+def test_f16_a_spreadsheet_error_is_refused_with_its_line(cell: str) -> None:
+    rows = lines()
+    cells = rows[41].split(",")
+    rows[41] = ",".join([*cells[:2], cell, *cells[3:]])
+    with pytest.raises(InputRejected, match=r"RRID-F16.*line 42.*in column 'q_2'.*spreadsheet"):
+        parse("\n".join(rows) + "\n")
+
+
+def test_f09_a_cut_last_line_is_left_out() -> None:
+    content = text(good())
+    table = parse(content[:-60])
+    assert levels(table) == {"F09": "repair"}
+    assert "line 1201" in table.checks[0].message
+    assert equal(table, slice(0, -1))
+
+
+def test_f09_a_last_line_without_line_end_is_not_trusted() -> None:
+    """Cut inside the last number, the line still has all its cells: a wrong number must not come through."""
+    table = parse(text(good())[:-4])
+    assert levels(table) == {"F09": "warn"}
+    assert equal(table, slice(0, -1))
+
+
+@given(cut=st.integers(200, len(text(good())) - 1))
+@settings(max_examples=40, deadline=None)
+def test_f09_no_cut_gives_a_wrong_number(cut: int) -> None:
+    table = parse(text(good())[:cut])
+    assert equal(table, slice(0, table.rows.size))
+
+
+def test_f09_a_line_out_of_step_is_left_out_and_named() -> None:
+    rows = lines()
+    rows[500] = rows[500].rsplit(",", 2)[0]
+    table = parse("\n".join(rows) + "\n")
+    assert levels(table) == {"F09": "repair"}
+    assert "line 501 (5 cells, not 7)" in table.checks[0].message
+    assert table.rows.size == 1199
+    assert table.breaks == (499,)
+    assert table.rows[499] == 500
+
+
+def test_f09_a_garbled_number_is_a_damaged_line() -> None:
+    rows = lines()
+    rows[500] = rows[500].replace("0.", "0x.", 1)
+    assert "line 501" in parse("\n".join(rows) + "\n").checks[0].message
+
+
+def test_f09_much_damage_is_refused() -> None:
+    rows = lines()
+    for k in range(100, 130):
+        rows[k] = rows[k].rsplit(",", 1)[0]
+    with pytest.raises(InputRejected, match=r"RRID-F09.*30 of 1200 lines.*line 101 \(6 cells.*Export"):
+        parse("\n".join(rows) + "\n")
+
+
+def test_s03_two_columns_of_one_name_are_both_named() -> None:
+    with pytest.raises(InputRejected, match=r"RRID-S03.*line 1.*columns 2 and 3 are both named 'q_1'"):
+        parse(text(good()).replace("q_2", "q_1", 1))
+
+
+def test_a_column_of_words_is_kept_apart() -> None:
+    rows = lines()
+    table = parse("\n".join([rows[0] + ",state", *(row + ",RUN" for row in rows[1:])]) + "\n")
+    assert equal(table)
+    assert table.text == {"state": "RUN"}
+    with pytest.raises(InputRejected, match="RRID-S12.*'state'.*RUN"):
+        table.name_of("state")
+
+
+def test_units_in_the_header_are_found() -> None:
+    table = parse(text(good()).replace("t,q_1", "t [ms],q_1 (deg)", 1))
+    assert table.units == {"t": "ms", "q_1": "deg"}
+    below = lines()
+    table = parse("\n".join([below[0], "s,rad,rad,rad,Nm,Nm,Nm", *below[1:]]) + "\n")
+    assert table.units["tau_3"] == "Nm"
+    assert equal(table)
+
+
+def test_f01_nothing_in_it() -> None:
+    with pytest.raises(InputRejected, match="RRID-F01"):
+        parse("\n# only a comment\n\n")
+
+
+def test_t08_a_header_alone() -> None:
+    with pytest.raises(InputRejected, match="RRID-T08"):
+        parse("t,q_1\n")
+
+
+@given(data=st.data())
+@settings(max_examples=150, deadline=None)
+def test_no_mutation_escapes_as_another_error(data: st.DataObject) -> None:
+    """Whatever happens to its bytes, a text file is read or refused in words."""
+    content = bytearray("\n".join(lines()[:40]).encode())
+    for _ in range(data.draw(st.integers(1, 12))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    try:
+        table = parse(bytes(content[: data.draw(st.integers(0, len(content)))]))
+    except (InputRejected, UsageError):
+        return
+    assert all(values.size == table.rows.size for values in table.columns.values())
