@@ -7,11 +7,6 @@ Source   log-format.md; transmission and torque constants as `pipelines.log.join
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-import time
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,15 +14,15 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, UsageError
-from pipelines.log import filenames, schema
-from pipelines.log.experiment import Array, Controller, Derived, ExperimentLog, Signal
+from pipelines.log import filenames
+from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
 from pipelines.log.joint_side import Converted, joint_side
-from pipelines.log.recipe import LogSpec, ResampleSpec
-from pipelines.log.recordings import Assembled, Map, Material, Source, assemble, collect, parse_map
+from pipelines.log.make_log import SourceFile, make_log
+from pipelines.log.recipe import ResampleSpec
+from pipelines.log.recordings import Map, Material, Source, assemble, collect, parse_map
 from pipelines.log.repair import Limits, Recording, mend, split_at_gaps
 from pipelines.log.results import NOT_STORED
-from pipelines.log.robot import format_robot
 from pipelines.log.table import write_table
 from pipelines.log.table_columns import ImportedTable, import_table
 from pipelines.report.report import Figure, Report, Section, Table
@@ -48,15 +43,6 @@ class Settings:
     source: Path | None = None
     map: tuple[str, ...] = ()
     trust_units: bool = False
-
-
-@dataclass(frozen=True)
-class SourceFile:
-    """A recorded file, and the columns taken from it."""
-
-    name: str
-    sha256: str
-    columns: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -132,7 +118,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         checks += table.checks
         name = filenames.fill(spec.name, groups, material.recipe.where)
         tables.append(import_table(spec, name, f"tables/{slug(name)}.parquet", table))
-    return Result(material.recipe_path.name, material.robot.name, tuple(logs), tuple(tables), material.ignored, tuple(dict.fromkeys(checks)))
+    return Result(material.recipe_path.name, material.robot.name, tuple(logs), tuple(tables), material.ignored,
+                  tuple(dict.fromkeys(checks)))
 
 
 def _import(source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]) -> list[ImportedLog]:
@@ -148,14 +135,21 @@ def _import(source: Source, material: Material, mapped: Map, settings: Settings,
     if len(mended) > 1 and any(len(parts) > 1 for parts in mended):
         raise InputRejected("T04", "gaps or steps of the clock in files with clocks of their own", where=source.primary,
                             remedy="bring the files on one clock before the import")
-    repairs = tuple(f"{c.code}: {c.message}" for c in checks if c.level == "repair" and any(c.where.startswith(t.source) for t in source.tables.values()))
+    repairs = tuple(f"{c.code}: {c.message}" for c in checks if c.level == "repair"
+                    and any(c.where.startswith(t.source) for t in source.tables.values()))
     made = []
     for parts in zip(*mended, strict=True):
-        converted = [joint_side(part, recipe, assembled.units, material.robot, material.drive, settings.trust_units) for part in parts]
+        converted = [joint_side(part, recipe, assembled.units, material.robot, material.drive, settings.trust_units)
+                     for part in parts]
         checks += [check for item in converted for check in item.checks]
         made.append(_on_one_clock(parts, converted, recipe.resample, checks))
-    return [_log(source, material, assembled, t, signals, steps, (*repairs, *altered), k if len(made) > 1 else None)
-            for k, (t, signals, steps, altered) in enumerate(made, start=1)]
+    logs = []
+    for k, (t, signals, steps, altered) in enumerate(made, start=1):
+        altered = (*repairs, *altered)
+        log, files = make_log(source, material, assembled, t, signals, steps, altered, k if len(made) > 1 else None)
+        logs.append(ImportedLog(log.name, "", log.experiment, log.role, log.joint, log.n_samples, log.n_joints, log.sample_time,
+                                float(log.t[-1] - log.t[0]), files, steps, altered, None, log))
+    return logs
 
 
 def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec: ResampleSpec | None,
@@ -178,86 +172,18 @@ def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec
     return at, signals, steps, altered
 
 
-def _log(source: Source, material: Material, assembled: Assembled, t: Array, signals: Mapping[str, Signal], steps: tuple[str, ...],
-         altered: tuple[str, ...], number: int | None) -> ImportedLog:
-    recipe, robot = material.recipe, material.robot
-    about = _about(recipe.log, source, recipe.where)
-    name = filenames.fill(about.name, source.groups, recipe.where) + (f"-{number}" if number else "")
-    files = tuple(SourceFile(file, table.sha256, tuple(c for columns in assembled.columns.values() for c in columns if c in table.columns))
-                  for file, table in source.tables.items())
-    step = 1.0 / recipe.resample.rate if recipe.resample else float(np.median(np.diff(t))) if recipe.time.column is not None else \
-        recipe.time.sample_time or 1.0 / (recipe.time.rate or 1.0)
-    duration = float(t[-1] - t[0])
-    if t.size < 11:
-        raise InputRejected("T08", f"{t.size} samples at {1 / step:g} Hz", where=source.primary, remedy="record longer, or resample faster")
-    if about.period is not None and duration < about.period * (1.0 - 1e-6):
-        raise InputRejected("T07", f"{duration:.4g} s < {about.period:g} s period", where=source.primary, remedy="record a whole period, or correct period")
-    if about.experiment == "frf" and "v" not in signals:
-        raise InputRejected("S01", "an frf log without its excitation v", where=source.primary, remedy="map signals.v")
-    ordered = {"t": Signal(t, "s", schema.SIGNALS["t"][1])} | {key: signals[key] for key in schema.SIGNALS if key in signals}
-    log = ExperimentLog(
-        name=name, experiment=about.experiment, role=about.role, origin=about.origin, torque=about.torque, robot_name=robot.name, sample_time=step,
-        robot_text=format_robot(robot), signals=ordered, recorded=about.recorded, joint=about.joint, period=about.period,
-        posture=None if about.posture is None else np.array(about.posture), controller=_controller(material),
-        derived=_derived(files, material, steps, altered, about.recorded) if altered else None)
-    return ImportedLog(name, "", log.experiment, log.role, log.joint, log.n_samples, robot.n_joints, step, duration, files, steps, altered, None, log)
-
-
-def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
-    """[log], overruled by the groups of the file's name, overruled by its [[file]] case."""
-    groups = source.groups
-    found: dict[str, Any] = {}
-    for key, known in (("experiment", schema.EXPERIMENTS), ("role", schema.ROLES)):
-        if key in groups:
-            if groups[key] not in known:
-                raise UsageError("C02", f"'{source.primary}' gives {key} '{groups[key]}', must be one of {', '.join(known)}", where=where)
-            found[key] = groups[key]
-    if "joint" in groups:
-        if not groups["joint"].isdigit():
-            raise UsageError("C02", f"'{source.primary}' gives joint '{groups['joint']}', must be a number", where=where)
-        found["joint"] = int(groups["joint"])
-    if source.case is not None:
-        keys = ("name", "experiment", "role", "joint", "period", "recorded", "posture")
-        found |= {key: value for key in keys if (value := getattr(source.case, key)) is not None}
-    about = replace(base, **found)
-    if about.experiment not in schema.ONE_JOINT:
-        return replace(about, joint=None)
-    if about.joint is None:
-        raise UsageError("C02", f"{about.experiment} log '{source.primary}' without its joint", where=where,
-                         remedy="write joint = … in its [[file]], or {joint} in the pattern")
-    return about
-
-
-def _controller(material: Material) -> Controller | None:
-    spec = material.recipe.controller
-    if spec is None:
-        return None
-    arrays: dict[str, Any] = {key: np.array(value) for key in ("kp", "kd", "ki", "output_limit", "torque_resolution") if (value := getattr(spec, key)) is not None}
-    return Controller(law=spec.law, feedforward=spec.feedforward, velocity=spec.velocity, delay=spec.delay, **arrays)
-
-
-def _derived(files: tuple[SourceFile, ...], material: Material, steps: tuple[str, ...], altered: tuple[str, ...], recorded: str | None) -> Derived:
-    record = {"recipe": material.recipe_path.name, "files": {file.name: file.sha256 for file in files}, "converted": list(steps), "altered": list(altered)}
-    sha256 = files[0].sha256 if len(files) == 1 else hashlib.sha256("\n".join(file.sha256 for file in files).encode()).hexdigest()
-    return Derived("import", json.dumps(record, sort_keys=True), sha256, recorded or _created())
-
-
-def _created() -> str:
-    """Equal inputs give equal logs: not the clock on the wall, but the time that reproducible builds agree on."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
-    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(int(epoch) if epoch.isdigit() and len(epoch) < 12 else 0))
-
-
 def _preview(log: ExperimentLog) -> Preview:
     every = max(1, -(-log.n_samples // _PREVIEW_POINTS))
-    return Preview(tuple(log.t[::every].tolist()), tuple(tuple(row) for row in log.q[::every].tolist()), tuple(tuple(row) for row in log.tau[::every].tolist()))
+    return Preview(tuple(log.t[::every].tolist()), tuple(tuple(row) for row in log.q[::every].tolist()),
+                   tuple(tuple(row) for row in log.tau[::every].tolist()))
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
     """Write logs and tables into `folder`."""
     for item in result.logs:
         request.tell(f"writing {item.file}")
-        write_log((folder / item.file).with_suffix("." + request.format) if request.format != "h5" else folder / item.file, item.log)
+        write_log((folder / item.file).with_suffix("." + request.format) if request.format != "h5" else folder / item.file,
+                  item.log)
     for table in result.tables:
         write_table(folder / table.file, table.data, table.units)
 
@@ -268,7 +194,8 @@ def report(result: Result) -> Report:
     seconds = sum(item.duration for item in result.logs)
     words = f"{n} log{'s' if n != 1 else ''} of robot {result.robot} imported, {seconds:.4g} s in all"
     words += f", and {len(result.tables)} table{'s' if len(result.tables) != 1 else ''}" if result.tables else ""
-    words += f"; {len(repaired)} repair{'s' if len(repaired) != 1 else ''}, listed below." if repaired else "; nothing had to be repaired."
+    count = f"{len(repaired)} repair{'s' if len(repaired) != 1 else ''}"
+    words += f"; {count}, listed below." if repaired else "; nothing had to be repaired."
     logs = Table(("log", "experiment", "role", "joint", "samples", "rate [Hz]", "duration [s]"),
                  tuple((i.name, i.experiment, i.role, i.joint, i.samples, 1.0 / i.sample_time, i.duration) for i in result.logs))
     sections = [Section("Logs", tables=(logs,), figures=tuple(_figure(item, item.preview) for item in result.logs if item.preview))]
@@ -282,14 +209,16 @@ def report(result: Result) -> Report:
 
 def _treatment(result: Result) -> Section:
     """What was done to the samples, and what was found on the way."""
-    done = tuple((item.name, ", ".join(s.name for s in item.sources), "; ".join((*item.steps, *item.altered)) or "taken as they are") for item in result.logs)
+    done = tuple((item.name, ", ".join(s.name for s in item.sources),
+                  "; ".join((*item.steps, *item.altered)) or "taken as they are") for item in result.logs)
     found = tuple((c.code, c.level, c.where, c.message, c.remedy) for c in result.checks if c.level != "ok")
     tables = [Table(("log", "from", "done to the samples"), done)]
     if found:
         tables.append(Table(("code", "level", "where", "what", "remedy"), found))
     text = [f"By recipe {result.recipe}."]
     if result.ignored:
-        text.append(f"The recipe does not speak of {len(result.ignored)} files: {', '.join(result.ignored[:8])}{' …' if len(result.ignored) > 8 else ''}.")
+        more = " …" if len(result.ignored) > 8 else ""
+        text.append(f"The recipe does not speak of {len(result.ignored)} files: {', '.join(result.ignored[:8])}{more}.")
     return Section("What was done to the data", tuple(text), tuple(tables))
 
 
@@ -306,4 +235,5 @@ def _figure(item: ImportedLog, preview: Preview) -> Figure:
                   (7.2, 0.7 + 1.1 * item.joints), f"position and torque of log {item.name} against time")
 
 
-STAGE = Stage("import", "Import recordings by a recipe", Settings, compute, report, read, write, checks=lambda result: result.checks)
+STAGE = Stage("import", "Import recordings by a recipe", Settings, compute, report, read, write,
+              checks=lambda result: result.checks)

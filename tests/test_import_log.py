@@ -60,7 +60,8 @@ def test_both_recorded_sets_pass_the_strict_checker(tx40: Outcome[Result], odriv
 def test_tx40_is_the_joint_side_of_what_was_recorded(tx40: Outcome[Result], shared: Path) -> None:
     """The numbers of the files, taken through the transmission by hand."""
     log = open_log(tx40.folder / "logs" / "tx40.h5").log
-    motor_q, motor_tau = (np.loadtxt(shared / "real" / "tx40" / f, delimiter=",", skiprows=1) for f in ("pos_read_data.csv", "curr_data.csv"))
+    motor_q, motor_tau = (np.loadtxt(shared / "real" / "tx40" / f, delimiter=",", skiprows=1)
+                          for f in ("pos_read_data.csv", "curr_data.csv"))
     ratios = np.array([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])
     q = motor_q / ratios
     q[:, 5] = (motor_q[:, 5] - 32.0 * q[:, 4]) / 32.0
@@ -70,7 +71,8 @@ def test_tx40_is_the_joint_side_of_what_was_recorded(tx40: Outcome[Result], shar
     tau[:, 4] += 32.0 * motor_tau[:, 5]
     assert np.allclose(log.q, q, rtol=0, atol=1e-13)
     assert np.allclose(log.tau, tau, rtol=1e-13, atol=1e-12)
-    assert (log.n_samples, log.sample_time, log.experiment, log.role, log.torque) == (45000, 0.0002, "excitation", "identify", "measured")
+    assert (log.n_samples, log.sample_time, log.experiment, log.role, log.torque) == (45000, 0.0002, "excitation", "identify",
+                                                                                      "measured")
     assert log.derived is None  # units and transmission only
     assert log.robot.drive is not None
     assert log.robot.drive.transmission is not None
@@ -148,10 +150,12 @@ def test_one_recipe_covers_many_files(folder: Path) -> None:
     (folder / "run.csv").rename(folder / "friction_1_identify.csv")
     for name in ("friction_2_identify.csv", "excitation_2_validate.csv", "warmup.csv"):
         write(folder, text(good()), name)
-    recipe = RECIPE.replace('match = "*.csv"\nexperiment = "excitation"', 'match = "{experiment}_{joint}_{role}.csv"\nname = "{experiment}-{joint}"')
+    recipe = RECIPE.replace('match = "*.csv"\nexperiment = "excitation"',
+                            'match = "{experiment}_{joint}_{role}.csv"\nname = "{experiment}-{joint}"')
     outcome = run(folder, recipe)
     assert [(i.name, i.experiment, i.joint, i.role) for i in outcome.result.logs] == [
-        ("excitation-2", "excitation", None, "validate"), ("friction-1", "friction", 1, "identify"), ("friction-2", "friction", 2, "identify")]
+        ("excitation-2", "excitation", None, "validate"), ("friction-1", "friction", 1, "identify"),
+        ("friction-2", "friction", 2, "identify")]
     assert outcome.result.ignored == ("warmup.csv",)
 
 
@@ -177,7 +181,8 @@ def split_files(folder: Path) -> str:
     (folder / "run.csv").unlink()
     write(folder, text({k: v for k, v in columns.items() if k.startswith("q")}), "a_pos.csv")
     write(folder, text({k: v for k, v in columns.items() if k.startswith("tau")}), "a_tau.csv")
-    recipe = RECIPE.replace('"*.csv"', '"{run}_pos.csv"\nname = "{run}"').replace('unit = "N m"', 'unit = "N m", file = "{run}_tau.csv"')
+    recipe = RECIPE.replace('"*.csv"', '"{run}_pos.csv"\nname = "{run}"').replace('unit = "N m"',
+                                                                                  'unit = "N m", file = "{run}_tau.csv"')
     return recipe.replace('column = "t"\nunit = "s"', "rate = 1000")
 
 
@@ -321,18 +326,25 @@ REFUSED: dict[str, tuple[str, Callable[[Path], object], str, str]] = {
     "empty file": ("F01", lambda f: write(f, ""), RECIPE, "empty file"),
     "directory": ("C06", lambda f: ((f / "run.csv").unlink(), (f / "run.csv").mkdir()), RECIPE, "no file matches"),
     "FIFO": ("F12", lambda f: ((f / "run.csv").unlink(), os.mkfifo(f / "run.csv")), RECIPE, "not a regular file"),
-    "device": ("F12", lambda f: ((f / "run.csv").unlink(), (f / "run.csv").symlink_to("/dev/zero")), RECIPE, "not a regular file|outside"),
-    "column missing": ("S01", lambda f: write(f, text(good()).replace("tau_2", "tua_2", 1)), RECIPE, "'tau_2', did you mean 'tua_2'.*--map"),
-    "a fourth joint": ("S02", lambda f: write(f, text(good() | {"q_4": good()["q_1"]})), RECIPE, "4 columns for q, but the robot has 3"),
-    "names twice": ("S03", lambda f: write(f, text(good()).replace("q_3", "q_2", 1)), RECIPE, "columns 3 and 4 are both named 'q_2'"),
+    "device": ("F12", lambda f: ((f / "run.csv").unlink(), (f / "run.csv").symlink_to("/dev/zero")), RECIPE,
+               "not a regular file|outside"),
+    "column missing": ("S01", lambda f: write(f, text(good()).replace("tau_2", "tua_2", 1)), RECIPE,
+                       "'tau_2', did you mean 'tua_2'.*--map"),
+    "a fourth joint": ("S02", lambda f: write(f, text(good() | {"q_4": good()["q_1"]})), RECIPE,
+                       "4 columns for q, but the robot has 3"),
+    "names twice": ("S03", lambda f: write(f, text(good()).replace("q_3", "q_2", 1)), RECIPE,
+                    "columns 3 and 4 are both named 'q_2'"),
     "no unit": ("S04", lambda f: None, unit_away(RECIPE), 'signal q: no unit.*unit = "rad"'),
     "volts": ("S05", lambda f: None, RECIPE.replace('"N m"', '"V"'), "unknown unit 'V'; torque needs one of N m"),
-    "header says otherwise": ("S05", lambda f: write(f, text(good()).replace("q_1", "q_1 [deg]", 1)), RECIPE, "the header says 'deg'"),
-    "milliseconds": ("S08", lambda f: milliseconds(f), RECIPE.replace('unit = "s"', 'unit = "s"\nrate = 1000'), "in ms it would fit"),
+    "header says otherwise": ("S05", lambda f: write(f, text(good()).replace("q_1", "q_1 [deg]", 1)), RECIPE,
+                              "the header says 'deg'"),
+    "milliseconds": ("S08", lambda f: milliseconds(f), RECIPE.replace('unit = "s"', 'unit = "s"\nrate = 1000'),
+                     "in ms it would fit"),
     "unit of time open": ("S08", lambda f: milliseconds(f), RECIPE.replace('unit = "s"', ""), "could be"),
     "period for rate": ("S09", lambda f: None, RECIPE.replace('column = "t"\nunit = "s"', "rate = 0.001"), "a period"),
     "current": ("S10", lambda f: None, RECIPE.replace('"N m"', '"A"'), "torque_constant"),
-    "words": ("S12", lambda f: rows_changed(f, lambda r: [r[0], *(x.rsplit(",", 1)[0] + ",off" for x in r[1:])]), RECIPE, "'tau_3'.*'off'"),
+    "words": ("S12", lambda f: rows_changed(f, lambda r: [r[0], *(x.rsplit(",", 1)[0] + ",off" for x in r[1:])]), RECIPE,
+              "'tau_3'.*'off'"),
     "wild clock": ("T01", lambda f: spoiled(f, "t", slice(10, None, 100), 0.0), RECIPE, "runs backwards"),
     "stamps twice": ("T02", lambda f: spoiled(f, "t", 100, float(good()["t"][99])), RECIPE, "line 102"),
     "shorter than a period": ("T07", lambda f: None, RECIPE.replace("[time]", "period = 10.0\n[time]"), "1.199 s < 10 s period"),
@@ -342,11 +354,14 @@ REFUSED: dict[str, tuple[str, Callable[[Path], object], str, str]] = {
     "infinite": ("D03", lambda f: spoiled(f, "q_3", 5, np.inf), RECIPE, "inf in line 7"),
     "absurd": ("D03", lambda f: spoiled(f, "q_3", 5, 1e300), RECIPE, "1e\\+300 in line 7"),
     "undeclared sentinel": ("D03", lambda f: spoiled(f, "q_3", 5, -999.0), RECIPE, r"\[missing\] values = \[-999\]"),
-    "spreadsheet error": ("F16", lambda f: rows_changed(f, lambda r: [*r[:9], "#REF!," + r[9].split(",", 1)[1], *r[10:]]), RECIPE, "line 10"),
-    "much damage": ("F09", lambda f: rows_changed(f, lambda r: [*r[:9], *(x[: len(x) // 2] for x in r[9:40]), *r[40:]]), RECIPE, "31 of 1200"),
+    "spreadsheet error": ("F16", lambda f: rows_changed(f, lambda r: [*r[:9], "#REF!," + r[9].split(",", 1)[1], *r[10:]]), RECIPE,
+                          "line 10"),
+    "much damage": ("F09", lambda f: rows_changed(f, lambda r: [*r[:9], *(x[: len(x) // 2] for x in r[9:40]), *r[40:]]), RECIPE,
+                    "31 of 1200"),
     "archive": ("X12", lambda f: write(f, b"PK\x03\x04" + bytes(100)), RECIPE, "archive"),
     "nothing matches": ("C06", lambda f: (f / "run.csv").unlink(), RECIPE, "no file matches"),
-    "companion outside": ("X11|S01", lambda f: None, RECIPE.replace('unit = "N m"', 'unit = "N m", file = "../../etc/passwd"'), "passwd"),
+    "companion outside": ("X11|S01", lambda f: None, RECIPE.replace('unit = "N m"', 'unit = "N m", file = "../../etc/passwd"'),
+                          "passwd"),
     "frf without excitation": ("S01", lambda f: None, RECIPE.replace('"excitation"', '"frf"\njoint = 1'), "excitation v"),
 }
 
@@ -379,7 +394,8 @@ def test_s07_radians_that_are_degrees(folder: Path) -> None:
     columns = good()
     write(folder, text(columns | {f"q_{j}": np.rad2deg(columns[f"q_{j}"]) for j in (1, 2, 3)}))
     joint = '[[robot.joint]]\nname = "j"\ntype = "revolute"\na = 0.0\nalpha = 0.0\nd = 0.0\noffset = 0.0\nposition = [-2.0, 2.0]\n'
-    recipe = RECIPE.replace('use = "rrr"', 'name = "r"\ngravity = [0.0, 0.0, -9.81]\n[robot.kinematics]\nconvention = "dh"\n' + 3 * joint)
+    recipe = RECIPE.replace('use = "rrr"',
+                            'name = "r"\ngravity = [0.0, 0.0, -9.81]\n[robot.kinematics]\nconvention = "dh"\n' + 3 * joint)
     with pytest.raises(InputRejected, match=r"RRID-S07.*column 'q_1'.*looks like degrees.*--trust-units"):
         run(folder, recipe)
     assert run(folder, recipe, trust_units=True).result.logs

@@ -30,7 +30,8 @@ def read_npy(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]:
     if size > _BUDGET:
         raise InputRejected("X05", f"declares {size} bytes", where=source, remedy="split the recording")
     if start + size != len(data):
-        raise InputRejected("F02", f"truncated or damaged: {len(data)} of {start + size} bytes", where=source, remedy="copy the file again")
+        raise InputRejected("F02", f"truncated or damaged: {len(data)} of {start + size} bytes", where=source,
+                            remedy="copy the file again")
     if size == 0:
         raise InputRejected("T08", "no sample", where=source, remedy="record again")
     array = np.frombuffer(data, dtype=kind, count=math.prod(shape), offset=start).reshape(shape, order="F" if by_columns else "C")
@@ -57,6 +58,7 @@ def _header(data: bytes, source: str) -> tuple[np.dtype[np.generic], bool, tuple
         kind = np.dtype(np.lib.format.descr_to_dtype(descr))
     except (ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, RecursionError, MemoryError, OverflowError):
         raise broken from None
-    if not (isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape) and len(shape) <= 8 and isinstance(order, bool)):
+    if not (isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape) and len(shape) <= 8
+            and isinstance(order, bool)):
         raise broken
     return kind, order, shape, start

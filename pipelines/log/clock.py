@@ -40,14 +40,16 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     steps = np.diff(finite)
     steps = steps[steps > 0]
     if finite.size < 2 or steps.size == 0:
-        raise InputRejected("T08", f"{finite.size} time stamp{'s' if finite.size != 1 else ''}, none later than another", where=where, remedy="record again")
+        raise InputRejected("T08", f"{finite.size} time stamp{'s' if finite.size != 1 else ''}, none later than another",
+                            where=where, remedy="record again")
     median = float(np.median(steps))
     unit = spec.unit or table.units.get(name)
     checks: list[Check] = []
     if unit is None:
         unit = _detected(median, step, where, assume, checks)
     elif spec.unit and (other := table.units.get(name)) and other != spec.unit:
-        checks.append(Check.of("S08", "warn", f"the header says '{other}', the recipe says '{spec.unit}' and is followed", where=where))
+        checks.append(Check.of("S08", "warn", f"the header says '{other}', the recipe says '{spec.unit}' and is followed",
+                               where=where))
     factor = _factor(unit, step, where)
     _plausible(median, factor, unit, step, where)
     origin = finite[0] if abs(finite[0]) > 1e6 * median * finite.size else 0.0  # an epoch: seconds since 1970 cost digits
@@ -59,7 +61,8 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
 def _factor(unit: str, step: float | None, where: str) -> float:
     if unit in ("sample", "samples", "index"):
         if step is None:
-            raise InputRejected("S08", "time is a sample index, but no rate is declared", where=where, remedy="add rate = … [Hz] to [time]")
+            raise InputRejected("S08", "time is a sample index, but no rate is declared", where=where,
+                                remedy="add rate = … [Hz] to [time]")
         return step
     return to_si(unit, "time", where=where).factor
 
@@ -79,7 +82,8 @@ def _detected(median: float, step: float | None, where: str, assume: bool, check
     if step is not None:
         fits = _fitting(median, step)
         if len(fits) == 1:
-            checks.append(Check.of("S08", "warn", f"unit of time not declared; {fits[0]} fits the declared rate of {1 / step:.6g} Hz",
+            checks.append(Check.of("S08", "warn",
+                                   f"unit of time not declared; {fits[0]} fits the declared rate of {1 / step:.6g} Hz",
                                    where=where, remedy=f'add unit = "{fits[0]}" to [time]'))
             return fits[0]
     elif assume:

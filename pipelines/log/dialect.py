@@ -58,7 +58,8 @@ def decode(data: bytes, source: str, encoding: str | None = None) -> tuple[str, 
         whole = len(data)
         data = data.rstrip(b"\0")
         if len(data) < whole:
-            checks.append(Check.of("F09", "repair", f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its power", where=source))
+            checks.append(Check.of("F09", "repair",
+                                   f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its power", where=source))
         if (at := data.find(b"\0")) >= 0:
             line = data[:at].count(b"\n") + 1
             raise InputRejected("F16", f"a NUL byte in line {line}", where=source,
@@ -68,7 +69,8 @@ def decode(data: bytes, source: str, encoding: str | None = None) -> tuple[str, 
     try:
         text = data.decode(encoding)
     except (UnicodeDecodeError, LookupError) as problem:
-        raise InputRejected("F16", f"not text in {encoding}: {problem}", where=source, remedy="give its encoding under [format]") from None
+        raise InputRejected("F16", f"not text in {encoding}: {problem}", where=source,
+                            remedy="give its encoding under [format]") from None
     return text.replace("\r\n", "\n").replace("\r", "\n"), checks
 
 
@@ -95,7 +97,8 @@ def lines_of(text: str, comment: str | None) -> list[tuple[int, str]]:
     marks = (comment,) if comment else _COMMENTS
     # A cell such as "#REF!" at the start of a line is damage, not a comment; a comment is followed by a blank or letters.
     return [(number, line) for number, line in enumerate(text.split("\n"), start=1)
-            if line.strip() and not (line.lstrip().startswith(marks) and not re.match(r"\s*#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)\b", line))]
+            if line.strip()
+            and not (line.lstrip().startswith(marks) and not re.match(r"\s*#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)\b", line))]
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -156,5 +159,6 @@ def _refuse_two_commas(lines: list[tuple[int, str]], dialect: Dialect, source: s
     names = len(cells_of(lines[0][1], ","))
     if dialect.delimiter == "," and names > 1 and dialect.width == 2 * names and not is_number(cells_of(lines[0][1], ",")[0]):
         number = lines[1][0] if len(lines) > 1 else lines[0][0]
-        raise InputRejected("F16", f"line {number} has {dialect.width} cells under {names} names: comma is both delimiter and decimal sign",
+        raise InputRejected("F16", f"line {number} has {dialect.width} cells under {names} names: "
+                            "comma is both delimiter and decimal sign",
                             where=source, remedy="export with a semicolon or tab between the columns, or with decimal points")

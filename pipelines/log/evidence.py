@@ -10,7 +10,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 
-__all__ = ["Guess", "motion_of", "position_unit", "rollover", "torque_unit"]
+__all__ = ["Guess", "motion_of", "position_unit", "rollover", "sign_of", "torque_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
@@ -46,15 +46,19 @@ def position_unit(q: Array, t: Array | None, dq: Array | None, named: str | None
     if named == "counts" or (named is None and span > 2000.0 and _whole(q)):
         return _counts(q, span, wrap, named)
     if named in ("rad", "deg", "rev", "turn", "mm", "m"):
-        return Guess(named, "sure" if _possible(span, named) else "unsure", f"named so; the largest range is {span:.4g} {named}"), further
+        return Guess(named, "sure" if _possible(span, named) else "unsure",
+                     f"named so; the largest range is {span:.4g} {named}"), further
     if (found := _by_velocity(q, t, dq)) is not None:
         return found, further
     if span > 720.0:
-        return Guess("deg", "unsure", f"a range of {span:.5g} is neither an arm's in rad nor in deg: motor side, or counts?"), further
+        return Guess("deg", "unsure",
+                     f"a range of {span:.5g} is neither an arm's in rad nor in deg: motor side, or counts?"), further
     if (turns := _quarter_turns(q)) is not None:
-        return Guess("rad", "likely", f"starts at {turns} times pi/2: motor side, and these are likely its gear ratios for [drive]"), further
+        return Guess("rad", "likely",
+                     f"starts at {turns} times pi/2: motor side, and these are likely its gear ratios for [drive]"), further
     if span > 4.0 * math.pi:
-        return Guess("deg", "unsure", f"a range of {span:.4g} is too much for a joint in rad; or motor side in rad, then [drive] transmission"), further
+        return Guess("deg", "unsure",
+                     f"a range of {span:.4g} is too much for a joint in rad; or motor side in rad, then [drive]"), further
     speed = float(np.abs(np.diff(q, axis=0) / np.diff(t)[:, None]).max()) if t is not None and (np.diff(t) > 0).all() else math.nan
     why = f"ranges up to {span:.3g}" + (f", speeds up to {speed:.3g} a second" if math.isfinite(speed) else "")
     return Guess("rad", "likely", f"{why}: a joint's in rad, hardly a movement in deg"), further
@@ -94,7 +98,8 @@ def _by_velocity(q: Array, t: Array | None, dq: Array | None) -> Guess | None:
     if near == 1.0 and peak > 50.0:
         return Guess("deg", "likely", f"its slope is the recorded velocity, which reaches {peak:.4g}: deg/s, not rad/s")
     other = {"rad": "rad/s", "deg": "rad/s", "rev": "rpm"}[names[near]]
-    return Guess(names[near], "likely", f"its slope is {factor:.4g} times the recorded velocity (up to {peak:.3g}), as with {names[near]} and {other}")
+    return Guess(names[near], "likely",
+                 f"its slope is {factor:.4g} times the recorded velocity (up to {peak:.3g}), as with {names[near]} and {other}")
 
 
 def torque_unit(tau: Array, named: str | None, current: bool) -> Guess:
@@ -107,6 +112,27 @@ def torque_unit(tau: Array, named: str | None, current: bool) -> Guess:
     if peak > 1000.0:
         return Guess("mN m", "unsure", f"up to {peak:.5g}: too much for N m of an arm")
     return Guess("N m", "unsure", f"up to {peak:.4g}; or a current in A, or motor side")
+
+
+def sign_of(q: Array, tau: Array) -> Guess:
+    """Friction takes power out: beside inertia, springs and a constant, torque must grow with speed on every joint."""
+    width = max(5, len(q) // 300)
+    smooth = np.ones(width) / width
+    share = np.zeros(q.shape[1])
+    for j in range(q.shape[1]):
+        position, torque = (np.convolve(x[:, j], smooth, mode="valid") for x in (q, tau))
+        speed = np.gradient(position)
+        columns = np.column_stack([speed, np.gradient(speed), position, np.ones(position.size)])
+        columns /= np.maximum(np.abs(columns).max(axis=0), 1e-300)
+        share[j] = np.linalg.lstsq(columns, torque, rcond=1e-9)[0][0] * np.std(columns[:, 0]) / max(float(np.std(torque)), 1e-300)
+    wrong = [str(j + 1) for j in np.flatnonzero(share < -0.02)]
+    if wrong:
+        return Guess("sign = -1?", "likely",
+                     f"torque of joint {', '.join(wrong)} takes energy out of the motion where friction should: "
+                     "add sign = -1 there, unless its transmission is negative")
+    if (share > 0.02).all():
+        return Guess("as recorded", "likely", "sign: torque grows with speed on every joint, as friction asks for")
+    return Guess("as recorded", "unsure", "sign: torque and motion do not tell")
 
 
 def motion_of(q: Array, unit: str) -> list[str]:

@@ -55,7 +55,8 @@ def fill(template: str, groups: Mapping[str, str], where: object) -> str:
     """
     def value(found: re.Match[str]) -> str:
         if found.group(1) not in groups:
-            raise UsageError("C02", f"'{template}' names {{{found.group(1)}}}, but the pattern has {', '.join(groups)}", where=where)
+            raise UsageError("C02", f"'{template}' names {{{found.group(1)}}}, but the pattern has {', '.join(groups)}",
+                             where=where)
         return groups[found.group(1)]
 
     return re.sub(r"\{(\w+)\}", value, template)
@@ -76,7 +77,8 @@ def files_below(folder: Path) -> tuple[str, ...]:
         folders[:] = sorted(f for f in folders if not f.startswith("."))
         found += [Path(parent, name).relative_to(folder).as_posix() for name in names if not name.startswith(".")]
         if len(found) > _MOST_FILES:
-            raise UsageError("C07", f"more than {_MOST_FILES} files", where=folder, remedy="give a folder that holds the recordings only")
+            raise UsageError("C07", f"more than {_MOST_FILES} files", where=folder,
+                             remedy="give a folder that holds the recordings only")
     return tuple(sorted(found))
 
 

@@ -7,6 +7,7 @@ marked "check:".
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,24 +17,14 @@ import numpy as np
 
 from pipelines.errors import clean
 from pipelines.log.clock import plausible_units
-from pipelines.log.evidence import Guess, motion_of, position_unit, torque_unit
+from pipelines.log.column_roles import companion_of, named_unit, roles_of
+from pipelines.log.evidence import Guess, motion_of, position_unit, sign_of, torque_unit
 from pipelines.log.experiment import Array
 from pipelines.log.raw import RawTable
 from pipelines.log.sources import read_table
 
 __all__ = ["Draft", "guess_recipe"]
 
-# What a column is, by its name. The first that fits counts; the order keeps "pos_ref" from being a position.
-_NAMES: tuple[tuple[str, str], ...] = (
-    ("q_ref", r"(q|pos|position|angle|theta)_?(ref|des|desired|cmd|target|set)\w*|(ref|des|desired|target|cmd|set)_?(q|pos|position|angle)\w*"),
-    ("dq", r"(dq|qd|qdot|vel|velocity|speed|omega|\w*_(vel|velocity|speed))(?![a-z])\w*"),
-    ("t", r"(t|time|timestamp|stamp|zeit|clock|sec|seconds?)(?![a-z])\w*|(t|time)(_|$).*"),
-    ("tau", r"(tau|torque|trq|moment|effort|mom)\w*|\w*(torque|effort)\w*"),
-    ("current", r"(i|iq|curr|current|amp|strom)(?![a-z])\w*|\w*(current)\w*"),
-    ("q", r"(q|pos|position|angle|theta|joint|enc|encoder|axis|j)(?![a-z])\w*|\w*(_pos|position|_angle|encoder)\w*"),
-)
-_SUFFIX_UNITS = {"s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns", "rad": "rad", "deg": "deg", "rev": "rev", "turns": "turn", "counts": "counts",
-                 "cnt": "counts", "ticks": "counts", "a": "A", "ma": "mA", "nm": "N m", "mnm": "mN m", "rpm": "rpm"}
 _BLANK = "FILL IN"
 
 
@@ -53,51 +44,13 @@ def guess_recipe(path: Path) -> Draft:
         InputRejected: the file cannot be read as a table of numbers.
     """
     table = read_table(path)
-    roles = _roles(table, path)
+    roles = roles_of(table, path)
     both = "q" in roles and ("tau" in roles or "current" in roles)
-    companion = None if both else _companion(path, table)
+    companion = None if both else companion_of(path, table)
     if companion is not None and "q" not in roles:
         table, companion, path = companion, table, path.parent / companion.source
-        roles = _roles(table, path)
+        roles = roles_of(table, path)
     return _Drafting(path, table, roles, companion).draft()
-
-
-def _roles(table: RawTable, path: Path) -> dict[str, tuple[str, ...]]:
-    """Which columns hold what, by their names; a column of time also by rising evenly. The file's name settles "Joint_1"."""
-    found: dict[str, list[str]] = {}
-    for name in table.columns:
-        word = re.sub(r"[^\w]+", "_", name.strip()).lower()
-        role = next((role for role, pattern in _NAMES if re.fullmatch(pattern, word)), None)
-        if role is not None:
-            found.setdefault(role, []).append(name)
-    if "t" not in found:
-        first = next(iter(table.columns))
-        steps = np.diff(table.columns[first])
-        if steps.size > 10 and (steps > 0).all() and np.std(steps) < 0.3 * np.mean(steps) and len(table.columns) > 2:
-            found = {"t": [first]} | {role: [c for c in names if c != first] for role, names in found.items()}
-    if re.search(r"tau|torque|curr|effort|moment", path.stem.lower()) and "tau" not in found and "current" not in found and "q" in found:
-        found["tau"] = found.pop("q")
-    plain = [c for c in table.columns if c not in found.get("t", [])]
-    if not set(found) - {"t"} and re.search(r"tau|torque|curr|effort", path.stem.lower()):
-        found["tau"] = plain
-    elif not set(found) - {"t"} and plain:
-        found["q"] = plain
-    return {role: tuple(names) if role != "t" else tuple(names[:1]) for role, names in found.items() if names}
-
-
-def _companion(path: Path, table: RawTable) -> RawTable | None:
-    """A file beside it with the same columns and as many rows: positions here, torques there."""
-    for other in sorted(path.parent.iterdir())[:200]:
-        if other == path or other.suffix.lower() != path.suffix.lower() or not other.is_file() or other.stat().st_size > 1 << 30:
-            continue
-        candidate = read_table(other)
-        if list(candidate.columns) == list(table.columns) and candidate.rows.size == table.rows.size and _is_torque(other) != _is_torque(path):
-            return candidate
-    return None
-
-
-def _is_torque(path: Path) -> bool:
-    return re.search(r"tau|torque|curr|effort|moment", path.stem.lower()) is not None
 
 
 class _Drafting:
@@ -125,8 +78,10 @@ class _Drafting:
 
     def draft(self) -> Draft:
         name = clean(self.path.name, 80)
-        lines = [f"# Drafted by `rrrid import --guess {name}`: {self.table.rows.size} samples, columns {', '.join(clean(c, 40) for c in self.table.columns)}.",
-                 f"# Go through every \"check:\" and fill in what says {_BLANK}; then: rrrid import RECIPE.toml --source FOLDER", ""]
+        columns = ", ".join(clean(c, 40) for c in self.table.columns)
+        lines = [f"# Drafted by `rrrid import --guess {name}`: {self.table.rows.size} samples, columns {columns}.",
+                 f"# Go through every \"check:\" and fill in what says {_BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
+                 ""]
         lines += [*self._robot(), *self._log(), *self._time(), *self._signals(), *self._drive(), *self._resample()]
         return Draft("\n".join(lines) + "\n", tuple(self.evidence), tuple(self.blanks))
 
@@ -136,9 +91,11 @@ class _Drafting:
             return ["[robot]", f"use = {_quoted(urdf.name)}   # check: likely, the URDF beside the recording", ""]
         if self.n == 1:
             return ["[robot]                                 # check: one joint on a vertical axis, where gravity does no work",
-                    'name = "one-joint"', "gravity = [0.0, 0.0, -9.81]", "", "[robot.kinematics]", 'convention = "dh"', "", "[[robot.joint]]",
+                    'name = "one-joint"', "gravity = [0.0, 0.0, -9.81]", "", "[robot.kinematics]", 'convention = "dh"', "",
+                    "[[robot.joint]]",
                     'name = "joint"', 'type = "revolute"', "a = 0.0", "alpha = 0.0", "d = 0.0", "offset = 0.0", ""]
-        return ["[robot]", f'use = "{self.blank("robot.use")}"                        # the robot of {self.n} joints: robot.toml, a URDF, or a shipped name', ""]
+        return ["[robot]",
+                f'use = "{self.blank("robot.use")}"   # the robot of {self.n} joints: robot.toml, a URDF, or a shipped name', ""]
 
     def _log(self) -> list[str]:
         return ["[log]", f"match = {_quoted(self.path.name)}      # a pattern such as \"run_{{number}}.csv\" takes many files",
@@ -163,19 +120,21 @@ class _Drafting:
         if steps.size < 10 or not ((steps > 0).all() or (steps < 0).all()) or np.std(steps) > 0.2 * abs(np.mean(steps)):
             return []
         self.evidence.append("positions rise in even steps without a clock: a map")
-        return [f"# check: likely a map and no log, {q[0]} goes on in even steps of {np.mean(steps):.4g}: then delete [log], [time] and [signals] and write",
-                f"#     [[table]] match = {_quoted(self.path.name)}, columns = {{ position = {{ column = {_quoted(q[0])}, unit = … }}, … }}"]
+        return [f"# check: likely a map and no log, {clean(q[0], 40)} goes on in even steps of {np.mean(steps):.4g};",
+                "#     then delete [log], [time] and [signals], and write",
+                f"#     [[table]] match = {_quoted(self.path.name)}, columns = {{ position = {{ column = …, unit = … }}, … }}"]
 
     def _time_unit(self, column: str) -> Guess:
         steps = np.diff(self.table.columns[column])
         median = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
         rate = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-        named = _suffix(column, self.table)
+        named = named_unit(column, self.table)
         fits = [unit for unit in plausible_units(median) if 10.0 <= 1.0 / (median * rate[unit]) <= 2e4] or plausible_units(median)
         if named in rate and named in fits:
             return Guess(named, "sure", f"named so, and a median step of {median:.4g} makes {1 / (median * rate[named]):.4g} Hz")
         if len(fits) == 1:
-            return Guess(fits[0], "likely", f"a median step of {median:.4g} makes {1 / (median * rate[fits[0]]):.4g} Hz; every other unit is absurd")
+            return Guess(fits[0], "likely",
+                         f"a median step of {median:.4g} makes {1 / (median * rate[fits[0]]):.4g} Hz; every other unit is absurd")
         best = fits[0] if fits else self.blank("time.unit")
         return Guess(best, "unsure", f"a median step of {median:.4g} could be {', '.join(fits) or 'a sample index'}")
 
@@ -193,7 +152,7 @@ class _Drafting:
             values = np.column_stack([self.table.columns[c] for c in q])
             dq = self.roles.get("dq", ())
             speed = np.column_stack([self.table.columns[c] for c in dq]) if len(dq) == len(q) else None
-            named = _suffix(q[0], self.table)
+            named = named_unit(q[0], self.table)
             guess, extra = position_unit(values, self.seconds(), speed, named)
             lines += [f"q = {{ {_columns(q)}, unit = \"{guess.value}\"{extra} }}", f"    {self.note('q unit', guess)}"]
             lines += [f"    {comment}" for comment in motion_of(values, guess.value)]
@@ -203,26 +162,26 @@ class _Drafting:
 
     def _torque(self) -> list[str]:
         if not self.torque:
-            return [f'tau = {{ columns = "{self.blank("signals.tau")}", unit = "{_BLANK}" }}   # no column looks like a torque or a current']
+            return [f'tau = {{ columns = "{self.blank("signals.tau")}", unit = "{_BLANK}" }}   # no column looks like it']
         values = np.column_stack([self.torque_table.columns[c] for c in self.torque])
-        named = _suffix(self.torque[0], self.torque_table)
+        named = named_unit(self.torque[0], self.torque_table)
         guess = torque_unit(values, named, self.current)
         self.current = guess.value in ("A", "mA")
         file = f", file = {_quoted(self.torque_table.source)}" if self.torque_table is not self.table else ""
         lines = [f"tau = {{ {_columns(self.torque)}, unit = \"{guess.value}\"{file} }}", f"    {self.note('tau unit', guess)}"]
         q = self.roles.get("q", ())
         if len(q) == len(self.torque):
-            lines.append(f"    {self.note('sign', _sign(np.column_stack([self.table.columns[c] for c in q]), values))}")
+            lines.append(f"    {self.note('sign', sign_of(np.column_stack([self.table.columns[c] for c in q]), values))}")
         return lines
 
     def _drive(self) -> list[str]:
-        lines = ["# [drive]                               # where the numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
+        lines = ["# [drive]                               # where numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
                  f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
         if not self.current:
             return [*lines, ""]
         self.blanks.append("drive.torque_constant")
         return ["[drive]", f'torque_constant = "{_BLANK}"             # N m/A, motor side: from the data sheet',
-                f"# transmission = [{', '.join(['100.0'] * self.n)}]   # where the numbers are motor side: q_motor = N q_joint", ""]
+                f"# transmission = [{', '.join(['100.0'] * self.n)}]   # where numbers are motor side: q_motor = N q_joint", ""]
 
     def _resample(self) -> list[str]:
         t = self.seconds()
@@ -235,7 +194,8 @@ class _Drafting:
             self.evidence.append(f"time is even within {100 * uneven:.2g} %")
             return [f"# time is even within {100 * uneven:.2g} %, every {1e3 * median:.6g} ms: nothing to resample"]
         rate = _round_below(1.0 / median)
-        guess = Guess(f"{rate:g} Hz", "likely", f"steps of {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms, median {1e3 * median:.4g} ms: "
+        guess = Guess(f"{rate:g} Hz", "likely",
+                      f"steps of {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms, median {1e3 * median:.4g} ms: "
                       "the next round rate below, so that no sample is invented")
         return ["[resample]", f"rate = {rate:g}   {self.note('resample', guess)}", 'method = "spline"']
 
@@ -243,37 +203,6 @@ class _Drafting:
 def _round_below(rate: float) -> float:
     decade = 10.0 ** np.floor(np.log10(rate))
     return float(max(m for m in (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0) if m * decade <= rate * (1 + 1e-9)) * decade)
-
-
-def _suffix(column: str, table: RawTable) -> str | None:
-    """The unit in the header, or in the last part of the name."""
-    from pipelines.log.units import UNITS
-
-    header = table.units.get(column, "")
-    if header in UNITS or header == "counts":
-        return header
-    parts = re.split(r"[_\s.]+", column.lower())
-    return next((_SUFFIX_UNITS[p] for p in reversed(parts[1:]) if p in _SUFFIX_UNITS), None) if len(parts) > 1 else None
-
-
-def _sign(q: Array, tau: Array) -> Guess:
-    """Friction takes power out: beside inertia, springs and a constant, torque must grow with speed on every joint."""
-    width = max(5, len(q) // 300)
-    smooth = np.ones(width) / width
-    share = np.zeros(q.shape[1])
-    for j in range(q.shape[1]):
-        position, torque = (np.convolve(x[:, j], smooth, mode="valid") for x in (q, tau))
-        speed = np.gradient(position)
-        columns = np.column_stack([speed, np.gradient(speed), position, np.ones(position.size)])
-        columns /= np.maximum(np.abs(columns).max(axis=0), 1e-300)
-        share[j] = np.linalg.lstsq(columns, torque, rcond=1e-9)[0][0] * np.std(columns[:, 0]) / max(float(np.std(torque)), 1e-300)
-    wrong = [str(j + 1) for j in np.flatnonzero(share < -0.02)]
-    if wrong:
-        return Guess("sign = -1?", "likely", f"torque of joint {', '.join(wrong)} takes energy out of the motion where friction should: "
-                     "add sign = -1 there, unless its transmission is negative")
-    if (share > 0.02).all():
-        return Guess("as recorded", "likely", "sign: torque grows with speed on every joint, as friction asks for")
-    return Guess("as recorded", "unsure", "sign: torque and motion do not tell")
 
 
 def _columns(names: Sequence[str]) -> str:
@@ -287,6 +216,4 @@ def _columns(names: Sequence[str]) -> str:
 
 
 def _quoted(text: str) -> str:
-    import json
-
     return json.dumps(text, ensure_ascii=False)

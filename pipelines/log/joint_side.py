@@ -49,7 +49,8 @@ def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive |
         rows = spec.transmission
         if len(rows) != n or any(isinstance(row, tuple) and len(row) != n for row in rows):
             raise UsageError("C02", f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers", where=where)
-        matrix = tuple(row if isinstance(row, tuple) else tuple(float(row) if i == j else 0.0 for j in range(n)) for i, row in enumerate(rows))
+        matrix = tuple(row if isinstance(row, tuple) else tuple(float(row) if i == j else 0.0 for j in range(n)) for i,
+                       row in enumerate(rows))
         if abs(np.linalg.det(np.array(matrix))) < 1e-12:
             raise UsageError("C02", "drive.transmission cannot be inverted", where=where, remedy="each joint needs a motor")
     if spec.torque_constant is not None:
@@ -59,7 +60,8 @@ def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive |
 
 def _per_joint(value: Numbers, n: int, what: str, where: object) -> Array:
     if isinstance(value, tuple) and len(value) != n:
-        raise UsageError("C02", f"{what} holds {len(value)} numbers, the robot has {n} joints", where=where, remedy="one number, or one a joint")
+        raise UsageError("C02", f"{what} holds {len(value)} numbers, the robot has {n} joints", where=where,
+                         remedy="one number, or one a joint")
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
 
 
@@ -71,7 +73,8 @@ def unit_declared(name: str, spec: SignalSpec, table: RawTable, columns: tuple[s
         for header in headers:
             known = (_known(header), _known(spec.unit))
             if None not in known and known[0] != known[1]:
-                raise InputRejected("S05", f"the header says '{header}', the recipe says '{spec.unit}'", where=where, remedy="correct one of them")
+                raise InputRejected("S05", f"the header says '{header}', the recipe says '{spec.unit}'", where=where,
+                                    remedy="correct one of them")
         return spec.unit
     if len(headers) == 1:
         unit = headers.pop()
@@ -80,7 +83,8 @@ def unit_declared(name: str, spec: SignalSpec, table: RawTable, columns: tuple[s
     wanted = schema.unit_of(name)
     if not assume:
         raise InputRejected("S04", f"no unit; say what the numbers of {name} are in", where=where,
-                            remedy=f'add unit = "{wanted}" (or what it is) to signals.{name}, or pass --assume-units if they are SI')
+                            remedy=f'add unit = "{wanted}" (or what it is) to signals.{name}, '
+                            "or pass --assume-units if they are SI")
     checks.append(Check.of("S04", "warn", f"no unit; taken as {wanted}, as --assume-units says", where=where))
     return wanted
 
@@ -104,7 +108,9 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot:
     for name, raw in part.signals.items():
         spec = recipe.signals[name]
         values = _unwrapped(part, name, raw, spec, altered, checks)
-        values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where) * _per_joint(spec.sign, n, f"signals.{name}.sign", recipe.where)
+        values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where) * _per_joint(spec.sign, n,
+                                                                                                        f"signals.{name}.sign",
+                                                                                                        recipe.where)
         values, current = _in_si(part, name, values, spec, units[name], drive, n, recipe, steps)
         if current is not None and "current" not in recipe.signals:
             signals["current"] = Signal(current, "A", schema.SIGNALS["current"][1])
@@ -130,7 +136,8 @@ def _unwrapped(part: Recording, name: str, raw: Array, spec: SignalSpec, altered
     for joint in np.flatnonzero(turns.any(axis=0)):
         count = int(np.abs(turns[:, joint]).sum())
         at = part.listed(np.flatnonzero(turns[:, joint]) + 1)
-        checks.append(Check.of("D07", "warn", f"{count} rollovers of {spec.wrap:g} unwrapped ({at})", where=part.column(name, int(joint))))
+        checks.append(Check.of("D07", "warn", f"{count} rollovers of {spec.wrap:g} unwrapped ({at})",
+                               where=part.column(name, int(joint))))
         altered.append(f"{name} of joint {joint + 1}: {count} rollovers of {spec.wrap:g} unwrapped")
     return raw - spec.wrap * np.concatenate([np.zeros((1, raw.shape[1])), np.cumsum(turns, axis=0)])
 
@@ -185,7 +192,8 @@ def _through_drive(name: str, values: Array, spec: SignalSpec, recipe: Recipe, d
 def _refuse_wrong_kind(part: Recording, name: str, unit: str, spec: SignalSpec, recipe: Recipe, robot: RobotDescription) -> None:
     """S05: an angle for a joint that slides, a length for one that turns."""
     quantity = schema.SIGNALS[name][0]
-    if quantity not in (*_MOTION, "torque") or _motor_side(name, spec, recipe) or (unit in UNITS and UNITS[unit].quantity == "current"):
+    if quantity not in (*_MOTION, "torque") or _motor_side(name, spec,
+                                                           recipe) or (unit in UNITS and UNITS[unit].quantity == "current"):
         return
     for j, revolute in enumerate(robot.revolute):
         if revolute == (unit in _LINEAR):
@@ -205,5 +213,6 @@ def _refuse_degrees(part: Recording, q: Array, unit: str, robot: RobotDescriptio
         slack = 0.05 * (high - low)
         as_degrees = np.deg2rad(q[:, j])
         if as_degrees.min() >= low - slack and as_degrees.max() <= high + slack:
-            raise InputRejected("S07", f"moves over {span:.4g} declared rad, its limits are {low:.4g} to {high:.4g} rad: looks like degrees",
+            raise InputRejected("S07", f"moves over {span:.4g} declared rad, its limits are {low:.4g} to {high:.4g} rad: "
+                                "looks like degrees",
                                 where=part.column("q", j), remedy='declare unit = "deg", or pass --trust-units')

@@ -51,7 +51,8 @@ def read_mat5(data: bytes, source: str) -> Arrays:
             # Not mat_dtype=True, the type MATLAB shows: it would drop imaginary parts; columns become real numbers later.
             loaded = loadmat(io.BytesIO(data), variable_names=names, mat_dtype=False, struct_as_record=True, squeeze_me=False)
     except MatReadWarning as problem:
-        raise InputRejected("S03", f"a variable is there twice: {problem}", where=source, remedy="save each variable once") from None
+        raise InputRejected("S03", f"a variable is there twice: {problem}", where=source,
+                            remedy="save each variable once") from None
     except (*_DAMAGE, MatReadError):
         raise _damaged(source) from None
     found: Arrays = {}
@@ -120,7 +121,8 @@ def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:
             raise InputRejected("X04", f"more than {_MOST_MEMBERS} members", where=source, remedy="save the signals alone")
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
-            raise InputRejected("X01", f"external link '{prefix}{name}' refused", where=source, remedy="store the data in the file itself")
+            raise InputRejected("X01", f"external link '{prefix}{name}' refused", where=source,
+                                remedy="store the data in the file itself")
         if name in ("#refs#", "#subsystem#") or not isinstance(link, h5py.HardLink):
             continue
         kind = group.get(name, getclass=True)
@@ -134,7 +136,8 @@ def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:
 def _usable(dataset: Any, name: str, source: str) -> Any:
     """X02, X03: a data set of plain numbers stored in this file; None for text, references and empty ones."""
     if dataset.id.get_create_plist().get_external_count() > 0:
-        raise InputRejected("X02", f"'{name}' lies in another file: refused", where=source, remedy="store the data in the file itself")
+        raise InputRejected("X02", f"'{name}' lies in another file: refused", where=source,
+                            remedy="store the data in the file itself")
     if dataset.is_virtual:
         raise InputRejected("X03", f"'{name}' is virtual: refused", where=source, remedy="store the data in the file itself")
     plain = dataset.dtype.kind in "fiub" and dataset.shape is not None and "MATLAB_empty" not in dataset.attrs

@@ -137,7 +137,8 @@ def _upright(name: str, array: npt.NDArray[np.generic], source: str, checks: lis
         if rows > _WIDEST_MATRIX:
             return None
         if rows > 1:
-            checks.append(Check.of("S11", "warn", f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}: time along the long side",
+            checks.append(Check.of("S11", "warn",
+                                   f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}: time along the long side",
                                    where=source, remedy="store one row a sample"))
         return matrix.T
     raise InputRejected("S11", f"'{name}' has shape {matrix.shape}: which side is time cannot be told", where=source,

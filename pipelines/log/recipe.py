@@ -26,22 +26,13 @@ offset -> resampling.
 
 from __future__ import annotations
 
-import datetime
-import json
-import math
-import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from pipelines.errors import InputRejected, UsageError, did_you_mean
-from pipelines.log import schema
 from pipelines.log.dialect import TextFormat
-from pipelines.log.shipped import shipped
 
-__all__ = ["DriveSpec", "FileSpec", "LogSpec", "MissingSpec", "Recipe", "ResampleSpec", "SignalSpec", "TableSpec",
-           "TimeSpec", "find_recipe", "parse_recipe"]
+__all__ = ["ColumnSpec", "ControllerSpec", "DriveSpec", "FileSpec", "LogSpec", "MissingSpec", "Numbers", "Recipe", "ResampleSpec",
+           "SignalSpec", "TableSpec", "TimeSpec"]
 
 Numbers = float | tuple[float, ...]  # one for all joints, or one a joint
 Columns = str | int | tuple[str | int, ...]
@@ -49,7 +40,6 @@ Texts = str | tuple[str, ...]
 Experiment = Literal["friction", "excitation", "writing", "frf", "hold", "free"]
 Role = Literal["identify", "validate", "reference"]
 _STRICT = {"extra": "forbid"}
-_NOT_IMPORTED = ("t",)
 
 
 @dataclass(frozen=True)
@@ -198,136 +188,3 @@ class Recipe:
     controller: ControllerSpec | None = None
     table: tuple[TableSpec, ...] = ()
     where: str = field(default="", compare=False)
-
-
-def find_recipe(source: str | Path) -> Path:
-    """The recipe file of that path, or the shipped recipe of that bare name."""
-    path = Path(source)
-    return path if path.exists() else shipped("recipes", str(source))
-
-
-def parse_recipe(text: str, where: object = "") -> Recipe:
-    """Read and check a recipe.
-
-    Raises:
-        UsageError: C01 unknown key or not TOML, C02 a value out of its bounds.
-        InputRejected: S04 a signal without unit, S09 a rate that is a period, S10 current without torque constant.
-    """
-    from pydantic import TypeAdapter, ValidationError
-
-    try:
-        table = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as problem:
-        raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where) from None
-    if "where" in table:
-        raise UsageError("C01", "'where' is not a key of a recipe", where=where)
-    try:
-        recipe = TypeAdapter(Recipe).validate_json(json.dumps(_plain(table)), strict=True)
-    except ValidationError as problem:
-        raise _explain(problem.errors()[0], where) from None
-    except RecursionError:
-        raise UsageError("C02", "the recipe is nested too deeply", where=where) from None
-    _bounds(recipe, where)
-    _meaning(recipe, where)
-    return recipe
-
-
-def _plain(value: Any) -> Any:
-    """TOML's own dates as text; everything else is JSON already."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    if isinstance(value, datetime.datetime):
-        utc = value.astimezone(datetime.UTC) if value.tzinfo else value
-        return utc.strftime("%Y-%m-%dT%H:%M:%SZ")
-    return str(value) if isinstance(value, datetime.date | datetime.time) else value
-
-
-_SECTIONS: Mapping[str, type] = {"log": LogSpec, "file": FileSpec, "time": TimeSpec, "signals": SignalSpec, "drive": DriveSpec, "resample": ResampleSpec,
-                                 "missing": MissingSpec, "format": TextFormat, "controller": ControllerSpec, "table": TableSpec}
-
-
-def _explain(error: Any, where: object) -> UsageError:
-    """The first complaint of pydantic in our words, with the key it is about."""
-    path = [part for part in error["loc"] if not (isinstance(part, str) and ("[" in part or part in ("str", "int", "float")))]
-    place = ".".join(f"[{part + 1}]" if isinstance(part, int) else str(part) for part in path).replace(".[", "[")
-    if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        kind = Recipe if len(path) == 1 else ColumnSpec if "columns" in path[:-1] else _SECTIONS[str(path[0])]
-        known = [f.name for f in fields(kind) if f.name != "where"]
-        return UsageError("C01", f"'{place}' is not a key of a recipe{did_you_mean(str(path[-1]), known)}", where=where,
-                          remedy=f"known here: {', '.join(known)}")
-    if error["type"] in ("missing", "missing_argument"):
-        return UsageError("C02", f"'{place}' is missing", where=where, remedy="rrrid import --guess FILE drafts a recipe")
-    return UsageError("C02", f"'{place}': {error['msg']}, not {error['input']!r}", where=where)
-
-
-# Numbers that must be finite and above a bound.
-_POSITIVE = ("rate", "sample_time", "longest_gap", "counts_per_rev", "wrap", "period", "torque_constant")
-
-
-def _numbers(owner: object, path: str) -> Iterator[tuple[str, str, float]]:
-    """(place, key, number) of every number in the recipe, lists taken apart."""
-    for item in fields(owner) if is_dataclass(owner) else ():
-        yield from _below(getattr(owner, item.name), f"{path}.{item.name}".lstrip("."), item.name)
-
-
-def _below(value: object, path: str, key: str) -> Iterator[tuple[str, str, float]]:
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _below(inner, f"{path}.{name}", str(name))
-    elif isinstance(value, tuple):
-        for i, inner in enumerate(value):
-            yield from _below(inner, f"{path}[{i + 1}]", key)
-    elif is_dataclass(value):
-        yield from _numbers(value, path)
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield path, key, float(value)
-
-
-def _bounds(recipe: Recipe, where: object) -> None:
-    """C02: every number finite and inside its bounds."""
-    for path, key, number in _numbers(recipe, ""):
-        if path.startswith(("robot.", "missing.")):
-            continue
-        if not math.isfinite(number):
-            raise UsageError("C02", f"'{path}' is {number}, must be a finite number", where=where)
-        if key in _POSITIVE and number <= 0.0:
-            raise UsageError("C02", f"'{path}' is {number}, must be above 0", where=where)
-        if key == "sign" and abs(number) != 1.0:
-            raise UsageError("C02", f"'{path}' is {number}, must be 1 or -1", where=where, remedy="use scale for other factors")
-        if key in ("joint", "column", "columns") and (number < 1 or number != int(number)):
-            raise UsageError("C02", f"'{path}' is {number}, must be 1 or more: joints and columns count from 1", where=where)
-
-
-def _meaning(recipe: Recipe, where: object) -> None:
-    """What single values cannot show: signals known, units given, rates that are rates."""
-    for name, spec in recipe.signals.items():
-        if name not in schema.SIGNALS or name in _NOT_IMPORTED:
-            raise UsageError("C01", f"'signals.{name}' is not a signal{did_you_mean(name, schema.SIGNALS)}", where=where,
-                             remedy=f"signals: {', '.join(s for s in schema.SIGNALS if s not in _NOT_IMPORTED)}; time has its own table [time]")
-        if (spec.columns is None) == (spec.column is None):
-            raise UsageError("C02", f"'signals.{name}' needs columns (a list, a pattern or a name), once", where=where)
-        if spec.unit == "counts" and spec.counts_per_rev is None:
-            raise UsageError("C02", f"'signals.{name}' is in counts: counts_per_rev is missing", where=where, remedy="add counts_per_rev")
-    references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]
-    if len(references) not in (0, 3):
-        raise UsageError("C02", f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together", where=where, remedy="map all three, or none")
-    no_logs = not recipe.log.match and not any(not case.skip for case in recipe.file)
-    if no_logs and recipe.table:
-        return  # maps alone: no clock, no signals
-    for name in ("q", "tau"):
-        if name not in recipe.signals:
-            raise InputRejected("S01", f"the recipe maps no signal '{name}'", where=where, remedy=f"add {name} = {{ columns = …, unit = … }} to [signals]")
-    rates = {"time.rate": recipe.time.rate, "resample.rate": recipe.resample.rate if recipe.resample else None}
-    for place, rate in rates.items():
-        if rate is not None and rate < 1.0:
-            raise InputRejected("S09", f"{place} is {rate:g} Hz: a period?", where=where, remedy=f"a period of {rate:g} s is a rate of {1 / rate:g} Hz")
-    if recipe.time.sample_time is not None and recipe.time.sample_time > 1.0:
-        raise InputRejected("S09", f"time.sample_time is {recipe.time.sample_time:g} s: a rate?", where=where, remedy=f"write rate = {recipe.time.sample_time:g}")
-    if recipe.time.rate is not None and recipe.time.sample_time is not None:
-        raise UsageError("C02", "'time' has both rate and sample_time", where=where, remedy="give one of them")
-    if recipe.time.column is None and recipe.time.rate is None and recipe.time.sample_time is None:
-        raise UsageError("C02", "'time' has neither column nor rate", where=where, remedy="give the column of the time stamps, or the sampling rate [Hz]")
-    if no_logs:
-        raise UsageError("C02", "the recipe matches no files", where=where, remedy='write match = "*.csv" in [log], or [[file]] cases')

@@ -14,7 +14,8 @@ from pipelines.log.clock import time_of
 from pipelines.log.experiment import Array
 from pipelines.log.joint_side import drive_of, unit_declared
 from pipelines.log.raw import RawTable, expand
-from pipelines.log.recipe import FileSpec, Recipe, TableSpec, find_recipe, parse_recipe
+from pipelines.log.recipe import FileSpec, Recipe, TableSpec
+from pipelines.log.recipe_reader import find_recipe, parse_recipe
 from pipelines.log.repair import Recording
 from pipelines.log.robot import Drive, RobotDescription, load_robot, parse_robot
 from pipelines.log.sources import read_table
@@ -82,7 +83,8 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
               if (groups := filenames.match(spec.match, name)) is not None]
     if not sources and not tables:
         patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
-        raise NothingMatched("C06", f"no file matches {patterns}", where=folder, remedy="give the folder of the recordings with --source")
+        raise NothingMatched("C06", f"no file matches {patterns}", where=folder,
+                             remedy="give the folder of the recordings with --source")
     return Material(recipe, path, folder, replace(arm, drive=drive), drive, tuple(sources), tuple(tables),
                     tuple(name for name in names if name not in read and Path(name).suffix.lower() in _RECORDINGS),
                     (path, *described, *(folder / name for name in read)))
@@ -128,7 +130,8 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
             raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, ('name', 'gravity'))}", where=path,
                              remedy="beside use, name and gravity can be given; write the rest in the description")
     if not isinstance(use, str) or not use.strip():
-        raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path, remedy="fill it in")
+        raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path,
+                         remedy="fill it in")
     found = next((place / use for place in (folder, path.parent) if (place / use).is_file()), None)
     robot = load_robot(found if found is not None else use)
     files = () if found is None else (found,)
@@ -156,7 +159,8 @@ def parse_map(entries: tuple[str, ...], recipe: Recipe) -> Map:
             signal, joint = "t", "1"
         if not equals or not column.strip() or not joint.isdigit() or (signal not in recipe.signals and signal != "t"):
             known = ", ".join([*recipe.signals, "t"])
-            raise UsageError("C02", f"'{entry}' is not signal_joint=column", where="--map", remedy=f"write --map q_1=Joint_1; signals: {known}")
+            raise UsageError("C02", f"'{entry}' is not signal_joint=column", where="--map",
+                             remedy=f"write --map q_1=Joint_1; signals: {known}")
         found.setdefault(signal, {})[int(joint)] = column.strip()
     return found
 
@@ -196,7 +200,8 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
         checks += said
         signals: dict[str, Array] = {s: np.column_stack([table.columns[c] for c in columns[s]]) for s in here}
         places = table.rows + 1 if table.lines is None else table.lines
-        recordings.append(Recording(t, signals, {s: columns[s] for s in here}, places, table.source, time.column is not None and own_clock,
+        recordings.append(Recording(t, signals, {s: columns[s] for s in here}, places, table.source,
+                                    time.column is not None and own_clock,
                                     "row" if table.lines is None else "line", table.breaks))
     joined = _joined(recordings, list(source.tables.values()), time.column is not None, checks)
     if len(joined) > 1 and recipe.resample is None:
@@ -231,4 +236,5 @@ def _refuse_unequal(first: Recording, other: Recording, a: int, b: int, one_cloc
     if one_clock or abs(a - b) > max(1, 1e-3 * max(a, b)):
         raise InputRejected("S16", f"{a + 1} and {b + 1} samples: not of one recording", where=where,
                             remedy="give files of the same run, or files with time stamps of their own and [resample]")
-    checks.append(Check.of("T06", "warn", f"{a + 1} and {b + 1} samples; the rows both have are used, counted from the start", where=where))
+    checks.append(Check.of("T06", "warn", f"{a + 1} and {b + 1} samples; the rows both have are used, counted from the start",
+                           where=where))

@@ -72,7 +72,8 @@ def mend(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], t
     """
     checks: list[Check] = []
     if recording.t.size < 2:
-        raise InputRejected("T08", f"{recording.t.size} sample{'s' if recording.t.size != 1 else ''}", where=recording.where, remedy="record again")
+        raise InputRejected("T08", f"{recording.t.size} sample{'s' if recording.t.size != 1 else ''}", where=recording.where,
+                            remedy="record again")
     recording = _mark_missing(recording, limits.missing, checks)
     recording = _drop_missing(recording, checks)
     recording = _drop_duplicates(recording, checks)
@@ -91,7 +92,8 @@ def _mark_missing(recording: Recording, missing: tuple[float, ...], checks: list
             hit = np.isin(values, np.array(missing))
             if (count := int(hit.sum())) > 0:
                 values[hit] = np.nan
-                checks.append(Check.of("D03", "repair", f"{count} numbers of {name} are declared missing values", where=recording.where))
+                checks.append(Check.of("D03", "repair", f"{count} numbers of {name} are declared missing values",
+                                       where=recording.where))
         for joint in range(values.shape[1]):
             _refuse_absurd(recording, name, joint, values[:, joint])
         signals[name] = values
@@ -108,7 +110,8 @@ def _refuse_absurd(recording: Recording, name: str, joint: int, values: Array) -
         hit = values == sentinel
         rest = np.abs(values[~hit & np.isfinite(values)])
         if hit.any() and rest.size and rest.max() < abs(sentinel) / 5.0:
-            raise InputRejected("D03", f"{sentinel:g} in {recording.listed(np.flatnonzero(hit))} looks like 'no sample', nothing else comes near it",
+            raise InputRejected("D03", f"{sentinel:g} in {recording.listed(np.flatnonzero(hit))} looks like 'no sample': "
+                                "nothing else comes near it",
                                 where=recording.column(name, joint), remedy=remedy.format(f"{sentinel:g}"))
 
 
@@ -121,15 +124,18 @@ def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
         holes = np.isnan(values)
         for joint in np.flatnonzero(holes.mean(axis=0) > _MOST_MISSING):
             share = holes[:, joint].mean()
-            raise InputRejected("D02", "holds no number at all" if share == 1.0 else f"{100 * share:.0f} % of its samples are missing",
+            raise InputRejected("D02", "holds no number at all" if share == 1.0
+                                else f"{100 * share:.0f} % of its samples are missing",
                                 where=recording.column(name, int(joint)), remedy="choose another column, or record again")
         lost |= holes.any(axis=1)
     if not lost.any():
         return recording
     which = np.flatnonzero(lost)
     if lost.mean() > _MOST_MISSING:
-        raise InputRejected("D02", f"{which.size} of {lost.size} samples have a missing value", where=recording.where, remedy="record again")
-    checks.append(Check.of("D01", "repair", f"{which.size} of {lost.size} samples with a missing value left out ({recording.listed(which)})",
+        raise InputRejected("D02", f"{which.size} of {lost.size} samples have a missing value", where=recording.where,
+                            remedy="record again")
+    checks.append(Check.of("D01", "repair",
+                           f"{which.size} of {lost.size} samples with a missing value left out ({recording.listed(which)})",
                            where=recording.where))
     return recording.take(~lost)
 
@@ -144,9 +150,11 @@ def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
     for values in recording.signals.values():
         differ |= (values[which] != values[which - 1]).any(axis=1)
     if differ.any():
-        raise InputRejected("T02", f"{int(differ.sum())} time stamps stand twice with different values ({recording.listed(which[differ])})",
+        raise InputRejected("T02", f"{int(differ.sum())} time stamps stand twice with different values "
+                            f"({recording.listed(which[differ])})",
                             where=recording.where, remedy="record time with more digits, or import by rate instead of the column")
-    checks.append(Check.of("T02", "repair", f"{which.size} samples that stand twice dropped ({recording.listed(which)})", where=recording.where))
+    checks.append(Check.of("T02", "repair", f"{which.size} samples that stand twice dropped ({recording.listed(which)})",
+                           where=recording.where))
     return recording.take(~again)
 
 
@@ -163,7 +171,9 @@ def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recordin
     kept = tuple(part for part in parts if part.t.size >= max(FEWEST, _SHORTEST_PART * recording.t.size))
     dropped = recording.t.size - sum(part.t.size for part in kept)
     code, why = ("T01", "time steps back") if back.size else ("F09", "lines are lost and no clock says how many")
-    checks.append(Check.of(code, "repair", f"{why} at {recording.listed(np.array(cuts))}: split into {len(kept)} part{'s' if len(kept) != 1 else ''}"
+    checks.append(Check.of(code, "repair",
+                           f"{why} at {recording.listed(np.array(cuts))}: "
+                           f"split into {len(kept)} part{'s' if len(kept) != 1 else ''}"
                            f"{f', {dropped} samples of short parts left out' if dropped else ''}", where=recording.where))
     if not kept:
         _long_enough(parts[0])
@@ -172,7 +182,8 @@ def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recordin
 
 def _long_enough(recording: Recording) -> Recording:
     if recording.t.size < FEWEST:
-        raise InputRejected("T08", f"{recording.t.size} samples left; a log needs {FEWEST}", where=recording.where, remedy="record longer")
+        raise InputRejected("T08", f"{recording.t.size} samples left; a log needs {FEWEST}", where=recording.where,
+                            remedy="record longer")
     return recording
 
 
@@ -186,16 +197,22 @@ def _report_clock(part: Recording, limits: Limits, checks: list[Check]) -> None:
     lost = int(np.round(steps[gaps] / median - 1.0).sum())
     if lost:
         share = 100.0 * lost / (lost + part.t.size)
-        checks.append(Check.of("T03", "warn", f"{lost} samples ({share:.2g} %) are lost in {gaps.size} gaps after {part.listed(gaps)}", where=part.where))
+        checks.append(Check.of("T03", "warn",
+                               f"{lost} samples ({share:.2g} %) are lost in {gaps.size} gaps after {part.listed(gaps)}",
+                               where=part.where))
     wide = gaps[steps[gaps] > longest]
     if wide.size:
         if steps[wide].sum() > 0.5 * (part.t[-1] - part.t[0]):
-            raise InputRejected("T04", f"gaps of up to {steps.max():.4g} s make more than half of the recording", where=part.where, remedy="record again")
-        checks.append(Check.of("T04", "repair" if limits.resampled else "warn", f"{wide.size} gaps longer than {longest:.4g} s, the longest "
-                               f"{steps.max():.4g} s after {part.listed(wide[:1])}; {'split there' if limits.resampled else 'kept as gaps of time'}",
+            raise InputRejected("T04", f"gaps of up to {steps.max():.4g} s make more than half of the recording", where=part.where,
+                                remedy="record again")
+        checks.append(Check.of("T04", "repair" if limits.resampled else "warn",
+                               f"{wide.size} gaps longer than {longest:.4g} s, the longest "
+                               f"{steps.max():.4g} s after {part.listed(wide[:1])}; "
+                               f"{'split there' if limits.resampled else 'kept as gaps of time'}",
                                where=part.where))
     if jitter > 0.05 and not limits.resampled:
-        checks.append(Check.of("T05", "warn", f"time is uneven: 95 % of the steps lie within {100 * jitter:.0f} % of {median:.6g} s",
+        checks.append(Check.of("T05", "warn",
+                               f"time is uneven: 95 % of the steps lie within {100 * jitter:.0f} % of {median:.6g} s",
                                where=part.where, remedy="add [resample] rate = … for an even grid"))
 
 

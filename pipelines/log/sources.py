@@ -39,7 +39,8 @@ def read_table(path: Path, text: TextFormat | None = None) -> RawTable:
     """
     status = regular_file(path)
     if status.st_size > _LARGEST:
-        raise InputRejected("X05", f"{status.st_size} bytes; import reads files up to {_LARGEST}", where=path, remedy="split the recording")
+        raise InputRejected("X05", f"{status.st_size} bytes; import reads files up to {_LARGEST}", where=path,
+                            remedy="split the recording")
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:

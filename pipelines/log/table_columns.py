@@ -17,8 +17,10 @@ from pipelines.log.units import UNITS
 
 __all__ = ["ImportedTable", "import_table"]
 
-_SI = {"time": "s", "position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2", "torque": "N m", "current": "A", "temperature": "degC"}
-_METRES = {"m": "m", "mm": "m", "um": "m", "m/s": "m/s", "mm/s": "m/s", "m/s^2": "m/s^2", "mm/s^2": "m/s^2", "N": "N", "mN": "N", "kN": "N"}
+_SI = {"time": "s", "position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2", "torque": "N m", "current": "A",
+       "temperature": "degC"}
+_METRES = {"m": "m", "mm": "m", "um": "m", "m/s": "m/s", "mm/s": "m/s", "m/s^2": "m/s^2", "mm/s^2": "m/s^2", "N": "N", "mN": "N",
+           "kN": "N"}
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ def import_table(spec: TableSpec, name: str, file: str, table: RawTable) -> Impo
     units: dict[str, str] = {}
     for key, column in spec.columns.items():
         source = table.name_of(column.column)
-        values, units[key] = _converted(table.columns[source], column, table.units.get(source), f"{table.source}, column '{source}'")
+        values, units[key] = _converted(table.columns[source], column, table.units.get(source),
+                                        f"{table.source}, column '{source}'")
         if not np.isfinite(values).all():
             row = table.place(int(np.flatnonzero(~np.isfinite(values))[0]))
             raise InputRejected("D01", f"no number in {row}", where=f"{table.source}, column '{source}'", remedy="remove that row")
@@ -65,5 +68,6 @@ def _converted(values: Array, column: ColumnSpec, header: str | None, where: str
         return values * (2.0 * math.pi / column.counts_per_rev), "rad"
     known = UNITS.get(unit)
     if known is None:
-        raise InputRejected("S05", f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}; known are {', '.join(UNITS)}", where=where, remedy="declare its unit")
+        raise InputRejected("S05", f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}; known are {', '.join(UNITS)}", where=where,
+                            remedy="declare its unit")
     return known.factor * values + known.offset, _METRES.get(unit) or _SI[known.quantity]

@@ -104,7 +104,8 @@ def _named(cells: tuple[str, ...], source: str, line: int) -> tuple[tuple[str, .
     names = tuple(name or f"column_{j + 1}" for j, (name, _) in enumerate(pairs))
     for j, name in enumerate(names):
         if name in names[:j]:
-            raise InputRejected("S03", f"columns {names.index(name) + 1} and {j + 1} are both named '{name}'", where=f"{source}, line {line}",
+            raise InputRejected("S03", f"columns {names.index(name) + 1} and {j + 1} are both named '{name}'",
+                                where=f"{source}, line {line}",
                                 remedy="rename one of them in the file")
     return names, {name: unit for name, (_, unit) in zip(names, pairs, strict=True) if unit}
 
@@ -120,13 +121,15 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
              checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str]]:
     widths = [line.count(dialect.delimiter) + 1 if dialect.delimiter not in ("", " ") and '"' not in line
               else len(cells_of(line, dialect.delimiter)) for _, line in body]
-    damage = [_Damage(i, body[i][0], f"{width} cells, not {dialect.width}") for i, width in enumerate(widths) if width != dialect.width]
+    damage = [_Damage(i, body[i][0], f"{width} cells, not {dialect.width}") for i,
+              width in enumerate(widths) if width != dialect.width]
     for found in damage:
         _refuse_formulas(body[found.index], cells_of(body[found.index][1], dialect.delimiter), names, source)
     torn = {found.index for found in damage}
     if not whole and len(body) - 1 not in torn:
         torn.add(len(body) - 1)
-        checks.append(Check.of("F09", "warn", "the last line has no line end: whether its last number is whole cannot be told, it is left out",
+        checks.append(Check.of("F09", "warn",
+                               "the last line has no line end: whether its last number is whole cannot be told, it is left out",
                                where=f"{source}, line {body[-1][0]}"))
     good = [i for i in range(len(body)) if i not in torn]
     if not good:
@@ -139,7 +142,8 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
             {name: np.ascontiguousarray(values[keep]) for name, values in columns.items()}, words)
 
 
-def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> tuple[dict[str, Array], dict[str, str], dict[int, str]]:
+def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> tuple[dict[str, Array], dict[str, str],
+                                                                                              dict[int, str]]:
     """Columns of numbers, columns of text with an example, and the lines (by index) with a cell that is no number."""
     # numpy rounds every number correctly; pandas does so only where asked, and newer ones refuse to be asked.
     text = "\n".join(line for _, line in lines)
@@ -153,7 +157,9 @@ def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: 
     return _parse_slowly(lines, dialect, names, source)
 
 
-def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> tuple[dict[str, Array], dict[str, str], dict[int, str]]:
+def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> tuple[dict[str, Array],
+                                                                                                     dict[str, str],
+                                                                                                     dict[int, str]]:
     """Cell by cell, to find out which cell is no number."""
     cells = [cells_of(line, dialect.delimiter) for _, line in lines]
     columns: dict[str, Array] = {}
@@ -176,7 +182,8 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
             columns[name] = values
             wrong |= {i: f"'{cells[i][j][:30]}' in column '{name}' is no number" for i in bad}
     if not columns:
-        raise InputRejected("F16", "no column of numbers", where=source, remedy="rrrid import reads CSV and text tables, MAT (v5, v7.3) and NPY")
+        raise InputRejected("F16", "no column of numbers", where=source,
+                            remedy="rrrid import reads CSV and text tables, MAT (v5, v7.3) and NPY")
     return columns, words, wrong
 
 
@@ -184,7 +191,8 @@ def _refuse_formulas(line: Line, cells: list[str], names: tuple[str, ...], sourc
     for j, cell in enumerate(cells):
         if _FORMULA.fullmatch(cell):
             name = names[j] if j < len(names) else str(j + 1)
-            raise InputRejected("F16", f"'{cell[:30]}' in column '{name}' is a spreadsheet's formula or error", where=f"{source}, line {line[0]}",
+            raise InputRejected("F16", f"'{cell[:30]}' in column '{name}' is a spreadsheet's formula or error",
+                                where=f"{source}, line {line[0]}",
                                 remedy="export the recording itself, not an edited sheet")
 
 

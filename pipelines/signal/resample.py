@@ -27,7 +27,8 @@ def grid(start: float, end: float, rate: float) -> Array:
 def resample(t: Array, values: Array, at: Array, method: Literal["spline", "linear"] = "spline") -> Array:
     """`values` (samples,) or (samples, k), taken at the increasing times `t`, at the times `at` inside their span."""
     if method == "linear" or t.size < 4:
-        return np.stack([np.interp(at, t, column) for column in np.atleast_2d(values.T)], axis=-1).reshape(at.shape + values.shape[1:])
+        return np.stack([np.interp(at, t, column) for column in np.atleast_2d(values.T)],
+                        axis=-1).reshape(at.shape + values.shape[1:])
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(t, values, axis=0, bc_type="natural")(at), dtype=np.float64)

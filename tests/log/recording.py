@@ -62,7 +62,8 @@ def write(folder: Path, content: str | bytes, name: str = "run.csv") -> Path:
     return path
 
 
-def run(folder: Path, recipe: str = RECIPE, *, strict: bool = False, assume_units: bool = False, **settings: object) -> Outcome[Result]:
+def run(folder: Path, recipe: str = RECIPE, *, strict: bool = False, assume_units: bool = False,
+        **settings: object) -> Outcome[Result]:
     """Import what lies in `folder` by `recipe`, into out/ beside it."""
     path = folder.parent / "recipe.toml"
     path.write_text(recipe, encoding="utf-8")

@@ -11,7 +11,7 @@ from pipelines.errors import UsageError
 from pipelines.log.evidence import rollover
 from pipelines.log.files import open_log
 from pipelines.log.guess import guess_recipe
-from pipelines.log.recipe import parse_recipe
+from pipelines.log.recipe_reader import parse_recipe
 from tests.log.recording import good, run, text, write
 
 
@@ -58,7 +58,8 @@ def test_the_tx40_draft_finds_both_files_and_the_motor_side(shared: Path, name: 
     recipe = parse_recipe(draft.text.replace('rate = "FILL IN"', "rate = 5000"))
     assert recipe.robot["use"] == "tx40.urdf"
     assert recipe.log.match == "pos_read_data.csv"
-    assert (recipe.signals["q"].columns, recipe.signals["q"].unit, recipe.signals["tau"].file) == ("Joint_{j}", "rad", "curr_data.csv")
+    assert (recipe.signals["q"].columns, recipe.signals["q"].unit, recipe.signals["tau"].file) == ("Joint_{j}", "rad",
+                                                                                                   "curr_data.csv")
     assert "starts at 32, -45 times pi/2" in draft.text
 
 

@@ -86,7 +86,8 @@ def test_f06_text_named_mat_is_read_with_a_warning(tmp_path: Path) -> None:
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.7, 0.999])
 @pytest.mark.parametrize("version", ["5", "5z", "7.3"])
 def test_f08_a_truncated_mat_file_is_refused_in_one_way(tmp_path: Path, version: str, share: float) -> None:
-    path = mat73(tmp_path / "run.mat") if version == "7.3" else mat5(tmp_path / "run.mat", signals(), do_compression=version == "5z")
+    path = mat73(tmp_path / "run.mat") if version == "7.3" else mat5(tmp_path / "run.mat", signals(),
+                                                                     do_compression=version == "5z")
     whole = path.read_bytes()
     path.write_bytes(whole[: max(130, int(share * len(whole)))])
     with pytest.raises(InputRejected, match="RRID-(F08 run.mat: truncated or damaged MAT file|S12)"):

@@ -8,7 +8,7 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log import filenames
-from pipelines.log.recipe import find_recipe, parse_recipe
+from pipelines.log.recipe_reader import find_recipe, parse_recipe
 from pipelines.log.shipped import shipped_names
 from tests.log.recording import RECIPE
 

@@ -12,7 +12,8 @@ from pipelines.errors import Check, InputRejected
 from pipelines.log.clock import time_of
 from pipelines.log.joint_side import drive_of, joint_side
 from pipelines.log.raw import RawTable, expand
-from pipelines.log.recipe import Recipe, TimeSpec, parse_recipe
+from pipelines.log.recipe import Recipe, TimeSpec
+from pipelines.log.recipe_reader import parse_recipe
 from pipelines.log.repair import Limits, Recording, mend, split_at_gaps
 from pipelines.log.robot import load_robot
 from pipelines.signal.resample import grid, resample
@@ -96,7 +97,8 @@ def test_t02_a_sample_written_twice_is_dropped() -> None:
     good_one = recording()
     twice = good_one.take(np.repeat([True], 1200))
     index = np.insert(np.arange(1200), 300, 299)
-    twice = replace(good_one, t=good_one.t[index], places=np.arange(2, 1203), signals={k: v[index] for k, v in good_one.signals.items()})
+    twice = replace(good_one, t=good_one.t[index], places=np.arange(2, 1203),
+                    signals={k: v[index] for k, v in good_one.signals.items()})
     (part,), checks = mend(twice, Limits())
     assert levels(checks) == {"T02": "repair"}
     assert np.array_equal(part.t, good_one.t)
@@ -283,8 +285,9 @@ def test_d07_a_rollover_is_followed_through() -> None:
 
 
 def test_sign_scale_and_offset_act_in_this_order() -> None:
-    joint = convert(recording(), recipe(lambda s: s.replace('unit = "rad"', 'unit = "deg", sign = -1, scale = 2.0, offset = [0.5, 0.0, 0.0]')))
-    expected = np.deg2rad(-2.0 * recording().signals["q"]) + [0.5, 0.0, 0.0]
+    joint = convert(recording(),
+                    recipe(lambda s: s.replace('unit = "rad"', 'unit = "deg", sign = -1, scale = 2.0, offset = [0.5, 0.0, 0.0]')))
+    expected = np.deg2rad(-2.0 * recording().signals["q"]) + np.array([0.5, 0.0, 0.0])
     assert np.allclose(joint["q"], expected, rtol=1e-14, atol=1e-16)
 
 
