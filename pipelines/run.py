@@ -1,0 +1,137 @@
+"""Run the whole workflow on a folder of logs.
+
+Reads    a folder of logs of one robot; several robots or days of recording below it are taken apart
+Writes   result.json with every stage's result, one report.html, and each stage's own files in a folder of its name
+Source   cli-contract.md; the order is the way of the data: what a stage finds, the next ones build on
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from pipelines.errors import Check
+from pipelines.log.files import Opened
+from pipelines.log.results import NOT_STORED
+from pipelines.report.report import Report, Section, Table, Tone
+from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+
+__all__ = ["STAGE", "STEPS", "Group", "Result", "Settings", "Step", "compute", "report"]
+
+# Modules of the stages, in the order they are run.
+STEPS = ("inspect",)
+
+_WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Every stage runs with its own defaults."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One stage's outcome: its exit code under --check, and its result."""
+
+    name: str
+    exit: int
+    result: Any
+    report: Report = field(metadata=NOT_STORED, repr=False)
+    checks: tuple[Check, ...] = field(metadata=NOT_STORED, repr=False)
+
+
+@dataclass(frozen=True)
+class Group:
+    """The logs of one robot, recorded on one day, and what the stages made of them."""
+
+    name: str
+    stages: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One group's stages; with several groups, `runs` holds each of them and `stages` is empty."""
+
+    stages: tuple[Step, ...]
+    runs: tuple[Group, ...] = ()
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        return self.runs or (Group("", self.stages),)
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Run every stage on every group of logs."""
+    groups = tuple(Group(name, tuple(_step(module, part) for module in STEPS)) for name, part in _apart(inputs))
+    return Result((), groups) if len(groups) > 1 else Result(groups[0].stages)
+
+
+def _step(module: str, inputs: Inputs) -> Step:
+    stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
+    result = stage.compute(inputs, stage.settings())
+    return Step(stage.name, stage.exit_code(result, True), result, stage.report(result), stage.checks(result))
+
+
+def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
+    """The inputs, one robot and one day of recording at a time. Files that no log came out of go with the first."""
+    groups: dict[tuple[str, str, str], list[Opened]] = {}
+    for opened in inputs.logs:
+        log = opened.log
+        groups.setdefault((log.robot_name, log.robot_text, (log.recorded or "")[:10]), []).append(opened)
+    if len(groups) < 2:
+        return [("", inputs)]
+    parts = []
+    for number, ((robot, _, day), logs) in enumerate(groups.items()):
+        part = dataclasses.replace(inputs, logs=tuple(logs), rejected=inputs.rejected if number == 0 else (), robot_name=robot)
+        parts.append((" ".join(filter(None, (robot, day))), part))
+    names = [name for name, _ in parts]
+    return [(name if names.count(name) == 1 else f"{name} ({i + 1})", part) for i, (name, part) in enumerate(parts)]
+
+
+def report(result: Result) -> Report:
+    """The worst verdict first, one table of all stages, then every stage's report."""
+    steps = [(group.name, step) for group in result.groups for step in group.stages]
+    tone = max((step.report.tone for _, step in steps), key=_WORST.index)
+    verdicts = [f"{name}: {step.report.verdict}" if name else step.report.verdict for name, step in steps]
+    table = Table(("logs", "stage", "verdict"), tuple((name or "all", step.name, step.report.verdict) for name, step in steps),
+                  caption="Each stage in the order it was run.", tones=tuple(step.report.tone for _, step in steps))
+    single = len(steps) == 1
+    sections = [Section("Stages", tables=(table,))] if not single else []
+    for name, step in steps:
+        sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
+    return Report("Run", " ".join(verdicts), tone, steps[0][1].report.key_figures if single else None, tuple(sections))
+
+
+def _titled(sections: Iterable[Section], prefix: str) -> list[Section]:
+    """`sections`, their titles and figures told apart from those of other stages."""
+    return [dataclasses.replace(
+        section, title=f"{prefix}: {section.title}" if prefix else section.title,
+        figures=tuple(dataclasses.replace(f, name=f"{slug(prefix)}-{f.name}" if prefix else f.name) for f in section.figures))
+        for section in sections]
+
+
+def write(result: Result, folder: Path, request: Request) -> None:
+    """Let every stage write its files into a folder of its name."""
+    for group in result.groups:
+        for step in group.stages:
+            stage: Stage[Any, Any] = import_module(f"pipelines.{step.name.replace('-', '_')}").STAGE
+            if stage.write is not None:
+                stage.write(step.result, folder / slug(group.name) / step.name if group.name else folder / step.name, request)
+
+
+def _exit_code(result: Result, check: bool) -> int:
+    codes = [step.exit for group in result.groups for step in group.stages]
+    return 3 if 3 in codes else max(codes) if check else 0
+
+
+def _checks(result: Result) -> tuple[Check, ...]:
+    return tuple(check for group in result.groups for step in group.stages for check in step.checks)
+
+
+STAGE = Stage("run", "Run the whole workflow on a folder of logs", Settings, compute, report,
+              partial(read_logs, keep_rejected=True), write, _exit_code, _checks)
