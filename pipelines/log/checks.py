@@ -1,0 +1,103 @@
+"""The log doctor: named checks of one log, and of several together.
+
+    for check in check_log(log):  ...       one `Check` for everything that was looked at, found or not
+    for check in check_together(subjects):  what only several logs show: copies, names, one-way friction logs
+
+A check that finds nothing says so with level "ok" and what it measured, so that a reader sees what was looked at.
+Codes are rows of the table of bad inputs; D16 (a joint moves that the experiment holds) and S21 (two logs of a folder
+have one name) are two more.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final
+
+from pipelines.errors import Check
+from pipelines.log.checks_motion import MOTION_CHECKS, both_ways
+from pipelines.log.checks_signal import SIGNAL_CHECKS
+from pipelines.log.checks_subject import Subject
+from pipelines.log.checks_time import MOTION_BAND, TIME_CHECKS
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import Opened
+
+__all__ = ["CHECKS", "LogCheck", "Subject", "check_log", "check_together"]
+
+LogCheck = Callable[[Subject], list[Check]]
+
+CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, MOTION_BAND, *SIGNAL_CHECKS, *MOTION_CHECKS)
+
+
+def check_log(log: ExperimentLog | Subject) -> tuple[Check, ...]:
+    """Everything the doctor has to say about one log."""
+    subject = log if isinstance(log, Subject) else Subject(log)
+    if subject.log.n_samples < 2:
+        return tuple(TIME_CHECKS[0](subject))
+    if subject.planned:
+        return ()  # a plan has neither clock nor sensors
+    checks = CHECKS if subject.sampled else TIME_CHECKS
+    return tuple(found for check in checks for found in check(subject))
+
+
+def check_together(opened: Sequence[Opened], subjects: Sequence[Subject]) -> tuple[Check, ...]:
+    """D14, D10 and names: what only several logs show."""
+    return (*_leaks(opened), *_names(opened), *_one_way_friction(subjects))
+
+
+def _leaks(opened: Iterable[Opened]) -> list[Check]:
+    """D14: a log that a fit uses must not judge it."""
+    copies: dict[str, list[Opened]] = defaultdict(list)
+    for one in opened:
+        copies[one.sha256].append(one)
+    found = []
+    for group in copies.values():
+        names = ", ".join(one.path.name for one in group)
+        if len(group) > 1:
+            found.append(Check.of("D14", "warn", f"the same file {len(group)} times: {names}", where=group[0].path,
+                                  remedy="keep one of them; a copy counts twice in a fit"))
+    content: dict[bytes, list[Opened]] = defaultdict(list)
+    for one in opened:
+        if one.log.origin != "planned" and one.log.n_samples > 1:
+            content[one.log.q.tobytes() + one.log.tau.tobytes() if one.log.n_samples < 100 else _fingerprint(one.log)].append(one)
+    for group in content.values():
+        roles = sorted({one.log.role for one in group})
+        if len(roles) > 1:
+            found.append(Check.of("D14", "reject", f"leak: {', '.join(one.path.name for one in group)} hold the same "
+                           f"samples with roles "
+                                  f"{' and '.join(roles)}", where=group[0].path, gate=True,
+                                  remedy="judge on another recording; a fit always explains what it was made from"))
+    return found
+
+
+def _fingerprint(log: ExperimentLog) -> bytes:
+    import hashlib
+
+    return hashlib.sha256(log.q.tobytes() + log.tau.tobytes()).digest()
+
+
+def _names(opened: Iterable[Opened]) -> list[Check]:
+    """A log's name is unique within its folder: results are filed under it."""
+    named: dict[tuple[str, str], list[Opened]] = defaultdict(list)
+    for one in opened:
+        named[str(one.path.parent), one.log.name].append(one)
+    return [Check.of("S21", "warn", f"{len(group)} logs are named '{name}': {', '.join(one.path.name for one in group)}",
+                     where=folder, remedy="give each log of a folder a name of its own")
+            for (folder, name), group in named.items() if len(group) > 1 and len({one.sha256 for one in group}) > 1]
+
+
+def _one_way_friction(subjects: Iterable[Subject]) -> list[Check]:
+    """D10: all friction logs of a joint together move it both ways."""
+    groups: dict[tuple[str, int], list[tuple[Subject, float, float]]] = defaultdict(list)
+    for subject in subjects:
+        if subject.log.experiment == "friction" and subject.sampled:
+            for joint, (up, down) in both_ways(subject).items():
+                groups[subject.log.robot_name, joint].append((subject, up, down))
+    found = []
+    for (_, joint), members in groups.items():
+        if max(up for _, up, _ in members) < 0.02 or max(down for _, _, down in members) < 0.02:
+            found.append(members[0][0].say("D10", "warn", f"the speed of joint {joint + 1} never changes sign in its "
+                           f"friction logs: Coulomb offset "
+                                           f"unidentifiable joint {joint + 1}", signal="q", joint=joint, gate=True,
+                                           remedy="record the joint in both directions"))
+    return found

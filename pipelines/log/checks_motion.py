@@ -1,0 +1,162 @@
+"""Check the motion of a log: units of angle, limits, reference against measurement, and what moves that should not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.errors import Check
+from pipelines.log.checks_subject import Subject, spread
+from pipelines.log.experiment import Array
+from pipelines.log.faults import emergency_stop, lagged_speed
+
+__all__ = ["MOTION_CHECKS", "both_ways"]
+
+_DEGREE = np.pi / 180.0
+_NOISE_SPEED = 6.0  # standard deviations that a limit must be exceeded by
+
+
+def degrees(s: Subject) -> list[Check]:
+    """S07: angles declared in rad are not degrees. Only limits of position and speed can tell."""
+    found = []
+    speed = peak_speed(s)
+    for j, joint in enumerate(s.log.robot.joints):
+        if not joint.revolute or s.travel[j] <= 0:
+            continue
+        low, high = joint.position
+        q = s.position[np.isfinite(s.position[:, j]), j]
+        reach = max(abs(float(q.min())), abs(float(q.max())), s.travel[j])
+        bounds = max(abs(low), abs(high)) if np.isfinite(joint.position).all() else np.inf
+        beyond = reach > 2.0 * bounds or speed[j] > 3.0 * joint.velocity
+        fits = reach * _DEGREE <= 1.1 * bounds and speed[j] * _DEGREE <= 1.1 * joint.velocity
+        if reach > 4.0 * np.pi and beyond and fits:
+            found.append(s.say("S07", "reject", f"q of joint {j + 1} is declared in rad, but looks like degrees: it reaches "
+                               f"{reach:.4g} at up to {speed[j]:.4g} a second, beyond the limits in rad and within them in deg",
+                               signal="q", joint=j, remedy="declare the unit deg, or pass --trust-units"))
+    travel = ", ".join(f"{v:.3g}" for v in s.travel)
+    return found or s.ok("S07", f"angles: {travel} rad of travel, speeds as the limits allow", signal="q")
+
+
+def peak_speed(s: Subject) -> Array:
+    """(joints,) [rad/s] largest speed over ±10 ms within the usable stretches."""
+    peaks = [np.nanmax(np.abs(lagged_speed(s.position[run], s.log.sample_time)), axis=0, initial=0.0)
+             for run in s.good.runs if s.good.time.known]
+    return np.max(peaks, axis=0) if peaks else np.zeros(s.log.n_joints)
+
+
+def limits(s: Subject) -> list[Check]:
+    """D12: position, speed and acceleration stay within what the description allows."""
+    found, robot = [], s.log.robot
+    speed, acceleration = peak_speed(s), _peak_acceleration(s)
+    for j, joint in enumerate(robot.joints):
+        q = s.position[np.isfinite(s.position[:, j]), j]
+        if not q.size:
+            continue
+        margin = 0.01 * (joint.position[1] - joint.position[0]) if np.isfinite(joint.position).all() else 0.01
+        over = max(float(q.max()) - joint.position[1], joint.position[0] - float(q.min()))
+        if over > margin:
+            found.append(s.say("D12", "warn", f"the position goes {over:.3g} {s.unit('q', j)} beyond its limits "
+                               f"{list(joint.position)}", signal="q", joint=j, remedy="correct the limits, or the joint's zero"))
+        for value, limit, what, unit in ((speed[j], joint.velocity, "speed", s.unit("dq", j)),
+                                         (acceleration[j], joint.acceleration, "acceleration", s.unit("ddq_ref", j))):
+            if value > 1.1 * limit:
+                found.append(s.say("D12", "warn", f"the {what} reaches {value:.4g} {unit}, {value / limit:.3g} times "
+                               f"its limit", signal="q",
+                                   joint=j, gate=value > 1.5 * limit, remedy="move slower, or correct the limit"))
+    return found or s.ok("D12", "within the limits; speed at most " + ", ".join(f"{v:.3g}" for v in speed) + " rad/s, acceleration "
+                         + ", ".join(f"{v:.3g}" for v in acceleration) + " rad/s^2", signal="q")
+
+
+def _peak_acceleration(s: Subject) -> Array:
+    """(joints,) acceleration over ±20 ms, less what the position's own noise gives."""
+    peaks = [np.zeros(s.log.n_joints)]
+    m = max(2, round(0.02 / s.log.sample_time))
+    for run in s.good.runs if s.good.time.known else ():
+        q = s.position[run]
+        if len(q) <= 4 * m:
+            continue
+        second = np.abs(q[2 * m:] - 2.0 * q[m:-m] + q[:-2 * m]) / (m * s.log.sample_time) ** 2
+        # white noise of variance σ² leaves 20 σ² in the third difference; √6 σ / (m Ts)² in this acceleration
+        sigma = np.sqrt(np.nanmean(np.diff(q, 3, axis=0) ** 2, axis=0) / 20.0)
+        noise = np.sqrt(6.0) * sigma / (m * s.log.sample_time) ** 2
+        peaks.append(np.nanmax(second, axis=0, initial=0.0) - _NOISE_SPEED * noise)
+    return np.asarray(np.max(peaks, axis=0))
+
+
+def held_joints(s: Subject) -> list[Check]:
+    """D16: joints that this experiment holds stay where they are."""
+    log = s.log
+    if log.experiment not in ("friction", "frf", "hold"):
+        return []
+    mover = None if log.joint is None else log.joint - 1
+    allowed = 0.05 if mover is None else max(0.05, 0.1 * float(s.travel[mover]))
+    found = [s.say("D16", "warn", f"joint {j + 1} moves by {s.travel[j]:.3g} {s.unit('q', j)} in a {log.experiment} "
+                                  f"log that holds it",
+                   signal="q", joint=j, remedy="hold it stiffer, or call the experiment 'free'", gate=True)
+             for j in range(log.n_joints) if j != mover and s.travel[j] > allowed]
+    return found or s.ok("D16", "held joints move by at most " + format(max(
+        (float(s.travel[j]) for j in range(log.n_joints) if j != mover), default=0.0), ".3g") + " rad", signal="q")
+
+
+def follows_reference(s: Subject) -> list[Check]:
+    """S16: reference and measurement are of the same run. A controller lags and sags, but does not do something else."""
+    log = s.good.log
+    if "q_ref" not in log or log.experiment in ("hold", "frf"):
+        return []
+    found, seen = [], []
+    travel = spread(log["q_ref"])
+    for j in np.flatnonzero(travel > 0.01).tolist():
+        q, reference = s.position[:s.good.end, j], log["q_ref"][:s.good.end, j]
+        ok = np.isfinite(q) & np.isfinite(reference)
+        if ok.sum() < 20:
+            continue
+        error = q[ok] - reference[ok]
+        share = float(np.std(error)) / max(float(np.std(reference[ok])), 1e-12)
+        seen.append(f"{100 * share:.2g} %")
+        if share > 0.5:
+            found.append(s.say("S16", "reject" if share > 0.8 else "warn", f"position and reference differ by "
+                               f"{100 * share:.0f} % of the motion "
+                               f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): they are not of the same run, or "
+                               f"not of the same joint",
+                               signal="q_ref", joint=int(j), gate=True, remedy="log both in one recorder, or leave "
+                               "the reference out"))
+    within = f" within {', '.join(seen)} of the motion" if seen else ""
+    return found or s.ok("S16", f"the position follows its reference{within}", signal="q_ref")
+
+
+def stopped(s: Subject) -> list[Check]:
+    """D11: the arm does what is asked of it to the end."""
+    event = emergency_stop(s.good.log)
+    if event is None:
+        return s.ok("D11", "no emergency stop, no lost reference")
+    sample, how = event
+    return [s.say("D11", "warn", f"emergency stop or tracking failure: {how}; samples from there on are left out",
+                  gate=sample < s.log.n_samples / 2,
+                  sample=int(s.good.kept[sample]), remedy="look what stopped the arm, and record again")]
+
+
+def both_ways(s: Subject) -> dict[int, tuple[float, float]]:
+    """For each joint (from 0) that this experiment moves: share of its moving time in positive and in negative direction."""
+    shares = {}
+    for j in s.moving:
+        if s.travel[j] <= 0 or not s.good.runs or not s.good.time.known:
+            continue
+        speed = np.concatenate([lagged_speed(s.position[run, j:j + 1], s.log.sample_time, 0.02)[:, 0] for run in s.good.runs])
+        speed = speed[np.isfinite(speed)]
+        fast = np.abs(speed) > 0.05 * np.abs(speed).max(initial=0.0)
+        if fast.any():
+            shares[j] = (float(np.mean(speed[fast] > 0)), float(np.mean(speed[fast] < 0)))
+    return shares
+
+
+def direction(s: Subject) -> list[Check]:
+    """D10: an excitation moves every joint both ways; friction logs are judged together, one may go each way."""
+    if s.log.experiment != "excitation":
+        return []
+    one_way = [j for j, (up, down) in both_ways(s).items() if min(up, down) < 0.02]
+    found = [s.say("D10", "warn", f"the speed of joint {j + 1} never changes sign: its Coulomb friction cannot be "
+                                  f"told from a torque offset",
+                   signal="q", joint=j, remedy="move the joint in both directions", gate=True) for j in one_way]
+    return found or s.ok("D10", "every joint moves in both directions", signal="q")
+
+
+MOTION_CHECKS = (degrees, limits, held_joints, follows_reference, stopped, direction)

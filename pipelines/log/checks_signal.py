@@ -1,0 +1,164 @@
+"""Check the samples of a log: missing, absurd, dead, saturated, spiky, wrapped, coarse."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.errors import Check
+from pipelines.log.checks_subject import Subject, spread
+from pipelines.log.faults import GAP_LIMIT, jumps, sentinels, torque_limit
+from pipelines.log.segments import long_blocks, unwrapped
+
+__all__ = ["SIGNAL_CHECKS"]
+
+_FEW = 0.01  # share of samples that may be missing before a channel is not a measurement any more
+_HALF = 0.5
+
+
+def missing_samples(s: Subject) -> list[Check]:
+    """D01, D02: NaN stands for a measurement that was not made; a few are fine, a whole channel is not."""
+    found: list[Check] = []
+    for name in ("q", "tau"):
+        undefined = np.isnan(s.log[name])
+        for j in np.flatnonzero(undefined.any(axis=0)).tolist():
+            column, total = undefined[:, j], int(undefined[:, j].sum())
+            first = int(np.argmax(column))
+            blocks = long_blocks(column)
+            if total > _HALF * column.size:
+                words = f"{total} of {column.size} samples are missing" if total < column.size else "there is no measurement at all"
+                found.append(s.say("D02", "reject", f"{name} of joint {j + 1}: {words}", signal=name, joint=j, sample=first,
+                                   remedy="look at this channel's cable and its place in the recorder, and record again"))
+            elif blocks:
+                found.append(s.say("D02", "repair", f"{total} samples of {name} are missing, {len(blocks)} times more "
+                               f"than {GAP_LIMIT} in a "
+                                   "row; the log is split there", signal=name, joint=j, sample=first,
+                                   remedy="look at this channel's cable, and record again"))
+            else:
+                found.append(s.say("D01", "repair", f"{total} samples of {name} are missing, never more than {GAP_LIMIT} in a row; "
+                                   "treated as not measured", signal=name, joint=j, sample=first, remedy="none needed "
+                                   "if they stay few"))
+    return found or s.ok("D01", "no sample of q or tau is missing")
+
+
+def absurd_samples(s: Subject) -> list[Check]:
+    """D03: infinite, astronomically large, and filler values such as -999."""
+    found: list[Check] = []
+    for name, signal in s.log.signals.items():
+        if name == "t":
+            continue
+        with np.errstate(invalid="ignore"):
+            huge = (np.abs(signal.values) >= 1e9) & ~np.isnan(signal.values)
+        filler = sentinels(signal.values) if name in ("q", "tau") else np.zeros_like(huge)
+        bad = huge | filler
+        for j in np.flatnonzero(bad.any(axis=0)).tolist():
+            which = np.flatnonzero(bad[:, j])
+            values = ", ".join(f"{v:g}" for v in np.unique(signal.values[which[:1000], j])[:4])
+            few = which.size <= _FEW * s.log.n_samples
+            at = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
+            found.append(s.say("D03", "repair" if few else "reject", f"{which.size} samples of {name} hold {values}, "
+                               f"which is no measurement"
+                               f" (samples {at})" + ("; treated as missing" if few else ""), signal=name, joint=j,
+                               sample=int(which[0]),
+                               remedy="mark what was not measured as NaN, or look at the sensor"))
+    return found or s.ok("D03", "no infinite, astronomical or filler value")
+
+
+def dead_channels(s: Subject) -> list[Check]:
+    """D04: what this experiment has to move does move."""
+    log = s.good.log
+    found = []
+    reference = spread(log["q_ref"]) if "q_ref" in log else np.zeros(log.n_joints)
+    torque = spread(log.tau)
+    open_loop = log.experiment == "friction"  # a constant torque is what such a log is about
+    for j in range(log.n_joints):
+        finite = log.tau[np.isfinite(log.tau[:, j]), j]
+        if not finite.size or not np.isfinite(log.q[:, j]).any():
+            continue  # D02 has said so
+        asked = j in s.moving or reference[j] > 0.01
+        if s.travel[j] == 0.0 and asked and log.experiment != "hold":
+            found.append(s.say("D04", "reject", f"q of joint {j + 1} is constant "
+                               f"({log.q[np.isfinite(log.q[:, j]), j][0]:.6g})", signal="q",
+                               joint=j, remedy="look at this encoder and its place in the recorder, and record again"))
+        if torque[j] == 0.0 and (j in s.moving or s.travel[j] > 0.1) and (finite[0] == 0.0 or not open_loop):
+            found.append(s.say("D04", "reject", f"tau of joint {j + 1} is constant ({finite[0]:.6g}) while the joint "
+                               f"moves", signal="tau",
+                               joint=j, remedy="look at this channel of the recorder, and record again"))
+    return found or s.ok("D04", "every channel that has to move does")
+
+
+def saturation(s: Subject) -> list[Check]:
+    """D05: the drive could give the torque that was asked for."""
+    flags = s.good.saturated
+    found = []
+    for j in np.flatnonzero(flags.any(axis=0)).tolist():
+        share = float(flags[:, j].mean())
+        level = float(np.nanmin(np.abs(s.good.log.tau[flags[:, j], j])))
+        described = torque_limit(s.log)[j]
+        limit = f"the described limit of {described:.4g}" if level >= 0.99 * described else f"a flat top at {level:.4g}"
+        found.append(s.say("D05", "warn", f"{100 * share:.2g} % of the torque samples lie at {limit} "
+                                          f"{s.unit('tau', j)}; they are left out of "
+                           "fits", signal="tau", joint=j, sample=int(s.good.kept[np.argmax(flags[:, j])]), gate=share > 0.05,
+                           remedy="move slower or with less acceleration; a saturated drive hides what the arm needs"))
+    if found:
+        return found
+    peak = np.nanmax(np.abs(s.good.log.tau), axis=0, initial=0.0)
+    return s.ok("D05", "the torque stays below its limits, at most " + ", ".join(f"{v:.3g}" for v in peak), signal="tau")
+
+
+def glitches(s: Subject) -> list[Check]:
+    """D06: single samples far from their neighbours."""
+    found = []
+    for name, flags in (("q", s.good.position_spikes), ("tau", s.good.torque_spikes)):
+        for j in np.flatnonzero(flags.any(axis=0)).tolist():
+            which = np.flatnonzero(flags[:, j])
+            found.append(s.say("D06", "repair", f"{which.size} samples of {name} stand out of their neighbours as no "
+                               f"motion does; left out",
+                               signal=name, joint=j, sample=int(s.good.kept[which[0]]),
+                               remedy="look at the shielding of the encoder and at the recorder's transmission"))
+    return found or s.ok("D06", "no sample stands out of its neighbours")
+
+
+def wraps(s: Subject) -> list[Check]:
+    """D07: the position does not jump, by a turn or otherwise."""
+    log = s.good.log
+    recorded = s.log.q[s.good.kept]
+    shifted = np.abs(np.diff(np.where(np.isfinite(recorded), recorded - log.q, 0.0), axis=0)) > 1e-6
+    found = []
+    for j in np.flatnonzero(shifted.any(axis=0)).tolist():
+        at = np.flatnonzero(shifted[:, j])
+        size = abs(float(recorded[at[0] + 1, j] - log.q[at[0] + 1, j]) - float(recorded[at[0], j] - log.q[at[0], j]))
+        found.append(s.say("D07", "warn",
+                           f"the encoder wraps {at.size} times by {size:.6g} {s.unit('q', j)}; unwrapped", signal="q", joint=j,
+                           sample=int(s.good.kept[at[0] + 1]), remedy="let the recorder count turns"))
+    left, size_left = jumps(log.q, log.robot.revolute)
+    if unwrapped(log)[1].any():
+        for j in np.flatnonzero(left.any(axis=0)).tolist():
+            at = np.flatnonzero(left[:, j])
+            found.append(s.say("D07", "warn", f"the position jumps {at.size} times, first by "
+                               f"{size_left[at[0], j]:.4g} {s.unit('q', j)}, which is "
+                               "no turn and no counter's range; the log is split there", signal="q", joint=j,
+                               sample=int(s.good.kept[at[0] + 1]), remedy="look at the encoder: it loses counts", gate=True))
+    return found or s.ok("D07", "the position neither wraps nor jumps", signal="q")
+
+
+def resolution(s: Subject) -> list[Check]:
+    """D08: encoders count as finely as the description says; the observer's noise is R = δ² / 12."""
+    found, seen = [], []
+    for j, joint in enumerate(s.log.robot.joints):
+        step = s.steps[j]
+        if step is None:
+            seen.append("not visible")
+            continue
+        seen.append(f"{step:.3g}")
+        declared = joint.encoder_resolution
+        too_coarse = step > 1.5 * declared if declared else s.travel[j] < 1000.0 * step
+        if too_coarse and np.unique(s.good.log.q[np.isfinite(s.good.log.q[:, j]), j]).size >= 50:
+            said = f"the description says {declared:.3g}" if declared else f"only {s.travel[j] / step:.0f} steps in all"
+            found.append(s.say("D08", "warn", f"the encoder counts in steps of {step:.3g} {s.unit('q', j)}, {said}; "
+                               f"noise is set to "
+                               f"R = δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}^2 from the data", signal="q", joint=j,
+                               remedy="correct encoder_resolution, or look for bits lost on the way"))
+    return found or s.ok("D08", f"encoder steps: {', '.join(seen)}", signal="q")
+
+
+SIGNAL_CHECKS = (missing_samples, absurd_samples, dead_channels, saturation, glitches, wraps, resolution)

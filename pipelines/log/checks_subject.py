@@ -1,0 +1,87 @@
+"""What every check of one log looks at: the log as recorded, and what of it is usable, worked out once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.errors import Check, Level
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.faults import quantum
+from pipelines.log.schema import joint_unit
+from pipelines.log.segments import Usable, usable
+
+__all__ = ["MIN_SAMPLES", "Subject"]
+
+MIN_SAMPLES = 20  # fewer samples have no statistics; T08 says so and the checks of signals stay silent
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One log under examination."""
+
+    log: ExperimentLog
+
+    @cached_property
+    def good(self) -> Usable:
+        return usable(self.log)
+
+    @property
+    def planned(self) -> bool:
+        return self.log.origin == "planned"
+
+    @property
+    def sampled(self) -> bool:
+        """Whether there are signals to judge."""
+        return not self.planned and self.log.n_samples >= MIN_SAMPLES
+
+    @cached_property
+    def steps(self) -> tuple[float | None, ...]:
+        """Step in which each encoder counts, where it can be seen. [rad]"""
+        return tuple(quantum(column) for column in self.good.log.q.T)
+
+    @cached_property
+    def travel(self) -> Array:
+        """(joints,) [rad] distance between the extreme positions."""
+        return spread(self.position)
+
+    @cached_property
+    def position(self) -> Array:
+        """(samples, joints) [rad] usable position, glitches as NaN."""
+        return np.where(self.good.position_spikes, np.nan, self.good.log.q)
+
+    @property
+    def moving(self) -> tuple[int, ...]:
+        """Joints (from 0) that this kind of experiment has to move."""
+        if self.log.experiment in ("friction", "frf") and self.log.joint is not None:
+            return (self.log.joint - 1,)
+        return tuple(range(self.log.n_joints)) if self.log.experiment == "excitation" else ()
+
+    def unit(self, signal: str, joint: int) -> str:
+        return joint_unit(signal, self.log.robot.joints[joint].revolute)
+
+    def place(self, signal: str = "", joint: int | None = None, sample: int | None = None) -> str:
+        """Where: file, signal, joint (from 0), sample of the recording."""
+        parts = [self.log.source or self.log.name]
+        parts += [f"signal {signal}"] if signal else []
+        parts += [f"joint {joint + 1}"] if joint is not None else []
+        if sample is not None:
+            parts.append(f"sample {sample}, t = {self.log.t[sample]:.6g} s")
+        return ", ".join(parts)
+
+    def say(self, code: str, level: Level, message: str, *, signal: str = "", joint: int | None = None, sample: int | None = None,
+            remedy: str = "", gate: bool = False) -> Check:
+        return Check.of(code, level, message, where=self.place(signal, joint, sample), remedy=remedy, gate=gate)
+
+    def ok(self, code: str, message: str, *, signal: str = "") -> list[Check]:
+        return [self.say(code, "ok", message, signal=signal)]
+
+
+def spread(x: Array) -> Array:
+    """(joints,) largest minus smallest finite sample of each column."""
+    finite = np.isfinite(x)
+    high = np.max(np.where(finite, x, -np.inf), axis=0, initial=-np.inf)
+    low = np.min(np.where(finite, x, np.inf), axis=0, initial=np.inf)
+    return np.asarray(np.maximum(high - low, 0.0))
