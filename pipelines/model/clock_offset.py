@@ -1,0 +1,104 @@
+"""Measure how far torque and motion are apart in time, without knowing the arm.
+
+τ(t + d) ≈ τ(t) + d τ̇(t). What a joint's row leaves of τ is compared with what it leaves of τ̇ (Gauss-Newton), in each
+quarter of the log and on each joint apart: their scatter says how sure the answer is, and their trend is the drift. A
+delay of one joint alone makes scatter, not an offset: a clock is common to all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.rigid.body import Array
+from pipelines.model.row_fit import Row, Sampled
+
+__all__ = ["Offset", "clock_offset"]
+
+_BLOCKS = 4
+_ROUNDS = 6
+_EXPLAINED = 0.2  # relative residual up to which a joint's torque is understood well enough to time it
+# Student's t for 99.5 % by degrees of freedom: few joints agree by chance more easily than many.
+_STUDENT = (np.inf, 63.7, 9.92, 5.84, 4.60, 4.03, 3.71, 3.50)
+
+
+@dataclass(frozen=True)
+class Offset:
+    """Torque lies `samples` later than the motion it belongs to, at mid-log; and how that changes from end to end.
+
+    The bounds are 99.5 % ones, from the scatter of the quarters and from that of the joints.
+    """
+
+    samples: float
+    bound: float
+    drift: float
+    drift_bound: float
+    joints: int  # how many joints' torques are understood well enough to say
+
+
+def clock_offset(rows: tuple[Row, ...], motion: Sampled) -> Offset | None:
+    """The offset between the clocks of torque and position, or None where no torque is understood well enough."""
+    time = motion.t - motion.t.mean()
+    span = float(np.ptp(motion.t))
+    offset, drift = _coarse(rows, motion), 0.0
+    tau = motion.shifted(offset)
+    timed = [j for j, row in enumerate(rows) if _left(row, tau[:, j]) < _EXPLAINED]
+    if not timed or span <= 0:
+        return None
+    middle = np.array([float(block.mean()) for block in np.array_split(time, _BLOCKS)]) / span
+    for _ in range(_ROUNDS):
+        number, weight = _steps(rows, motion, offset + drift * time / span, timed)
+        step, bound = _line(number, weight, middle)
+        offset, drift = offset + float(step[0]), drift + float(step[1])
+        if np.abs(step).sum() < 1e-3:
+            break
+    return Offset(offset, float(bound[0]), drift, float(bound[1]), len(timed))
+
+
+def _left(row: Row, tau: Array) -> float:
+    return float(np.linalg.norm(row.residual(tau)) / max(float(np.linalg.norm(tau - tau.mean())), 1e-300))
+
+
+def _coarse(rows: tuple[Row, ...], motion: Sampled) -> float:
+    """The best of a few offsets, so that the linear steps start near."""
+    offsets = np.linspace(-0.8, 0.8, 17) * motion.reach
+    left = [sum(_left(row, tau) ** 2 for row, tau in zip(rows, motion.shifted(float(offset)).T, strict=True))
+            for offset in offsets]
+    return float(offsets[int(np.argmin(left))])
+
+
+def _steps(rows: tuple[Row, ...], motion: Sampled, offset: Array | float, joints: list[int]) -> tuple[Array, Array]:
+    """For each block and joint: the step in samples that the residual asks for, and its weight (inverse variance)."""
+    tau = motion.shifted(offset)
+    slope = 0.5 * (motion.shifted(offset + 1.0) - motion.shifted(offset - 1.0))
+    number, weight = np.zeros((_BLOCKS, len(joints))), np.zeros((_BLOCKS, len(joints)))
+    for place, j in enumerate(joints):
+        rest, turn = rows[j].residual(tau[:, j]), rows[j].residual(slope[:, j])
+        variance = float(rest @ rest) / len(rest)
+        for b, (r, s) in enumerate(zip(np.array_split(rest, _BLOCKS), np.array_split(turn, _BLOCKS), strict=True)):
+            power = float(s @ s)
+            if power > 0:
+                number[b, place] = -float(r @ s) / power
+                weight[b, place] = power / max(variance, 1e-300)
+    return number, weight
+
+
+def _line(number: Array, weight: Array, middle: Array) -> tuple[Array, Array]:
+    """Weighted straight line through the steps over time, (value, slope), and the bounds of both."""
+    design = np.stack([np.ones_like(middle), middle], axis=-1)
+    normal = np.einsum("bj,bk,bl->jkl", weight, design, design)  # of each joint
+    right = np.einsum("bj,bk,bj->jk", weight, design, number)
+    line = np.linalg.pinv(normal.sum(axis=0)) @ right.sum(axis=0)
+    rest = weight * (number - (design @ line)[:, None]) ** 2
+    freedom = max(1, number.size - 2)
+    covariance = np.linalg.pinv(normal.sum(axis=0)) * max(float(rest.sum()) / freedom, 1.0)
+    bound = 3.0 * np.sqrt(np.diag(covariance))
+    joints = number.shape[1]
+    if joints > 1:
+        each = np.linalg.pinv(normal) @ right[..., None]
+        share = np.einsum("jkk->jk", normal)
+        share = share / share.sum(axis=0)
+        between = np.sum(share * (each[..., 0] - line) ** 2, axis=0) / (joints - 1)
+        bound = bound + _STUDENT[min(joints - 1, len(_STUDENT) - 1)] * np.sqrt(between)
+    return line, bound
