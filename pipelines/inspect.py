@@ -1,0 +1,255 @@
+"""Examine logs: container, units, clock, signals, and whether torque fits motion.
+
+Reads    any logs, also broken ones: what cannot be opened is reported, not refused
+Writes   result.json (checks, one summary a log), result.h5 (what the figures show), report.html; no log is changed
+Source   bad-inputs.md, rows F, S, T and D; diagnosis.md, step 1
+
+A log is *rejected* where a check says "reject"; the exit code is then 3. With --check, a check that wants mending
+("repair") or closes a gate ends in exit 1; a warning alone does not.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.errors import Check, Level, RrridError
+from pipelines.log.checks import Subject, check_log, check_together
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.faults import quantum
+from pipelines.log.files import Opened
+from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.log.schema import joint_unit
+from pipelines.model.plausibility import plausibility
+from pipelines.report.log_preview import Preview, log_preview, preview_figures
+from pipelines.report.report import Report, Section, Table
+from pipelines.report.sections import checks_table, level_tone
+from pipelines.stage import Inputs, Request, Stage, read_logs
+
+__all__ = ["STAGE", "LogSummary", "Range", "Result", "Settings", "compute", "report"]
+
+_PREVIEWS = 8
+_WORST_FIRST: tuple[Level, ...] = ("reject", "repair", "warn")
+_FINDINGS_SHOWN = 200
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`trust_units`: radians are radians, however large (S07). `allow_same`: one recording may have two roles (D14)."""
+
+    trust_units: bool = False
+    allow_same: bool = False
+
+
+@dataclass(frozen=True)
+class Range:
+    """Extreme finite values of one signal of one joint."""
+
+    signal: str
+    joint: int  # 1-based
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class LogSummary:
+    """What a log says of itself, and what its samples say."""
+
+    name: str
+    file: str
+    sha256: str
+    integrity: str  # "digest" | "none": whether a flipped bit would be noticed
+    experiment: str
+    role: str
+    origin: str
+    robot: str
+    joints: int
+    moving_joint: int | None
+    controller: str  # its law; "" where the log does not say
+    signals: tuple[str, ...]
+    samples: int
+    usable_samples: int  # that a fit may use
+    duration: float  # [s]
+    sample_time: float  # [s]
+    period: float | None  # [s]
+    jitter: float  # rms, in sample times
+    dropped_samples: int
+    gaps: tuple[tuple[float, float], ...]  # [s] from, to
+    encoder_step: tuple[float | None, ...]  # [rad]
+    torque_step: tuple[float | None, ...]  # [N m]
+    ranges: tuple[Range, ...]
+    verdict: Level  # worst level of its checks
+
+
+@dataclass(frozen=True)
+class Result:
+    """Everything the doctor found."""
+
+    checks: tuple[Check, ...]
+    from_reading: int  # how many of them, the first, were made while reading
+    logs: tuple[LogSummary, ...]
+    rejected: tuple[str, ...]  # files that could not be opened
+    previews: tuple[Preview, ...]
+
+
+def read(request: Request, settings: Settings) -> Inputs:
+    """Every log; one that cannot be opened is a finding."""
+    return read_logs(request, settings, keep_rejected=True)
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Run every check on every log."""
+    reading = [*inputs.checks, *(check for opened in inputs.logs for check in opened.checks)]
+    found = [_as_check(rejected.error, rejected.path) for rejected in inputs.rejected]
+    logs: list[LogSummary] = []
+    previews: list[Preview] = []
+    subjects: list[Subject] = []
+    for opened in inputs.logs:
+        subject, mine = _examine(opened, inputs.robot, settings)
+        subjects.append(subject)
+        found += mine
+        logs.append(_summary(opened, subject, (*opened.checks, *mine)))
+        if len(previews) < _PREVIEWS and subject.sampled:
+            previews.append(log_preview(subject))
+    found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
+    return Result((*reading, *found), len(reading), tuple(logs), tuple(str(r.path) for r in inputs.rejected), tuple(previews))
+
+
+def _as_check(error: RrridError, path: object) -> Check:
+    return Check(error.code, "reject", error.message, error.where or str(path), error.remedy, True)
+
+
+def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings) -> tuple[Subject, list[Check]]:
+    log = opened.log
+    if robot is not None and robot.n_joints != log.n_joints:
+        mismatch = Check.of("S02", "reject", f"log has {log.n_joints} joints, model {robot.n_joints}", where=opened.path,
+                            remedy="give the description of this robot, or choose the columns with --joints")
+        return Subject(log), [mismatch]
+    subject = Subject(log if robot is None else replace(log, robot_text=format_robot(robot)))
+    checks = [check for check in check_log(subject) if not (settings.trust_units and check.code == "RRID-S07")]
+    if not any(check.level == "reject" for check in checks):
+        try:
+            checks += plausibility(subject)
+        except RrridError as problem:  # a description without usable geometry
+            checks.append(_as_check(problem, opened.path))
+    return subject, checks
+
+
+def _summary(opened: Opened, subject: Subject, checks: Iterable[Check]) -> LogSummary:
+    log, good = subject.log, subject.good if subject.sampled else None
+    t = good.log.t if good else log.t
+    time = good.time if good else None
+    gaps = tuple((float(log.t[k]) * time.scale, float(log.t[k + 1]) * time.scale) for k in time.gaps) if time else ()
+    levels = [check.level for check in checks]
+    return LogSummary(
+        log.name, str(opened.path), opened.sha256, "none" if any(c.code == "RRID-F05" for c in opened.checks) else "digest",
+        log.experiment, log.role, log.origin, log.robot_name, log.n_joints, log.joint,
+        log.controller.law if log.controller else "", tuple(log.signals), log.n_samples, int(good.fit.sum()) if good else 0,
+        float(t.max() - t.min()) if t.size else 0.0, log.sample_time, log.period, time.jitter if time else 0.0,
+        time.dropped_samples if time else 0, gaps, subject.steps if good else (),
+        tuple(quantum(column) for column in good.log.tau.T) if good else (), _ranges(log),
+        next((level for level in _WORST_FIRST if level in levels), "ok"))
+
+
+def _ranges(log: ExperimentLog) -> tuple[Range, ...]:
+    found = []
+    for name in ("q", "dq", "tau", "q_ref", "current", "temperature"):
+        for j, joint in enumerate(log.robot.joints if name in log else ()):
+            finite = log[name][np.isfinite(log[name][:, j]), j]
+            low, high = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
+            found.append(Range(name, j + 1, joint_unit(name, joint.revolute), low, high))
+    return tuple(found)
+
+
+def exit_code(result: Result, check: bool) -> int:
+    """3 where anything is rejected; with --check 1 where something had to be mended or a gate closed."""
+    if any(c.level == "reject" for c in result.checks):
+        return 3
+    return int(check and any(c.gate or c.level == "repair" for c in result.checks))
+
+
+def report(result: Result) -> Report:
+    """The verdict, what was found, what was looked at, and the signals of the first logs."""
+    found = [c for c in result.checks if c.level != "ok"]
+    sections = [_found_section(found)] if found else []
+    sections += [_logs_section(result), _passed_section(result)]
+    sections += [_log_section(summary, preview) for summary, preview in _paired(result)]
+    tone = level_tone(c.level for c in result.checks)
+    return Report("Log doctor", _verdict(result), tone, _key_figures(result), tuple(sections))
+
+
+def _paired(result: Result) -> list[tuple[LogSummary, Preview]]:
+    remaining = list(result.logs)
+    pairs = []
+    for preview in result.previews:
+        at = next(i for i, summary in enumerate(remaining) if summary.name == preview.name)
+        pairs.append((remaining.pop(at), preview))
+    return pairs
+
+
+def _verdict(result: Result) -> str:
+    total = len(result.logs) + len(result.rejected)
+    found = [c for c in result.checks if c.level != "ok"]
+    if not found:
+        which = "The log is" if total == 1 else f"All {total} logs are"
+        return f"{which} in order: nothing was found that a fit would suffer from."
+    bad = len(result.rejected) + sum(log.verdict == "reject" for log in result.logs)
+    mended = sum(log.verdict == "repair" for log in result.logs)
+    warned = sum(log.verdict == "warn" for log in result.logs)
+    parts = [f"{count} {words}" for count, words in
+             ((bad, "cannot be used"), (mended, "can be used after mending"), (warned, "should be looked at")) if count]
+    worst = min(found, key=lambda c: (_WORST_FIRST.index(c.level), not c.gate))
+    return f"Of {total} log{'s' * (total != 1)} {', '.join(parts) or 'none is bad alone'}. First of all: {worst.message}."
+
+
+def _key_figures(result: Result) -> Table:
+    count: dict[str, int] = defaultdict(int)
+    for check in result.checks:
+        count[check.level] += 1
+    rows = (("logs", len(result.logs) + len(result.rejected)), ("checks", len(result.checks)), ("passed", count["ok"]),
+            ("look at it", count["warn"]),
+            ("mended", count["repair"]), ("not usable", count["reject"]))
+    return Table(("what", "number"), rows)
+
+
+def _found_section(found: list[Check]) -> Section:
+    more = len(found) - _FINDINGS_SHOWN
+    text = (f"{more} more stand in result.json.",) if more > 0 else ()
+    return Section("What was found", text, (checks_table(found[:_FINDINGS_SHOWN]),))
+
+
+def _passed_section(result: Result) -> Section:
+    groups: dict[str, list[Check]] = defaultdict(list)
+    for check in result.checks:
+        if check.level == "ok":
+            groups[check.code].append(check)
+    rows = tuple((code, len(group), group[0].message) for code, group in sorted(groups.items()))
+    return Section("What was looked at and is in order", (), (Table(("code", "logs", "what was measured, in the first "
+                   "of them"), rows),))
+
+
+def _logs_section(result: Result) -> Section:
+    rows = tuple((log.name, log.experiment if log.moving_joint is None else f"{log.experiment}, joint "
+                   f"{log.moving_joint}", log.role, log.joints,
+                  log.samples, log.duration, 1.0 / log.sample_time, log.integrity) for log in result.logs)
+    return Section("The logs", (), (Table(("name", "experiment", "role", "joints", "samples", "duration [s]",
+                                           "rate [Hz]", "integrity"), rows,
+                                          tones=tuple(level_tone([log.verdict]) for log in result.logs)),
+                                          ))
+
+
+def _log_section(log: LogSummary, preview: Preview) -> Section:
+    ranges = Table(("signal", "joint", "lowest", "highest", "unit"), tuple((r.signal, r.joint, r.low, r.high,
+                                                                            r.unit) for r in log.ranges))
+    uneven = log.jitter > 1e-3 or log.dropped_samples > 0 or bool(log.gaps)
+    steps = ", ".join("not visible" if step is None else f"{step:.3g}" for step in log.encoder_step)
+    text = (f"{log.usable_samples} of {log.samples} samples can be used. Encoder steps [rad]: {steps}. SHA-256 {log.sha256[:16]}…",)
+    return Section(f"Log {log.name}", text, (ranges,), preview_figures(preview, uneven))
+
+
+STAGE = Stage("inspect", "Examine logs", Settings, compute, report, read, exit_code=exit_code,
+              checks=lambda result: result.checks[result.from_reading:])

@@ -1,0 +1,95 @@
+"""Show one log in few points: envelopes of its signals, its sampling intervals, and where samples are left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipelines.log.checks_subject import Subject
+from pipelines.log.experiment import Array
+from pipelines.log.faults import GAP_LIMIT, Mask
+from pipelines.report.report import Figure
+from pipelines.report.sections import interval_figure, joint_signal_figure, timeline_figure
+
+__all__ = ["Preview", "log_preview", "preview_figures"]
+
+_BUCKETS, _INTERVALS = 200, 4000
+
+
+@dataclass(frozen=True)
+class Preview:
+    """Envelopes for the figures: lowest and highest sample of each bucket."""
+
+    name: str
+    sample_time: float  # [s]
+    units: tuple[str, str]  # of position and torque, of the first joint
+    t: Array  # [s] (points,)
+    q: Array  # [rad] (points, joints)
+    tau: Array  # [N m] (points, joints)
+    flagged_q: Array  # 1 where a sample of the bucket is missing or spiky
+    flagged_tau: Array
+    intervals: Array  # [s]; quantiles where there are many
+    spans: dict[str, tuple[tuple[float, float], ...]]  # [s] kind -> from, to
+
+
+def log_preview(subject: Subject) -> Preview:
+    """What the figures of one log show."""
+    good = subject.good
+    recorded = subject.log.q[good.kept], subject.log.tau[good.kept]
+    size = max(1, -(-good.log.n_samples // _BUCKETS))
+    lost = good.missing
+    t = good.log.t
+    intervals = np.diff(t)
+    if intervals.size > _INTERVALS:
+        intervals = np.quantile(intervals, np.linspace(0.0, 1.0, _INTERVALS))
+    gaps = np.flatnonzero(np.diff(t) > (GAP_LIMIT + 1.5) * subject.log.sample_time)
+    spans = {"gap": tuple((float(t[k]), float(t[k + 1])) for k in gaps),
+             "missing": _spans(t, lost.any(axis=1)), "glitch": _spans(t, good.spikes.any(axis=1)),
+             "saturated": _spans(t, good.saturated.any(axis=1)), "after the stop": _spans(t, np.arange(t.size) >= good.end)}
+    bounded = [np.where(lost, np.nan, values) for values in recorded]
+    return Preview(subject.log.name, subject.log.sample_time, (subject.unit("q", 0), subject.unit("tau", 0)),
+                   np.repeat(t[::size], 2), _envelope(bounded[0], size), _envelope(bounded[1], size),
+                   _any(lost | good.position_spikes, size), _any(lost | good.torque_spikes | good.saturated, size), intervals,
+                   {kind: found for kind, found in spans.items() if found})
+
+
+def _spans(t: Array, mask: Any) -> tuple[tuple[float, float], ...]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], np.asarray(mask, bool), [False])).astype(np.int8))).reshape(-1, 2)
+    return tuple((float(t[a]), float(t[b - 1])) for a, b in edges[:200])
+
+
+def _envelope(x: Array, size: int) -> Array:
+    """(2 buckets, joints) lowest and highest finite sample of each bucket, NaN where it has none."""
+    padded = np.concatenate([x, np.repeat(x[-1:], -len(x) % size, axis=0)]).reshape(-1, size, x.shape[1])
+    finite = np.isfinite(padded)
+    low = np.where(finite, padded, np.inf).min(axis=1)
+    high = np.where(finite, padded, -np.inf).max(axis=1)
+    both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
+    return np.where(np.isfinite(both), both, np.nan)
+
+
+def _any(mask: Mask, size: int) -> Array:
+    padded = np.concatenate([mask, np.zeros((-len(mask) % size, mask.shape[1]), bool)]).reshape(-1, size, mask.shape[1])
+    return np.repeat(padded.any(axis=1), 2, axis=0).astype(np.float64)
+
+
+def preview_figures(preview: Preview, uneven: bool) -> tuple[Figure, ...]:
+    """Position and torque over time; the sampling where it is `uneven`; where samples are left out, if any are."""
+    figures: list[Figure] = [
+        joint_signal_figure(f"position-{preview.name}", "Measured position; lowest and highest sample of each short "
+                       "stretch.", preview.t, preview.q,
+                            preview.units[0], quantity="position", flagged=preview.flagged_q > 0, flag_name="missing or glitch"),
+        joint_signal_figure(f"torque-{preview.name}", "Torque; samples that no fit uses are marked.", preview.t,
+                            preview.tau, preview.units[1], quantity="torque",
+                            flagged=preview.flagged_tau > 0, flag_name="missing, glitch or saturated")]
+    if uneven:
+        clock = np.concatenate([[0.0], np.cumsum(preview.intervals)])
+        figures.append(interval_figure(f"intervals-{preview.name}", "How evenly the log was sampled; one bar would be "
+                       "perfect.", clock, preview.sample_time))
+    if preview.spans:
+        figures.append(timeline_figure(f"timeline-{preview.name}", "Where samples are missing or left out.",
+                                       (float(preview.t[0]), float(preview.t[-1])),
+                                       [(kind, list(found)) for kind, found in preview.spans.items()]))
+    return tuple(figures)
