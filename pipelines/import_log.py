@@ -174,8 +174,12 @@ def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec
 
 def _preview(log: ExperimentLog) -> Preview:
     every = max(1, -(-log.n_samples // _PREVIEW_POINTS))
-    return Preview(tuple(log.t[::every].tolist()), tuple(tuple(row) for row in log.q[::every].tolist()),
-                   tuple(tuple(row) for row in log.tau[::every].tolist()))
+
+    def rows(values: Array) -> tuple[tuple[float, ...], ...]:
+        # Six digits are more than a figure shows.
+        return tuple(tuple(float(f"{x:.6g}") for x in row) for row in values[::every].tolist())
+
+    return Preview(tuple(float(f"{x:.6g}") for x in log.t[::every].tolist()), rows(log.q), rows(log.tau))
 
 
 def write(result: Result, folder: Path, request: Request) -> None:

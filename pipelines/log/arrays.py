@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 
 import numpy as np
 import numpy.typing as npt
@@ -55,8 +56,10 @@ def _header(data: bytes, source: str) -> tuple[np.dtype[np.generic], bool, tuple
     try:
         table = ast.literal_eval(data[8 + wide : start].decode("latin-1" if major < 3 else "utf-8").strip())
         descr, order, shape = table["descr"], table["fortran_order"], table["shape"]
-        kind = np.dtype(np.lib.format.descr_to_dtype(descr))
-    except (ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, RecursionError, MemoryError, OverflowError):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # numpy warns of type codes that no file has held for years
+            kind = np.dtype(np.lib.format.descr_to_dtype(descr))
+    except (Warning, ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, RecursionError, MemoryError, OverflowError):
         raise broken from None
     if not (isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape) and len(shape) <= 8
             and isinstance(order, bool)):

@@ -175,7 +175,7 @@ class _Drafting:
         return lines
 
     def _drive(self) -> list[str]:
-        lines = ["# [drive]                               # where numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
+        lines = ["# [drive]                # where numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
                  f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
         if not self.current:
             return [*lines, ""]

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 
-__all__ = ["BUDGET", "read_mat5", "read_mat73"]
+__all__ = ["BUDGET", "damaged", "read_mat5", "read_mat73"]
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
@@ -27,10 +27,12 @@ _MOST_MEMBERS = 2000
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical")
 _HARMLESS = (*_NUMERIC, "char", "cell", "struct", "sparse")
 _DAMAGE = (ValueError, TypeError, IndexError, KeyError, OSError, OverflowError, EOFError, AttributeError, NotImplementedError,
-           struct.error, zlib.error, ZeroDivisionError, RuntimeError, AssertionError, MemoryError)
+           struct.error, zlib.error, ZeroDivisionError, RuntimeError, AssertionError, MemoryError,
+           NameError)  # a local variable of scipy that damage leaves unset
 
 
-def _damaged(source: str) -> InputRejected:
+def damaged(source: str) -> InputRejected:
+    """F08, in the one way it is said."""
     return InputRejected("F08", "truncated or damaged MAT file", where=source, remedy="copy it again, or save it again from MATLAB")
 
 
@@ -45,7 +47,7 @@ def read_mat5(data: bytes, source: str) -> Arrays:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", MatReadWarning)
+            warnings.simplefilter("error", UserWarning)
             listed = whosmat(io.BytesIO(data))
             names = _wanted(listed, source)
             # Not mat_dtype=True, the type MATLAB shows: it would drop imaginary parts; columns become real numbers later.
@@ -53,12 +55,12 @@ def read_mat5(data: bytes, source: str) -> Arrays:
     except MatReadWarning as problem:
         raise InputRejected("S03", f"a variable is there twice: {problem}", where=source,
                             remedy="save each variable once") from None
-    except (*_DAMAGE, MatReadError):
-        raise _damaged(source) from None
+    except (*_DAMAGE, MatReadError, UserWarning):
+        raise damaged(source) from None
     found: Arrays = {}
     for name in names:
         if name not in loaded:
-            raise _damaged(source)
+            raise damaged(source)
         found |= _opened(name, loaded[name])
     return found
 
@@ -109,7 +111,7 @@ def read_mat73(path: Path, source: str) -> Arrays:
     except InputRejected:
         raise
     except (*_DAMAGE, UnicodeError):
-        raise _damaged(source) from None
+        raise damaged(source) from None
 
 
 def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from pipelines.log.atomic import fault_of
 from pipelines.log.dialect import TextFormat
 from pipelines.log.files import regular_file
 from pipelines.log.guard import Answer, guarded
-from pipelines.log.matlab import read_mat5, read_mat73
+from pipelines.log.matlab import damaged, read_mat5, read_mat73
 from pipelines.log.raw import RawTable, columns_of_arrays
 from pipelines.log.tabular import read_text
 
@@ -99,7 +99,13 @@ def _in_child(read: Callable[[], RawTable], path: Path) -> RawTable:
                  "checks": [check.as_dict() for check in table.checks]}
         return Answer(about, {str(i): values for i, values in enumerate(table.columns.values())})
 
-    answer = guarded(work, path)
+    try:
+        answer = guarded(work, path)
+    except InputRejected as problem:
+        # However it was damaged, and however the library took it: one message (F08).
+        if problem.code == "RRID-F03":
+            raise damaged(path.name) from None
+        raise
     about = answer.about
     columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
     return RawTable(path.name, columns, np.arange(len(next(iter(columns.values())))), text=about["text"],

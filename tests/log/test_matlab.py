@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.arrays import read_npy
-from pipelines.log.matlab import read_mat5
 from pipelines.log.raw import columns_of_arrays
 from pipelines.log.sources import read_table
 from tests.log.recording import good, text
@@ -205,15 +204,16 @@ def test_no_mutation_of_an_npy_file_escapes(data: st.DataObject) -> None:
 
 @pytest.mark.parametrize("compressed", [False, True])
 @given(data=st.data())
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_no_mutation_of_a_mat_file_escapes(compressed: bool, data: st.DataObject) -> None:
-    buffer = io.BytesIO()
-    scipy.io.savemat(buffer, {name: values[:25] for name, values in signals().items()}, do_compression=compressed)
-    content = bytearray(buffer.getvalue())
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_mutation_of_a_mat_file_escapes(tmp_path: Path, compressed: bool, data: st.DataObject) -> None:
+    """Through the guarded child, as a user reads it: scipy has crashed and eaten all memory on such files."""
+    path = mat5(tmp_path / "run.mat", {name: values[:25] for name, values in signals().items()}, do_compression=compressed)
+    content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 6))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(bytes(content[: data.draw(st.integers(1, len(content)))]))
     try:
-        read_mat5(bytes(content[: data.draw(st.integers(0, len(content)))]), "run.mat")
+        read_table(path)
     except (InputRejected, UsageError):
         return
 
