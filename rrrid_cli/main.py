@@ -20,6 +20,8 @@ from rrrid_cli.options import Common, LogPaths, with_common
 
 __all__ = ["app", "entry"]
 
+TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
+
 STAGES = ("run", "inspect", "import", "convert")
 
 app = typer.Typer(name="rrrid", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -38,11 +40,14 @@ def run(logs: LogPaths, common: Common) -> None:
 
 @app.command()
 @with_common
-def inspect(logs: LogPaths, common: Common) -> None:
+def inspect(
+    logs: LogPaths, common: Common, trust_units: TrustUnits = None,
+    allow_same: Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")] = None,
+) -> None:
     """The log doctor: check container, units, time and signals; nothing is changed."""
     from pipelines.inspect import STAGE
 
-    _go(STAGE, tuple(logs), common, {})
+    _go(STAGE, tuple(logs), common, {"trust_units": trust_units, "allow_same": allow_same})
 
 
 @app.command("import")
@@ -53,6 +58,7 @@ def import_(
                       typer.Argument(help="Recipe: a TOML file, or the name of a shipped one.", show_default=False)] = None,
     source: Annotated[Path | None, typer.Option(help="Folder the recordings are in. [the recipe's]")] = None,
     map: Annotated[list[str] | None, typer.Option(help="Column to take for a signal: q_1=Joint_1. Repeatable.")] = None,
+    trust_units: TrustUnits = None,
     guess: Annotated[Path | None, typer.Option(help="Draft a recipe for this recording, with the evidence; print it.")] = None,
 ) -> None:
     """Make logs of recordings (CSV, MAT, NPY) by a recipe."""
@@ -63,7 +69,7 @@ def import_(
         raise UsageError("C02", "no recipe", where="import", remedy="name a recipe, or draft one with --guess FILE")
     from pipelines.import_log import STAGE
 
-    _go(STAGE, (), common, {"recipe": recipe, "source": source, "map": tuple(map or ()) or None})
+    _go(STAGE, (), common, {"recipe": recipe, "source": source, "map": tuple(map or ()) or None, "trust_units": trust_units})
 
 
 @app.command()

@@ -1,0 +1,130 @@
+"""What is true of every stage, whatever it computes. A new stage inherits all of it."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipelines.log.files import open_log
+from pipelines.log.results import decode, encode, read_series
+from pipelines.log.table import write_csv
+from pipelines.report.report import Report
+from pipelines.stage import Request, Stage, run_stage
+from rrrid_cli.main import STAGES
+
+REPO = Path(__file__).resolve().parents[1]
+MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if path.stem not in ("__init__", "stage", "errors")]
+FORBIDDEN = {"open", "print", "read_text", "write_text", "read_bytes", "write_bytes", "open_log", "write_log", "savefig"}
+
+
+def _stage(module: str) -> Stage[Any, Any]:
+    stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
+    return stage
+
+
+def _recording(folder: Path, samples: Path) -> tuple[Path, ...]:
+    """A CSV recording and its recipe, for the stage that makes logs instead of reading them."""
+    write_csv(folder / "run.csv", open_log(samples / "rrr-closed-form/excitation-1.h5").log)
+    (folder / "recipe.toml").write_text("""
+        [robot]
+        use = "rrr"
+        [log]
+        match = "run.csv"
+        experiment = "excitation"
+        [time]
+        column = "t"
+        unit = "s"
+        [signals]
+        q = { columns = "q_{j}", unit = "rad" }
+        tau = { columns = "tau_{j}", unit = "N m" }
+        """)
+    return ()
+
+
+def _run(module: str, tmp_path: Path, samples: Path) -> tuple[Any, Any]:
+    stage = _stage(module)
+    settings, paths = stage.settings(), (samples / "rrr-closed-form",)
+    if module == "import_log":
+        paths = _recording(tmp_path, samples)
+        settings = dataclasses.replace(settings, recipe=str(tmp_path / "recipe.toml"), source=tmp_path)
+    return stage, run_stage(stage, Request(paths, out=tmp_path / "out"), settings)
+
+
+def test_every_stage_is_a_command() -> None:
+    """A file directly in pipelines/ is a stage and bears its command's name."""
+    assert {_stage(module).name for module in MODULES} == set(STAGES)
+    assert all(_stage(module).name.replace("-", "_") in (module, module.removesuffix("_log")) for module in MODULES)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_stage_says_what_it_reads_and_writes(module: str) -> None:
+    """Title in the first line, then Reads, Writes and Source, as design.md asks."""
+    words = (import_module(f"pipelines.{module}").__doc__ or "").splitlines()
+    assert words[0].endswith(".")
+    for label in ("Reads ", "Writes ", "Source "):
+        assert any(line.startswith(label) for line in words), f"{module} does not say what it {label.lower()}"
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_settings_are_frozen_and_have_defaults(module: str) -> None:
+    """Every option has its default in one place, and no stage can change what it was given."""
+    stage = _stage(module)
+    assert dataclasses.is_dataclass(stage.settings)
+    assert stage.settings.__dataclass_params__.frozen  # type: ignore[attr-defined]
+    stage.settings()
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_compute_opens_no_file_and_prints_nothing(module: str) -> None:
+    """Compute, draw, write: three functions. The two first name nothing that touches the disk or the screen."""
+    for function in (_stage(module).compute, _stage(module).report):
+        for node in ast.walk(ast.parse(inspect.getsource(inspect.unwrap(function)))):
+            if isinstance(node, ast.Call):
+                name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
+                assert name not in FORBIDDEN, f"{function.__qualname__} calls {name}"
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m != "run"])
+def test_a_stored_result_redraws_its_report(module: str, tmp_path: Path, samples: Path) -> None:
+    """result.json and result.h5 hold all that the report shows: what is read back draws the same page."""
+    from pipelines.report.render import render_report
+
+    stage, outcome = _run(module, tmp_path, samples)
+    stored = json.loads((outcome.folder / "result.json").read_text())
+    assert stored.pop("command") == stage.name
+    series = read_series(outcome.folder / "result.h5") if (outcome.folder / "result.h5").exists() else {}
+    again = decode(type(outcome.result), stored, series)
+    assert encode(again)[0] == encode(outcome.result)[0]
+    redrawn = stage.report(again)
+    assert isinstance(redrawn, Report)
+    assert render_report(redrawn, {})["report.html"] == render_report(outcome.report, {})["report.html"]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_twice_is_the_same(module: str, tmp_path: Path, samples: Path) -> None:
+    """Equal inputs give equal bytes, provenance.json apart."""
+    contents = []
+    for _ in range(2):
+        _, outcome = _run(module, tmp_path, samples)
+        files = sorted(p for p in outcome.folder.rglob("*") if p.is_file() and p.name != "provenance.json")
+        contents.append({p.relative_to(outcome.folder).as_posix(): p.read_bytes() for p in files})
+    assert contents[0] == contents[1]
+    assert "report.html" in contents[0]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_every_log_a_stage_writes_is_in_order(module: str, tmp_path: Path, samples: Path) -> None:
+    """`inspect` accepts every log that any stage writes."""
+    from pipelines.inspect import STAGE as DOCTOR
+
+    _, outcome = _run(module, tmp_path, samples)
+    if list(outcome.folder.rglob("logs/*.h5")) + list(outcome.folder.rglob("logs/*.parquet")):
+        examined = run_stage(DOCTOR, Request((outcome.folder,), out=tmp_path / "examined", no_report=True), DOCTOR.settings())
+        assert [c for c in examined.result.checks if c.level == "reject"] == []
