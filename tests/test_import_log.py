@@ -370,7 +370,7 @@ def milliseconds(folder: Path) -> None:
     write(folder, text(good() | {"t": np.arange(1200) * 1.0}))
 
 
-EXITS = {"C06": 5, "X11": 2}
+EXITS = {"C06": 5, "X12": 2}
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -383,6 +383,30 @@ def test_what_cannot_be_mended_is_refused_with_place_and_remedy(name: str, folde
     assert caught.value.where
     assert caught.value.remedy
     assert not (folder.parent / "out").exists()
+
+
+def test_f15_a_file_that_is_still_written(folder: Path) -> None:
+    import fcntl
+
+    with (folder / "run.csv").open("a") as logger:
+        fcntl.flock(logger, fcntl.LOCK_EX)
+        with pytest.raises(EnvironmentFault, match=r"RRID-F15.*run.csv.*in use"):
+            run(folder)
+
+
+def test_a_companion_is_no_log_of_its_own(folder: Path) -> None:
+    recipe = split_files(folder).replace('"{run}_pos.csv"\nname = "{run}"', '"*.csv"').replace("{run}_tau", "a_tau")
+    assert [i.name for i in run(folder, recipe).result.logs] == ["a_pos"]
+
+
+def test_d07_angles_that_wrap_are_unwrapped_without_being_asked(folder: Path) -> None:
+    """D07: joint 1 turns through ±pi; its wrapped angle comes back as the motion it was, but for whole turns."""
+    columns = good()
+    turning = 3.0 + 6.0 * columns["t"]
+    write(folder, text(columns | {"q_1": np.mod(turning + np.pi, 2 * np.pi) - np.pi}))
+    outcome = run(folder)
+    assert codes(outcome) == {"D07": "warn"}
+    assert np.allclose(np.diff(open_log(outcome.folder / "logs" / "run.h5").log.q[:, 0]), np.diff(turning), atol=1e-12)
 
 
 def test_s04_assume_units_takes_si_and_says_so(folder: Path) -> None:

@@ -59,7 +59,8 @@ def _header(data: bytes, source: str) -> tuple[np.dtype[np.generic], bool, tuple
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # numpy warns of type codes that no file has held for years
             kind = np.dtype(np.lib.format.descr_to_dtype(descr))
-    except (Warning, ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, RecursionError, MemoryError, OverflowError):
+    except (Warning, ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, RecursionError, MemoryError,
+            OverflowError):
         raise broken from None
     if not (isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape) and len(shape) <= 8
             and isinstance(order, bool)):

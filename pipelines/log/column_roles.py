@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.log.raw import RawTable
 from pipelines.log.sources import read_table
 from pipelines.log.units import UNITS
@@ -58,7 +59,10 @@ def companion_of(path: Path, table: RawTable) -> RawTable | None:
     for other in sorted(path.parent.iterdir())[:200]:
         if other == path or other.suffix.lower() != path.suffix.lower() or not other.is_file() or other.stat().st_size > 1 << 30:
             continue
-        candidate = read_table(other)
+        try:
+            candidate = read_table(other)
+        except InputRejected:
+            continue  # whatever else lies there is not what was asked about
         alike = list(candidate.columns) == list(table.columns) and candidate.rows.size == table.rows.size
         if alike and _is_torque(other) != _is_torque(path):
             return candidate

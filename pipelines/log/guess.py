@@ -10,17 +10,18 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from pipelines.errors import clean
+from pipelines.errors import InputRejected, clean
 from pipelines.log.clock import plausible_units
 from pipelines.log.column_roles import companion_of, named_unit, roles_of
 from pipelines.log.evidence import Guess, motion_of, position_unit, sign_of, torque_unit
 from pipelines.log.experiment import Array
 from pipelines.log.raw import RawTable
+from pipelines.log.repair import FEWEST
 from pipelines.log.sources import read_table
 
 __all__ = ["Draft", "guess_recipe"]
@@ -43,14 +44,29 @@ def guess_recipe(path: Path) -> Draft:
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
-    table = read_table(path)
+    table = _sound(read_table(path))
     roles = roles_of(table, path)
     both = "q" in roles and ("tau" in roles or "current" in roles)
     companion = None if both else companion_of(path, table)
+    companion = _sound(companion) if companion is not None else None
+    if companion is not None and not np.array_equal(companion.rows, table.rows):
+        companion = None
     if companion is not None and "q" not in roles:
         table, companion, path = companion, table, path.parent / companion.source
         roles = roles_of(table, path)
     return _Drafting(path, table, roles, companion).draft()
+
+
+def _sound(table: RawTable) -> RawTable:
+    """The table without what a guess would stumble over: rows with a hole or an absurd number, columns of nothing else."""
+    usable = {name: np.isfinite(values) & (np.abs(values) < 1e18) for name, values in table.columns.items()}
+    columns = {name: values for name, values in table.columns.items() if usable[name].mean() > 0.8}
+    keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
+    if keep.sum() < FEWEST:
+        raise InputRejected("T08", f"{int(keep.sum())} samples without a hole", where=table.source,
+                            remedy="give a recording of a motion")
+    return replace(table, columns={name: values[keep] for name, values in columns.items()}, rows=table.rows[keep],
+                   lines=None if table.lines is None else table.lines[keep])
 
 
 class _Drafting:

@@ -107,7 +107,7 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot:
     signals: dict[str, Signal] = {}
     for name, raw in part.signals.items():
         spec = recipe.signals[name]
-        values = _unwrapped(part, name, raw, spec, altered, checks)
+        values = _unwrapped(part, name, raw, spec, units[name], altered, checks)
         values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where) * _per_joint(spec.sign, n,
                                                                                                         f"signals.{name}.sign",
                                                                                                         recipe.where)
@@ -126,20 +126,38 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot:
     return Converted(signals, tuple(steps), tuple(altered), tuple(checks))
 
 
-def _unwrapped(part: Recording, name: str, raw: Array, spec: SignalSpec, altered: list[str], checks: list[Check]) -> Array:
-    """D07: a counter that starts again is followed through; a jump of more than half its range is a rollover."""
-    if spec.wrap is None:
+def _unwrapped(part: Recording, name: str, raw: Array, spec: SignalSpec, unit: str, altered: list[str],
+               checks: list[Check]) -> Array:
+    """D07: a counter that starts again is followed through; a jump of more than half its range is a rollover.
+
+    Where the recipe names no range, jumps of a whole turn amid small steps are unwrapped all the same.
+    """
+    wrap = spec.wrap if spec.wrap is not None else _whole_turn(name, raw, spec, unit)
+    if wrap is None:
         return raw
-    turns = np.round(np.diff(raw, axis=0) / spec.wrap)
+    turns = np.round(np.diff(raw, axis=0) / wrap)
     if not turns.any():
         return raw
     for joint in np.flatnonzero(turns.any(axis=0)):
         count = int(np.abs(turns[:, joint]).sum())
         at = part.listed(np.flatnonzero(turns[:, joint]) + 1)
-        checks.append(Check.of("D07", "warn", f"{count} rollovers of {spec.wrap:g} unwrapped ({at})",
+        checks.append(Check.of("D07", "warn", f"{count} rollovers of {wrap:g} unwrapped ({at})",
                                where=part.column(name, int(joint))))
-        altered.append(f"{name} of joint {joint + 1}: {count} rollovers of {spec.wrap:g} unwrapped")
-    return raw - spec.wrap * np.concatenate([np.zeros((1, raw.shape[1])), np.cumsum(turns, axis=0)])
+        altered.append(f"{name} of joint {joint + 1}: {count} rollovers of {wrap:g} unwrapped")
+    return raw - wrap * np.concatenate([np.zeros((1, raw.shape[1])), np.cumsum(turns, axis=0)])
+
+
+def _whole_turn(name: str, raw: Array, spec: SignalSpec, unit: str) -> float | None:
+    """One turn in the recorded unit, where every large step of a position is just that; None where there is no such step."""
+    if schema.SIGNALS[name][0] != "position":
+        return None
+    one = {"deg": 360.0, "°": 360.0, "rad": 2.0 * math.pi, "mrad": 2000.0 * math.pi, "rev": 1.0, "turn": 1.0}.get(unit)
+    if unit == "counts" and isinstance(spec.counts_per_rev, int | float):
+        one = float(spec.counts_per_rev)
+    steps = np.abs(np.diff(raw, axis=0))
+    if one is None or not steps.size or (large := steps > 0.5 * one).sum() == 0:
+        return None
+    return one if np.abs(steps[large] - one).max() < 0.1 * one and steps[~large].max() < 0.1 * one else None
 
 
 def _in_si(part: Recording, name: str, values: Array, spec: SignalSpec, unit: str, drive: Drive | None, n: int, recipe: Recipe,

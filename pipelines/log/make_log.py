@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.errors import InputRejected, UsageError
+from pipelines.errors import InputRejected, UsageError, clean
 from pipelines.log import filenames, schema
 from pipelines.log.experiment import Array, Controller, Derived, ExperimentLog, Signal
 from pipelines.log.recipe import LogSpec
@@ -42,7 +42,7 @@ def make_log(source: Source, material: Material, assembled: Assembled, t: Array,
     """
     recipe, robot = material.recipe, material.robot
     about = _about(recipe.log, source, recipe.where)
-    name = filenames.fill(about.name, source.groups, recipe.where) + (f"-{number}" if number else "")
+    name = (clean(filenames.fill(about.name, source.groups, recipe.where), 200) or "log") + (f"-{number}" if number else "")
     files = tuple(SourceFile(file, table.sha256,
                              tuple(c for columns in assembled.columns.values() for c in columns if c in table.columns))
                   for file, table in source.tables.items())

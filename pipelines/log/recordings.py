@@ -77,8 +77,10 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
             read[name] = read_table(filenames.inside(folder, name, path), recipe.format)
         return read[name]
 
+    hits = {name: hit for name in names if (hit := _case(cases, name)) is not None}
+    companions = {other for name, (_, groups) in hits.items() for other in _files_of(recipe, groups, name, path) if other != name}
     sources = [_source(case, groups, name, recipe, table_of, names, path)
-               for name in names if (hit := _case(cases, name)) is not None for case, groups in [hit]]
+               for name, (case, groups) in hits.items() if name not in companions]
     tables = [(spec, groups, table_of(name)) for name in names for spec in recipe.table
               if (groups := filenames.match(spec.match, name)) is not None]
     if not sources and not tables:
@@ -99,7 +101,7 @@ def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] |
 
 def _source(case: FileSpec, groups: dict[str, str], name: str, recipe: Recipe, table_of: Callable[[str], RawTable],
             names: tuple[str, ...], where: Path) -> Source:
-    wanted = [_file_of(recipe, signal, groups, name, where) for signal in recipe.signals]
+    wanted = _files_of(recipe, groups, name, where)
     for other in wanted:
         if other not in names:
             raise InputRejected("S01", f"'{other}' is missing, which belongs to '{name}'{did_you_mean(other, names)}", where=where,
@@ -113,6 +115,10 @@ def _file_of(recipe: Recipe, signal: str, groups: Mapping[str, str], primary: st
         return primary
     beside = Path(primary).parent / filenames.fill(template, groups, where)
     return beside.as_posix()
+
+
+def _files_of(recipe: Recipe, groups: Mapping[str, str], primary: str, where: object) -> list[str]:
+    return [_file_of(recipe, signal, groups, primary, where) for signal in recipe.signals]
 
 
 def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tuple[RobotDescription, tuple[Path, ...]]:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
 
-__all__ = ["Limits", "Recording", "mend", "split_at_gaps"]
+__all__ = ["FEWEST", "Limits", "Recording", "mend", "split_at_gaps"]
 
 FEWEST = 11  # samples: with fewer there is no motion to speak of, and no log
 _MOST_STEPS = 3  # of the clock

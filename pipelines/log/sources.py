@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected
+from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
 from pipelines.log.arrays import read_npy
 from pipelines.log.atomic import fault_of
 from pipelines.log.dialect import TextFormat
@@ -44,6 +44,7 @@ def read_table(path: Path, text: TextFormat | None = None) -> RawTable:
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
+            _refuse_locked(handle, path)
             data = file.read(_LARGEST + 1)
     except OSError as problem:
         raise fault_of(problem, path) from None
@@ -57,11 +58,24 @@ def read_table(path: Path, text: TextFormat | None = None) -> RawTable:
     return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
 
 
+def _refuse_locked(handle: int, path: Path) -> None:
+    """F15: a file that a logger holds is still being written."""
+    import fcntl
+
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise EnvironmentFault("F15", "in use by another process", where=path,
+                               remedy="wait until the recording is finished") from None
+    except OSError:
+        return  # a file system without locks cannot say
+
+
 def _kind(data: bytes, source: str) -> str:
     """F06: what the first bytes say."""
     for magic, code, what, remedy in _REFUSED:
         if data.startswith(magic):
-            raise InputRejected(code, f"{what}, not a recording", where=source, remedy=remedy)
+            raise (UsageError if code == "X12" else InputRejected)(code, f"{what}, not a recording", where=source, remedy=remedy)
     if data.startswith(b"\x93NUMPY"):
         return "npy"
     if data[:1] == b"\x80" and data[1:2] in (b"\x02", b"\x03", b"\x04", b"\x05"):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected, UsageError
 from pipelines.log.evidence import rollover
 from pipelines.log.files import open_log
 from pipelines.log.guess import guess_recipe
@@ -93,6 +93,20 @@ def test_a_flipped_torque_is_noticed(tmp_path: Path) -> None:
 def test_a_rollover_is_told_by_jumps_of_one_size(size: float, found: float) -> None:
     assert rollover(np.mod(np.linspace(0, 3.7 * size, 3000), size)[:, None]) == pytest.approx(found)
     assert rollover(np.sin(np.linspace(0, 9, 3000))[:, None]) is None
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+def test_holes_do_not_disturb_a_guess(tmp_path: Path, value: float) -> None:
+    columns = good()
+    columns["q_1"][5] = value
+    columns["tau_2"][900] = value
+    whole = guess_recipe(write(tmp_path, text(good()))).text
+    assert guess_recipe(write(tmp_path, text(columns))).text == whole.replace("1200 samples", "1198 samples")
+
+
+def test_a_handful_of_samples_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputRejected, match="RRID-T08"):
+        drafted(tmp_path, "\n".join(text(good()).splitlines()[:6]) + "\n")
 
 
 def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
