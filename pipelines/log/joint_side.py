@@ -155,7 +155,7 @@ def _whole_turn(name: str, raw: Array, spec: SignalSpec, unit: str) -> float | N
     if unit == "counts" and isinstance(spec.counts_per_rev, int | float):
         one = float(spec.counts_per_rev)
     steps = np.abs(np.diff(raw, axis=0))
-    if one is None or not steps.size or (large := steps > 0.5 * one).sum() == 0:
+    if one is None or not (large := steps > 0.5 * one).any() or large.all():
         return None
     return one if np.abs(steps[large] - one).max() < 0.1 * one and steps[~large].max() < 0.1 * one else None
 
@@ -204,7 +204,7 @@ def _through_drive(name: str, values: Array, spec: SignalSpec, recipe: Recipe, d
         steps.append(f"{name}: motor to joint side by the inverse of the transmission")
         return np.asarray(np.linalg.solve(matrix, values.T).T, dtype=np.float64)
     steps.append(f"{name}: motor to joint side by the transposed transmission")
-    return values @ matrix
+    return np.asarray(values @ matrix, dtype=np.float64)
 
 
 def _refuse_wrong_kind(part: Recording, name: str, unit: str, spec: SignalSpec, recipe: Recipe, robot: RobotDescription) -> None:
