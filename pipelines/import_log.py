@@ -32,6 +32,7 @@ from pipelines.stage import Inputs, Request, Stage, slug
 __all__ = ["STAGE", "ImportedLog", "Result", "Settings", "compute", "read", "report"]
 
 _PREVIEWS, _PREVIEW_POINTS = 3, 400
+_FINEST = 4.0  # times the recorded rate
 
 
 @dataclass(frozen=True)
@@ -159,6 +160,10 @@ def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec
     altered = tuple(step for item in converted for step in item.altered)
     if spec is None:
         return parts[0].t, dict(converted[0].signals), steps, altered
+    for part in parts:
+        if (recorded := 1.0 / float(np.median(np.diff(part.t)))) * _FINEST < spec.rate:
+            raise UsageError("C02", f"resample.rate is {spec.rate:g} Hz, the recording has {recorded:.4g} Hz: "
+                             "its samples would be invented", where=part.where, remedy="choose a rate near the recorded one, or a lower one")
     at = grid(max(float(part.t[0]) for part in parts), min(float(part.t[-1]) for part in parts), spec.rate)
     signals: dict[str, Signal] = {}
     for part, item in zip(parts, converted, strict=True):

@@ -139,6 +139,11 @@ def test_a_good_recording_is_imported_bit_for_bit(folder: Path, checker: ModuleT
     assert not any(checker.check_folder(outcome.folder).values())
 
 
+def test_c02_samples_are_not_invented(folder: Path) -> None:
+    with pytest.raises(UsageError, match="RRID-C02.*1e\\+06 Hz, the recording has 1000 Hz"):
+        run(folder, RECIPE + "[resample]\nrate = 1e6\n")
+
+
 def test_equal_inputs_give_equal_files(folder: Path) -> None:
     first = run(folder, RECIPE + "[resample]\nrate = 500\n")
     bytes_of = (first.folder / "logs" / "run.h5").read_bytes(), (first.folder / "result.json").read_bytes()

@@ -95,6 +95,7 @@ def _explain(error: Any, where: object) -> UsageError:
     return UsageError("C02", f"'{place}': {error['msg']}, not {error['input']!r}", where=where)
 
 
+_LARGEST = 1e12
 # Numbers that must be finite and above a bound.
 _POSITIVE = ("rate", "sample_time", "longest_gap", "counts_per_rev", "wrap", "period", "torque_constant")
 
@@ -125,6 +126,8 @@ def _bounds(recipe: Recipe, where: object) -> None:
             continue
         if not math.isfinite(number):
             raise UsageError("C02", f"'{path}' is {number}, must be a finite number", where=where)
+        if abs(number) > _LARGEST:
+            raise UsageError("C02", f"'{path}' is {number}, must lie within ±{_LARGEST:g}", where=where)
         if key in _POSITIVE and number <= 0.0:
             raise UsageError("C02", f"'{path}' is {number}, must be above 0", where=where)
         if key == "sign" and abs(number) != 1.0:

@@ -44,6 +44,7 @@ def test_c01_an_unknown_key_is_named_with_its_neighbour(old: str, new: str, hint
 
 @pytest.mark.parametrize(("more", "words"), [
     ("[resample]\nrate = -5.0\n", "'resample.rate' is -5.0, must be above 0"),
+    ("[resample]\nrate = 1e300\n", "'resample.rate' is 1e\\+300, must lie within"),
     ("[resample]\nrate = nan\n", "'resample.rate' is nan, must be a finite"),
     ("[resample]\nrate = 100.0\nmethod = 'magic'\n", "'resample.method'.*'spline' or 'linear'"),
     ("[drive]\ntorque_constant = 0.0\n", "'drive.torque_constant' is 0.0, must be above 0"),
