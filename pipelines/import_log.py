@@ -163,7 +163,8 @@ def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec
     for part in parts:
         if (recorded := 1.0 / float(np.median(np.diff(part.t)))) * _FINEST < spec.rate:
             raise UsageError("C02", f"resample.rate is {spec.rate:g} Hz, the recording has {recorded:.4g} Hz: "
-                             "its samples would be invented", where=part.where, remedy="choose a rate near the recorded one, or a lower one")
+                             "its samples would be invented", where=part.where,
+                             remedy="choose a rate near the recorded one, or a lower one")
     at = grid(max(float(part.t[0]) for part in parts), min(float(part.t[-1]) for part in parts), spec.rate)
     signals: dict[str, Signal] = {}
     for part, item in zip(parts, converted, strict=True):
