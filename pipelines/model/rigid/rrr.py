@@ -16,9 +16,15 @@ from pipelines.log.robot import LinkParameters, RobotDescription
 from pipelines.model.rigid import rrr_kinematics
 from pipelines.model.rigid.body import Array, BaseParameter, TorqueParts
 
-__all__ = ["RRR", "fits"]
+__all__ = ["ACTING", "RRR", "fits"]
 
 _TINY = 1e-12
+
+# The columns that act on each joint. Row three has four columns of row two: the one's end is the other's beginning.
+_SHARED = [4, 5, 7, 8]
+ACTING = (tuple(range(11)), (0, 1, 2, 3, 9, 10, 11, 12, 13, 14, *_SHARED), (*_SHARED, 2, 3, 12))
+
+_Rows = Array | dict[int, Array]
 
 _MOMENT, _INERTIA = "kg m", "kg m^2"
 _PARAMETERS = (
@@ -72,59 +78,80 @@ class RRR:
         return rrr_kinematics.inverse(self.geometry, tips)
 
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
-        """R (samples, 3, 15). Kostić et al. 2004, eq. (A5), with r34 as in erratum E1."""
-        trigonometry = self._trigonometry(q)
-        R = np.zeros((*np.shape(q)[:-1], 3, 15))
-        self._fill_waist_row(R[..., 0, :], trigonometry, dq, ddq)
-        self._fill_other_rows(R[..., 1, :], R[..., 2, :], trigonometry, dq, ddq)
-        return R
+        """R (samples, 3, 15), stored with samples fastest. Kostić et al. 2004, eq. (A5), with r34 as in erratum E1."""
+        shape = np.shape(q)[:-1]
+        R = np.zeros((3, 15, *shape))
+        angles, v, u = (np.moveaxis(np.asarray(x, dtype=np.float64), -1, 0) for x in (q, dq, ddq))
+        trigonometry = self._trigonometry_of(angles[1], angles[2])
+        doubled = _doubled(trigonometry)
+        self._fill_waist_row(R[0], trigonometry, doubled, v, u)
+        self._fill_other_rows(R[1], R[2], trigonometry, doubled, v, u)
+        R[2, _SHARED] = R[1, _SHARED]
+        return np.moveaxis(R, (0, 1), (-2, -1))
 
-    def _fill_waist_row(self, one: Array, trigonometry: tuple[Array, ...], dq: Array, ddq: Array) -> None:
+    def acting_rows(self, q: Array, dq: Array, ddq: Array, out: Array) -> tuple[Array, Array, Array]:
+        """What is not always zero in R, of each joint (columns, samples); `ACTING` tells which columns.
+
+        Written to `out` (28, samples), in which the columns that rows two and three share stand once: a fit then reads
+        no zero and copies nothing. For q, dq, ddq (samples, 3).
+        """
+        angles, v, u = (np.ascontiguousarray(np.transpose(x), dtype=np.float64) for x in (q, dq, ddq))
+        trigonometry = self._trigonometry_of(angles[1], angles[2])
+        waist, two, three = out[:11], out[11:25], out[21:28]
+        doubled = _doubled(trigonometry)
+        self._fill_waist_row(waist, trigonometry, doubled, v, u)
+        self._fill_other_rows(dict(zip(ACTING[1], two, strict=True)), dict(zip(ACTING[2], three, strict=True)),
+                              trigonometry, doubled, v, u)
+        return waist, two, three
+
+    def _fill_waist_row(self, one: _Rows, trigonometry: tuple[Array, ...], doubled: tuple[Array, ...], dq: Array,
+                        ddq: Array) -> None:
         c2, s2, _, _, cS, sS = trigonometry
-        sin22, cos22, sin2S, cos2S, sin223, cos223 = _doubled(trigonometry)
-        v1, v2, v3 = np.moveaxis(dq, -1, 0)
-        u1, u2, u3 = np.moveaxis(ddq, -1, 0)
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = doubled
+        v1, v2, v3 = dq
+        u1, u2, u3 = ddq
         a2, v, u = self._a2, v2 + v3, u2 + u3
-        v12, v13, v1v = v1 * v2, v1 * v3, v1 * v
-        one[..., 0] = u1 * c2**2 - v12 * sin22
-        one[..., 1] = 0.5 * u1 * sin22 + v12 * cos22
-        one[..., 2] = 2 * a2 * ((u1 * cS - v13 * sS) * c2 - v12 * sin223)
-        one[..., 3] = -2 * a2 * ((u1 * sS + v13 * cS) * c2 + v12 * cos223)
-        one[..., 4] = u1 * cS**2 - v1v * sin2S
-        one[..., 5] = -0.5 * u1 * sin2S - v1v * cos2S
-        one[..., 6] = u1
-        one[..., 7] = u * cS - v**2 * sS
-        one[..., 8] = u * sS + v**2 * cS
-        one[..., 9] = -(v2**2) * s2 + u2 * c2
-        one[..., 10] = v2**2 * c2 + u2 * s2
+        v12, v13, v1v, v22, vv, half = v1 * v2, v1 * v3, v1 * v, v2 * v2, v * v, 0.5 * u1
+        one[0][...] = u1 * (c2 * c2) - v12 * sin22
+        one[1][...] = half * sin22 + v12 * cos22
+        one[2][...] = (2 * a2) * ((u1 * cS - v13 * sS) * c2 - v12 * sin223)
+        one[3][...] = (-2 * a2) * ((u1 * sS + v13 * cS) * c2 + v12 * cos223)
+        one[4][...] = u1 * (cS * cS) - v1v * sin2S
+        one[5][...] = -half * sin2S - v1v * cos2S
+        one[6][...] = u1
+        one[7][...] = u * cS - vv * sS
+        one[8][...] = u * sS + vv * cS
+        one[9][...] = u2 * c2 - v22 * s2
+        one[10][...] = v22 * c2 + u2 * s2
 
-    def _fill_other_rows(self, two: Array, three: Array, trigonometry: tuple[Array, ...], dq: Array,
-                         ddq: Array) -> None:
+    def _fill_other_rows(self, two: _Rows, three: _Rows, trigonometry: tuple[Array, ...], doubled: tuple[Array, ...],
+                         dq: Array, ddq: Array) -> None:
+        """Row two, and of row three what differs from it: see `_SHARED`."""
         c2, s2, c3, s3, cS, sS = trigonometry
-        sin22, cos22, sin2S, cos2S, sin223, cos223 = _doubled(trigonometry)
-        v1, v2, v3 = np.moveaxis(dq, -1, 0)
-        u1, u2, u3 = np.moveaxis(ddq, -1, 0)
-        a2, g, half = self._a2, self._g, 0.5 * v1**2
-        turning, slanted = 0.5 * v3**2 + v2 * v3, u2 + 0.5 * u3
-        two[..., 0] = half * sin22
-        two[..., 1] = -half * cos22
-        two[..., 2] = 2 * a2 * (slanted * c3 - turning * s3 + half * sin223) + g * cS
-        two[..., 3] = 2 * a2 * (-slanted * s3 - turning * c3 + half * cos223) - g * sS
-        two[..., 4] = half * sin2S
-        two[..., 5] = half * cos2S
-        two[..., 7] = u1 * cS
-        two[..., 8] = u1 * sS
-        two[..., 9] = u1 * c2
-        two[..., 10] = u1 * s2
-        two[..., 11] = u2
-        two[..., 12] = u3
-        two[..., 13] = g * c2
-        two[..., 14] = -g * s2
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = doubled
+        v1, v2, v3 = dq
+        u1, u2, u3 = ddq
+        a2, g, half = self._a2, self._g, 0.5 * v1 * v1
+        turning, slanted, fore = 0.5 * v3 * v3 + v2 * v3, u2 + 0.5 * u3, half + v2 * v2
+        up3, up4, bent3, bent4 = g * cS, g * sS, half * sin223, half * cos223
+        np.multiply(half, sin22, out=two[0])
+        np.multiply(half, -cos22, out=two[1])
+        two[2][...] = (2 * a2) * (slanted * c3 - turning * s3 + bent3) + up3
+        two[3][...] = (2 * a2) * (bent4 - slanted * s3 - turning * c3) - up4
+        np.multiply(half, sin2S, out=two[4])
+        np.multiply(half, cos2S, out=two[5])
+        np.multiply(u1, cS, out=two[7])
+        np.multiply(u1, sS, out=two[8])
+        np.multiply(u1, c2, out=two[9])
+        np.multiply(u1, s2, out=two[10])
+        two[11][...] = u2
+        two[12][...] = u3
+        np.multiply(g, c2, out=two[13])
+        np.multiply(-g, s2, out=two[14])
 
-        three[..., 2] = a2 * ((half + v2**2) * s3 + c3 * u2 + half * sin223) + g * cS
-        three[..., 3] = a2 * ((half + v2**2) * c3 - s3 * u2 + half * cos223) - g * sS
-        three[..., [4, 5, 7, 8]] = two[..., [4, 5, 7, 8]]
-        three[..., 12] = u2 + u3
+        three[2][...] = a2 * (fore * s3 + c3 * u2 + bent3) + up3
+        three[3][...] = a2 * (fore * c3 - s3 * u2 + bent4) - up4
+        np.add(u2, u3, out=three[12])
 
     def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
         """τ (samples, 3) [N m]; `p` is (15,), or (samples, 15) where every sample has its own arm."""
@@ -176,7 +203,10 @@ class RRR:
 
     def _trigonometry(self, q: Array) -> tuple[Array, ...]:
         """cos and sin of q2, q3 and S; of S by the addition theorem, which costs a third of two more calls."""
-        q2, q3 = q[..., 1] + self._offset[1], q[..., 2] + self._offset[2]
+        return self._trigonometry_of(q[..., 1], q[..., 2])
+
+    def _trigonometry_of(self, q2: Array, q3: Array) -> tuple[Array, ...]:
+        q2, q3 = q2 + self._offset[1], q3 + self._offset[2]
         c2, s2, c3, s3 = np.cos(q2), np.sin(q2), np.cos(q3), np.sin(q3)
         return c2, s2, c3, s3, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
 

@@ -1,0 +1,167 @@
+"""What a log can show of the parameters, and what it cannot.
+
+    condition_number(statistics)         of Φ itself: no weights, no scaling
+    resolved_rank(solution)              directions that stand out of the noise
+    unresolved(solution, names)          which parameters cannot be separated, in words
+    hard_to_see(solution, names)         the weakest directions, strongest columns first
+    visible(value, std, typical)         parameters worth printing as a number
+    visibility(statistics, ...)          how much of a further column the model cannot absorb
+
+Directions are those of columns scaled to unit length: what one of them weighs is its torque, not its unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.fit.equations import Array
+from pipelines.fit.least_squares import Solution
+from pipelines.fit.statistics import Statistics
+
+__all__ = ["Direction", "Unresolved", "condition_number", "hard_to_see", "resolved_rank", "typical_size", "unresolved",
+           "visibility", "visible"]
+
+_WHOLE = 3.0  # a direction is lost if three standard deviations of it are as large as all that was measured
+_SURE = 3.0  # standard deviations that a value must stand from zero
+_SMALL = 0.05  # of the typical size: a value that is zero to within this is known to be nearly nothing
+_NAMED = 0.15  # share of a direction below which a column is not worth naming
+_INVOLVED = 1e-3  # share of an unresolved direction above which a parameter is not determined
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A combination of parameters, by the share that each column has in its torque."""
+
+    singular_value: float  # of columns of unit length; 1 is a column on its own
+    weights: tuple[tuple[str, float], ...]  # the largest first; squares of all shares sum to one
+
+    def __str__(self) -> str:
+        words = " ".join(f"{'-' if w < 0 else '+'} {abs(w):.2f} {name}" for name, w in self.weights)
+        return words.removeprefix("+ ")
+
+
+@dataclass(frozen=True)
+class Unresolved:
+    """Parameters of which the log shows too little."""
+
+    never_moved: tuple[str, ...]  # their columns are zero
+    confused: tuple[tuple[str, ...], ...]  # groups that cannot be separated
+    parameters: tuple[str, ...]  # all parameters without a trustworthy value, in order
+
+    def __bool__(self) -> bool:
+        return bool(self.parameters)
+
+    def __str__(self) -> str:
+        words = [f"no sample shows {', '.join(self.never_moved)}"] if self.never_moved else []
+        words += [f"{', '.join(group[:-1])} and {group[-1]} cannot be separated" if len(group) > 1
+                  else f"{group[0]} is lost in the noise" for group in self.confused]
+        return "; ".join(words)
+
+
+def condition_number(statistics: Statistics, columns: Sequence[int] | None = None) -> float:
+    """Largest over smallest singular value of Φ in SI units. Kostić et al. 2004, eq. (13)."""
+    a = statistics.root(np.ones(len(statistics.power)))[:, :-1]
+    s = np.linalg.svd(a if columns is None else a[:, list(columns)], compute_uv=False)
+    return float(s[0] / s[-1]) if s[-1] > statistics.floor * s[0] else float("inf")
+
+
+def resolved_rank(solution: Solution, inflation: float = 1.0) -> int:
+    """Number of directions in which the noise leaves something to see."""
+    return int(_resolved(solution, inflation).sum())
+
+
+def _resolved(solution: Solution, inflation: float) -> npt.NDArray[np.bool_]:
+    """A direction is resolved if its standard deviation is below a third of the whole signal.
+
+    With columns of unit length a direction's coordinate has the unit of √(Σ w y²), and a standard deviation 1/s of a
+    residual of unit variance: a direction in which even a third of all that was measured could hide is not seen.
+    `inflation` is how much the residual's memory adds.
+    """
+    e = solution.errors
+    signal = np.sqrt(np.sum(solution.weights * np.square(e.signal_rms)) * e.samples)
+    unit = np.sqrt(np.mean(solution.weights * np.square(solution.sigma)))
+    ok: npt.NDArray[np.bool_] = solution.singular_values * signal > _WHOLE * unit * inflation
+    return ok & (np.arange(len(ok)) < solution.rank)
+
+
+def unresolved(solution: Solution, names: Sequence[str], inflation: float = 1.0) -> Unresolved:
+    """Name what cannot be seen: columns that are zero, and groups of columns that only show together."""
+    lost = solution.directions[~_resolved(solution, inflation)]
+    involved = np.flatnonzero(np.any(np.abs(lost) > _INVOLVED, axis=0)) if len(lost) else np.zeros(0, dtype=int)
+    alone, groups = [], []
+    for vector in _sparse(lost):
+        group = np.flatnonzero(np.abs(vector) > _NAMED * np.abs(vector).max())
+        if len(group) == 1 and not solution.bread[group[0], group[0]] > 0.0:
+            alone.append(int(group[0]))
+        else:
+            groups.append(tuple(int(k) for k in group))
+    return Unresolved(tuple(names[k] for k in sorted(alone)), tuple(tuple(names[k] for k in g) for g in sorted(groups)),
+                      tuple(names[k] for k in involved))
+
+
+def _sparse(space: Array) -> Array:
+    """A basis of the same rows with as many zeros as rows: reduced row echelon form with the largest pivots."""
+    rows = space.copy()
+    for k in range(len(rows)):
+        i, j = np.unravel_index(int(np.argmax(np.abs(rows[k:]))), rows[k:].shape)
+        rows[[k, k + int(i)]] = rows[[k + int(i), k]]
+        rows[k] /= rows[k, j]
+        others = np.arange(len(rows)) != k
+        rows[others] -= rows[others, j, None] * rows[k]
+    return rows
+
+
+def hard_to_see(solution: Solution, names: Sequence[str], count: int = 3) -> tuple[Direction, ...]:
+    """The `count` weakest directions, the weakest first."""
+    found = []
+    for s, v in list(zip(solution.singular_values, solution.directions, strict=True))[::-1][:count]:
+        order = [int(k) for k in np.argsort(-np.abs(v), kind="stable")]
+        sign = np.sign(v[order[0]])
+        found.append(Direction(float(s), tuple((names[k], float(sign * v[k])) for k in order if abs(v[k]) >= _NAMED)))
+    return tuple(found)
+
+
+def typical_size(value: Array, std: Array, groups: Sequence[str]) -> Array:
+    """For each parameter the root mean square of those of its group (its unit, say) that stand out of their noise."""
+    typical = np.zeros(len(value))
+    sure = np.isfinite(std) & (np.abs(value) > _SURE * std)
+    for group in set(groups):
+        members = np.array([other == group for other in groups])
+        known = value[members & sure]
+        typical[members] = np.sqrt(np.mean(np.square(known))) if len(known) else 0.0
+    return typical
+
+
+def visible(value: Array, std: Array, typical: Array | None = None) -> npt.NDArray[np.bool_]:
+    """Whether each parameter is visible: its value is known to a third, or known to be small.
+
+    |value| > 3 std, or std ≤ 5 % of `typical`, the size of its like: a parameter that is truly zero never stands out of
+    its noise, and is yet well known where that noise is small.
+    """
+    known = np.isfinite(std) & (np.abs(value) > _SURE * std)
+    if typical is not None:
+        known |= (typical > 0.0) & (std <= _SMALL * typical)
+    return known
+
+
+def visibility(statistics: Statistics, weights: Array, nominal: Sequence[int], extra: Sequence[int]) -> Array:
+    """η = ‖c⊥‖/‖c‖ of each extra column c, c⊥ being what the nominal columns cannot absorb; 0 where c is zero.
+
+    From the triangular factor: with the nominal columns first, what stands below their triangle is c⊥.
+    """
+    a = statistics.root(weights)[:, :-1]
+    q, _ = np.linalg.qr(_unit_columns(a[:, list(nominal)]))
+    c = a[:, list(extra)]
+    length = np.linalg.norm(c, axis=0)
+    rest = c - q @ (q.T @ c)
+    rest -= q @ (q.T @ rest)
+    return np.asarray(np.linalg.norm(rest, axis=0) / np.where(length > 0.0, length, 1.0))
+
+
+def _unit_columns(a: Array) -> Array:
+    length = np.linalg.norm(a, axis=0)
+    return np.asarray(a[:, length > 0.0] / length[length > 0.0])
