@@ -130,7 +130,7 @@ def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings)
                             remedy="give the description of this robot, or choose the columns with --joints")
         return Subject(log), [mismatch]
     subject = Subject(log if robot is None else replace(log, robot_text=format_robot(robot)))
-    checks = [check for check in check_log(subject) if not (settings.trust_units and check.code == "RRID-S07")]
+    checks = [*check_log(subject, ("RRID-S07",) if settings.trust_units else ())]
     if not any(check.level == "reject" for check in checks):
         try:
             checks += plausibility(subject)
@@ -141,7 +141,7 @@ def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings)
 
 def _summary(opened: Opened, subject: Subject, checks: Iterable[Check]) -> LogSummary:
     log, good = subject.log, subject.good if subject.sampled else None
-    t = good.log.t if good else log.t
+    t = good.log.t if good else log.t[np.abs(log.t) < 1e20]
     time = good.time if good else None
     gaps = tuple((float(log.t[k]) * time.scale, float(log.t[k + 1]) * time.scale) for k in time.gaps) if time else ()
     levels = [check.level for check in checks]
@@ -233,18 +233,15 @@ def _passed_section(result: Result) -> Section:
 
 
 def _logs_section(result: Result) -> Section:
-    rows = tuple((log.name, log.experiment if log.moving_joint is None else f"{log.experiment}, joint "
-                   f"{log.moving_joint}", log.role, log.joints,
-                  log.samples, log.duration, 1.0 / log.sample_time, log.integrity) for log in result.logs)
-    return Section("The logs", (), (Table(("name", "experiment", "role", "joints", "samples", "duration [s]",
-                                           "rate [Hz]", "integrity"), rows,
-                                          tones=tuple(level_tone([log.verdict]) for log in result.logs)),
-                                          ))
+    columns = ("name", "experiment", "role", "joints", "samples", "duration [s]", "rate [Hz]", "integrity")
+    rows = tuple((log.name, log.experiment if log.moving_joint is None else f"{log.experiment}, joint {log.moving_joint}",
+                  log.role, log.joints, log.samples, log.duration, 1.0 / log.sample_time, log.integrity) for log in result.logs)
+    return Section("The logs", (), (Table(columns, rows, tones=tuple(level_tone([log.verdict]) for log in result.logs)),))
 
 
 def _log_section(log: LogSummary, preview: Preview) -> Section:
-    ranges = Table(("signal", "joint", "lowest", "highest", "unit"), tuple((r.signal, r.joint, r.low, r.high,
-                                                                            r.unit) for r in log.ranges))
+    ranges = Table(("signal", "joint", "lowest", "highest", "unit"),
+                   tuple((r.signal, r.joint, r.low, r.high, r.unit) for r in log.ranges))
     uneven = log.jitter > 1e-3 or log.dropped_samples > 0 or bool(log.gaps)
     steps = ", ".join("not visible" if step is None else f"{step:.3g}" for step in log.encoder_step)
     text = (f"{log.usable_samples} of {log.samples} samples can be used. Encoder steps [rad]: {steps}. SHA-256 {log.sha256[:16]}…",)

@@ -29,15 +29,26 @@ LogCheck = Callable[[Subject], list[Check]]
 CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, MOTION_BAND, *SIGNAL_CHECKS, *MOTION_CHECKS)
 
 
-def check_log(log: ExperimentLog | Subject) -> tuple[Check, ...]:
-    """Everything the doctor has to say about one log."""
+# What follows from an input that is rejected for another reason is not worth a word of its own.
+_CONSEQUENCES: Final = {
+    "RRID-D04": ("D11", "S16"),
+    "RRID-S07": ("D06", "D08", "D11", "D12", "D16", "S16"),
+    "RRID-S08": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),
+    "RRID-S09": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),
+}
+
+
+def check_log(log: ExperimentLog | Subject, trusted: tuple[str, ...] = ()) -> tuple[Check, ...]:
+    """Everything the doctor has to say about one log, but what the user vouches for: codes in `trusted`."""
     subject = log if isinstance(log, Subject) else Subject(log)
     if subject.log.n_samples < 2:
         return tuple(TIME_CHECKS[0](subject))
     if subject.planned:
         return ()  # a plan has neither clock nor sensors
     checks = CHECKS if subject.sampled else TIME_CHECKS
-    return tuple(found for check in checks for found in check(subject))
+    found = [found for check in checks for found in check(subject) if found.code not in trusted]
+    follows = {f"RRID-{code}" for check in found if check.level == "reject" for code in _CONSEQUENCES.get(check.code, ())}
+    return tuple(check for check in found if check.level == "ok" or check.code not in follows)
 
 
 def check_together(opened: Sequence[Opened], subjects: Sequence[Subject]) -> tuple[Check, ...]:
@@ -54,7 +65,9 @@ def _leaks(opened: Iterable[Opened]) -> list[Check]:
     for group in copies.values():
         names = ", ".join(one.path.name for one in group)
         if len(group) > 1:
-            found.append(Check.of("D14", "warn", f"the same file {len(group)} times: {names}", where=group[0].path,
+            found.append(Check.of("D14", "warn",
+                                  f"the same file {len(group)} times: {names}",
+                                  where=group[0].path,
                                   remedy="keep one of them; a copy counts twice in a fit"))
     content: dict[bytes, list[Opened]] = defaultdict(list)
     for one in opened:
@@ -63,9 +76,10 @@ def _leaks(opened: Iterable[Opened]) -> list[Check]:
     for group in content.values():
         roles = sorted({one.log.role for one in group})
         if len(roles) > 1:
-            found.append(Check.of("D14", "reject", f"leak: {', '.join(one.path.name for one in group)} hold the same "
-                           f"samples with roles "
-                                  f"{' and '.join(roles)}", where=group[0].path, gate=True,
+            found.append(Check.of("D14", "reject",
+                                  f"leak: {', '.join(one.path.name for one in group)} hold the same samples with roles "
+                                  f"{' and '.join(roles)}",
+                                  where=group[0].path, gate=True,
                                   remedy="judge on another recording; a fit always explains what it was made from"))
     return found
 
@@ -81,8 +95,10 @@ def _names(opened: Iterable[Opened]) -> list[Check]:
     named: dict[tuple[str, str], list[Opened]] = defaultdict(list)
     for one in opened:
         named[str(one.path.parent), one.log.name].append(one)
-    return [Check.of("S21", "warn", f"{len(group)} logs are named '{name}': {', '.join(one.path.name for one in group)}",
-                     where=folder, remedy="give each log of a folder a name of its own")
+    return [Check.of("S21", "warn",
+                     f"{len(group)} logs are named '{name}': {', '.join(one.path.name for one in group)}",
+                     where=folder,
+                     remedy="give each log of a folder a name of its own")
             for (folder, name), group in named.items() if len(group) > 1 and len({one.sha256 for one in group}) > 1]
 
 
@@ -96,8 +112,9 @@ def _one_way_friction(subjects: Iterable[Subject]) -> list[Check]:
     found = []
     for (_, joint), members in groups.items():
         if max(up for _, up, _ in members) < 0.02 or max(down for _, _, down in members) < 0.02:
-            found.append(members[0][0].say("D10", "warn", f"the speed of joint {joint + 1} never changes sign in its "
-                           f"friction logs: Coulomb offset "
-                                           f"unidentifiable joint {joint + 1}", signal="q", joint=joint, gate=True,
+            found.append(members[0][0].say("D10", "warn",
+                                           f"the speed of joint {joint + 1} never changes sign in its friction logs: "
+                                           f"Coulomb offset unidentifiable joint {joint + 1}",
+                                           signal="q", joint=joint, gate=True,
                                            remedy="record the joint in both directions"))
     return found

@@ -7,7 +7,8 @@ import numpy as np
 from pipelines.errors import Check
 from pipelines.log.checks_subject import Subject, spread
 from pipelines.log.experiment import Array
-from pipelines.log.faults import emergency_stop, lagged_speed
+from pipelines.log.faults import lagged_speed
+from pipelines.log.stop import emergency_stop
 
 __all__ = ["MOTION_CHECKS", "both_ways"]
 
@@ -29,9 +30,11 @@ def degrees(s: Subject) -> list[Check]:
         beyond = reach > 2.0 * bounds or speed[j] > 3.0 * joint.velocity
         fits = reach * _DEGREE <= 1.1 * bounds and speed[j] * _DEGREE <= 1.1 * joint.velocity
         if reach > 4.0 * np.pi and beyond and fits:
-            found.append(s.say("S07", "reject", f"q of joint {j + 1} is declared in rad, but looks like degrees: it reaches "
-                               f"{reach:.4g} at up to {speed[j]:.4g} a second, beyond the limits in rad and within them in deg",
-                               signal="q", joint=j, remedy="declare the unit deg, or pass --trust-units"))
+            found.append(s.say("S07", "reject",
+                               f"q of joint {j + 1} is declared in rad, but looks like degrees: it reaches {reach:.4g} at "
+                               f"up to {speed[j]:.4g} a second, beyond the limits in rad and within them in deg",
+                               signal="q", joint=j,
+                               remedy="declare the unit deg, or pass --trust-units"))
     travel = ", ".join(f"{v:.3g}" for v in s.travel)
     return found or s.ok("S07", f"angles: {travel} rad of travel, speeds as the limits allow", signal="q")
 
@@ -54,14 +57,17 @@ def limits(s: Subject) -> list[Check]:
         margin = 0.01 * (joint.position[1] - joint.position[0]) if np.isfinite(joint.position).all() else 0.01
         over = max(float(q.max()) - joint.position[1], joint.position[0] - float(q.min()))
         if over > margin:
-            found.append(s.say("D12", "warn", f"the position goes {over:.3g} {s.unit('q', j)} beyond its limits "
-                               f"{list(joint.position)}", signal="q", joint=j, remedy="correct the limits, or the joint's zero"))
+            found.append(s.say("D12", "warn",
+                               f"the position goes {over:.3g} {s.unit('q', j)} beyond its limits {list(joint.position)}",
+                               signal="q", joint=j,
+                               remedy="correct the limits, or the joint's zero"))
         for value, limit, what, unit in ((speed[j], joint.velocity, "speed", s.unit("dq", j)),
                                          (acceleration[j], joint.acceleration, "acceleration", s.unit("ddq_ref", j))):
             if value > 1.1 * limit:
-                found.append(s.say("D12", "warn", f"the {what} reaches {value:.4g} {unit}, {value / limit:.3g} times "
-                               f"its limit", signal="q",
-                                   joint=j, gate=value > 1.5 * limit, remedy="move slower, or correct the limit"))
+                found.append(s.say("D12", "warn",
+                                   f"the {what} reaches {value:.4g} {unit}, {value / limit:.3g} times its limit",
+                                   signal="q", joint=j, gate=value > 1.5 * limit,
+                                   remedy="move slower, or correct the limit"))
     return found or s.ok("D12", "within the limits; speed at most " + ", ".join(f"{v:.3g}" for v in speed) + " rad/s, acceleration "
                          + ", ".join(f"{v:.3g}" for v in acceleration) + " rad/s^2", signal="q")
 
@@ -71,7 +77,7 @@ def _peak_acceleration(s: Subject) -> Array:
     peaks = [np.zeros(s.log.n_joints)]
     m = max(2, round(0.02 / s.log.sample_time))
     for run in s.good.runs if s.good.time.known else ():
-        q = s.position[run]
+        q = np.where(np.isfinite(s.position[run]).any(axis=0), s.position[run], 0.0)
         if len(q) <= 4 * m:
             continue
         second = np.abs(q[2 * m:] - 2.0 * q[m:-m] + q[:-2 * m]) / (m * s.log.sample_time) ** 2
@@ -89,9 +95,10 @@ def held_joints(s: Subject) -> list[Check]:
         return []
     mover = None if log.joint is None else log.joint - 1
     allowed = 0.05 if mover is None else max(0.05, 0.1 * float(s.travel[mover]))
-    found = [s.say("D16", "warn", f"joint {j + 1} moves by {s.travel[j]:.3g} {s.unit('q', j)} in a {log.experiment} "
-                                  f"log that holds it",
-                   signal="q", joint=j, remedy="hold it stiffer, or call the experiment 'free'", gate=True)
+    found = [s.say("D16", "warn",
+                   f"joint {j + 1} moves by {s.travel[j]:.3g} {s.unit('q', j)} in a {log.experiment} log that holds it",
+                   signal="q", joint=j, gate=True,
+                   remedy="hold it stiffer, or call the experiment 'free'")
              for j in range(log.n_joints) if j != mover and s.travel[j] > allowed]
     return found or s.ok("D16", "held joints move by at most " + format(max(
         (float(s.travel[j]) for j in range(log.n_joints) if j != mover), default=0.0), ".3g") + " rad", signal="q")
@@ -113,12 +120,12 @@ def follows_reference(s: Subject) -> list[Check]:
         share = float(np.std(error)) / max(float(np.std(reference[ok])), 1e-12)
         seen.append(f"{100 * share:.2g} %")
         if share > 0.5:
-            found.append(s.say("S16", "reject" if share > 0.8 else "warn", f"position and reference differ by "
-                               f"{100 * share:.0f} % of the motion "
-                               f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): they are not of the same run, or "
-                               f"not of the same joint",
-                               signal="q_ref", joint=int(j), gate=True, remedy="log both in one recorder, or leave "
-                               "the reference out"))
+            found.append(s.say("S16", "reject" if share > 0.8 else "warn",
+                               f"position and reference differ by {100 * share:.0f} % of the motion "
+                               f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): they are not of the same run, or not "
+                               "of the same joint",
+                               signal="q_ref", joint=int(j), gate=True,
+                               remedy="log both in one recorder, or leave the reference out"))
     within = f" within {', '.join(seen)} of the motion" if seen else ""
     return found or s.ok("S16", f"the position follows its reference{within}", signal="q_ref")
 
@@ -129,9 +136,10 @@ def stopped(s: Subject) -> list[Check]:
     if event is None:
         return s.ok("D11", "no emergency stop, no lost reference")
     sample, how = event
-    return [s.say("D11", "warn", f"emergency stop or tracking failure: {how}; samples from there on are left out",
-                  gate=sample < s.log.n_samples / 2,
-                  sample=int(s.good.kept[sample]), remedy="look what stopped the arm, and record again")]
+    return [s.say("D11", "warn",
+                  f"emergency stop or tracking failure: {how}; samples from there on are left out",
+                  gate=sample < s.log.n_samples / 2, sample=int(s.good.kept[sample]),
+                  remedy="look what stopped the arm, and record again")]
 
 
 def both_ways(s: Subject) -> dict[int, tuple[float, float]]:
@@ -153,9 +161,10 @@ def direction(s: Subject) -> list[Check]:
     if s.log.experiment != "excitation":
         return []
     one_way = [j for j, (up, down) in both_ways(s).items() if min(up, down) < 0.02]
-    found = [s.say("D10", "warn", f"the speed of joint {j + 1} never changes sign: its Coulomb friction cannot be "
-                                  f"told from a torque offset",
-                   signal="q", joint=j, remedy="move the joint in both directions", gate=True) for j in one_way]
+    found = [s.say("D10", "warn",
+                   f"the speed of joint {j + 1} never changes sign: its Coulomb friction cannot be told from a torque offset",
+                   signal="q", joint=j, gate=True,
+                   remedy="move the joint in both directions") for j in one_way]
     return found or s.ok("D10", "every joint moves in both directions", signal="q")
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from pipelines.errors import Check
 from pipelines.log.checks_subject import Subject, spread
-from pipelines.log.faults import GAP_LIMIT, jumps, sentinels, torque_limit
-from pipelines.log.segments import long_blocks, unwrapped
+from pipelines.log.faults import GAP_LIMIT, sentinels, torque_limit
+from pipelines.log.segments import long_blocks
 
 __all__ = ["SIGNAL_CHECKS"]
 
@@ -26,17 +26,22 @@ def missing_samples(s: Subject) -> list[Check]:
             blocks = long_blocks(column)
             if total > _HALF * column.size:
                 words = f"{total} of {column.size} samples are missing" if total < column.size else "there is no measurement at all"
-                found.append(s.say("D02", "reject", f"{name} of joint {j + 1}: {words}", signal=name, joint=j, sample=first,
+                found.append(s.say("D02", "reject",
+                                   f"{name} of joint {j + 1}: {words}",
+                                   signal=name, joint=j, sample=first,
                                    remedy="look at this channel's cable and its place in the recorder, and record again"))
             elif blocks:
-                found.append(s.say("D02", "repair", f"{total} samples of {name} are missing, {len(blocks)} times more "
-                               f"than {GAP_LIMIT} in a "
-                                   "row; the log is split there", signal=name, joint=j, sample=first,
+                found.append(s.say("D02", "repair",
+                                   f"{total} samples of {name} are missing, {len(blocks)} times more than {GAP_LIMIT} in a "
+                                   "row; the log is split there",
+                                   signal=name, joint=j, sample=first,
                                    remedy="look at this channel's cable, and record again"))
             else:
-                found.append(s.say("D01", "repair", f"{total} samples of {name} are missing, never more than {GAP_LIMIT} in a row; "
-                                   "treated as not measured", signal=name, joint=j, sample=first, remedy="none needed "
-                                   "if they stay few"))
+                found.append(s.say("D01", "repair",
+                                   f"{total} samples of {name} are missing, never more than {GAP_LIMIT} in a row; treated "
+                                   "as not measured",
+                                   signal=name, joint=j, sample=first,
+                                   remedy="none needed if they stay few"))
     return found or s.ok("D01", "no sample of q or tau is missing")
 
 
@@ -55,10 +60,10 @@ def absurd_samples(s: Subject) -> list[Check]:
             values = ", ".join(f"{v:g}" for v in np.unique(signal.values[which[:1000], j])[:4])
             few = which.size <= _FEW * s.log.n_samples
             at = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
-            found.append(s.say("D03", "repair" if few else "reject", f"{which.size} samples of {name} hold {values}, "
-                               f"which is no measurement"
-                               f" (samples {at})" + ("; treated as missing" if few else ""), signal=name, joint=j,
-                               sample=int(which[0]),
+            then = "; treated as missing" if few else ""
+            found.append(s.say("D03", "repair" if few else "reject",
+                               f"{which.size} samples of {name} hold {values}, which is no measurement (samples {at}){then}",
+                               signal=name, joint=j, sample=int(which[0]),
                                remedy="mark what was not measured as NaN, or look at the sensor"))
     return found or s.ok("D03", "no infinite, astronomical or filler value")
 
@@ -76,13 +81,15 @@ def dead_channels(s: Subject) -> list[Check]:
             continue  # D02 has said so
         asked = j in s.moving or reference[j] > 0.01
         if s.travel[j] == 0.0 and asked and log.experiment != "hold":
-            found.append(s.say("D04", "reject", f"q of joint {j + 1} is constant "
-                               f"({log.q[np.isfinite(log.q[:, j]), j][0]:.6g})", signal="q",
-                               joint=j, remedy="look at this encoder and its place in the recorder, and record again"))
+            found.append(s.say("D04", "reject",
+                               f"q of joint {j + 1} is constant ({log.q[np.isfinite(log.q[:, j]), j][0]:.6g})",
+                               signal="q", joint=j,
+                               remedy="look at this encoder and its place in the recorder, and record again"))
         if torque[j] == 0.0 and (j in s.moving or s.travel[j] > 0.1) and (finite[0] == 0.0 or not open_loop):
-            found.append(s.say("D04", "reject", f"tau of joint {j + 1} is constant ({finite[0]:.6g}) while the joint "
-                               f"moves", signal="tau",
-                               joint=j, remedy="look at this channel of the recorder, and record again"))
+            found.append(s.say("D04", "reject",
+                               f"tau of joint {j + 1} is constant ({finite[0]:.6g}) while the joint moves",
+                               signal="tau", joint=j,
+                               remedy="look at this channel of the recorder, and record again"))
     return found or s.ok("D04", "every channel that has to move does")
 
 
@@ -95,9 +102,10 @@ def saturation(s: Subject) -> list[Check]:
         level = float(np.nanmin(np.abs(s.good.log.tau[flags[:, j], j])))
         described = torque_limit(s.log)[j]
         limit = f"the described limit of {described:.4g}" if level >= 0.99 * described else f"a flat top at {level:.4g}"
-        found.append(s.say("D05", "warn", f"{100 * share:.2g} % of the torque samples lie at {limit} "
-                                          f"{s.unit('tau', j)}; they are left out of "
-                           "fits", signal="tau", joint=j, sample=int(s.good.kept[np.argmax(flags[:, j])]), gate=share > 0.05,
+        found.append(s.say("D05", "warn",
+                           f"{100 * share:.2g} % of the torque samples lie at {limit} {s.unit('tau', j)}; they are left out "
+                           "of fits",
+                           signal="tau", joint=j, sample=int(s.good.kept[np.argmax(flags[:, j])]), gate=share > 0.05,
                            remedy="move slower or with less acceleration; a saturated drive hides what the arm needs"))
     if found:
         return found
@@ -111,8 +119,8 @@ def glitches(s: Subject) -> list[Check]:
     for name, flags in (("q", s.good.position_spikes), ("tau", s.good.torque_spikes)):
         for j in np.flatnonzero(flags.any(axis=0)).tolist():
             which = np.flatnonzero(flags[:, j])
-            found.append(s.say("D06", "repair", f"{which.size} samples of {name} stand out of their neighbours as no "
-                               f"motion does; left out",
+            found.append(s.say("D06", "repair",
+                               f"{which.size} samples of {name} stand out of their neighbours as no motion does; left out",
                                signal=name, joint=j, sample=int(s.good.kept[which[0]]),
                                remedy="look at the shielding of the encoder and at the recorder's transmission"))
     return found or s.ok("D06", "no sample stands out of its neighbours")
@@ -120,24 +128,21 @@ def glitches(s: Subject) -> list[Check]:
 
 def wraps(s: Subject) -> list[Check]:
     """D07: the position does not jump, by a turn or otherwise."""
-    log = s.good.log
-    recorded = s.log.q[s.good.kept]
-    shifted = np.abs(np.diff(np.where(np.isfinite(recorded), recorded - log.q, 0.0), axis=0)) > 1e-6
-    found = []
-    for j in np.flatnonzero(shifted.any(axis=0)).tolist():
-        at = np.flatnonzero(shifted[:, j])
-        size = abs(float(recorded[at[0] + 1, j] - log.q[at[0] + 1, j]) - float(recorded[at[0], j] - log.q[at[0], j]))
-        found.append(s.say("D07", "warn",
-                           f"the encoder wraps {at.size} times by {size:.6g} {s.unit('q', j)}; unwrapped", signal="q", joint=j,
-                           sample=int(s.good.kept[at[0] + 1]), remedy="let the recorder count turns"))
-    left, size_left = jumps(log.q, log.robot.revolute)
-    if unwrapped(log)[1].any():
-        for j in np.flatnonzero(left.any(axis=0)).tolist():
-            at = np.flatnonzero(left[:, j])
-            found.append(s.say("D07", "warn", f"the position jumps {at.size} times, first by "
-                               f"{size_left[at[0], j]:.4g} {s.unit('q', j)}, which is "
-                               "no turn and no counter's range; the log is split there", signal="q", joint=j,
-                               sample=int(s.good.kept[at[0] + 1]), remedy="look at the encoder: it loses counts", gate=True))
+    found, wrapped, jumped = [], np.diff(s.good.wrapped, axis=0), s.good.jumped
+    for j in range(s.log.n_joints):
+        unit = s.unit("q", j)
+        if (at := np.flatnonzero(wrapped[:, j])).size:
+            found.append(s.say("D07", "warn",
+                               f"the encoder wraps {at.size} times by {abs(wrapped[at[0], j]):.6g} {unit}; unwrapped",
+                               signal="q", joint=j, sample=int(s.good.kept[at[0] + 1]),
+                               remedy="let the recorder count turns"))
+        if (at := np.flatnonzero(jumped[:, j])).size:
+            by = s.good.log.q[at[0], j] - s.good.log.q[at[0] - 1, j]
+            found.append(s.say("D07", "warn",
+                               f"the position jumps {at.size} times, first by {by:.4g} {unit}, which is no turn and no "
+                               "counter's range; the log is split there",
+                               signal="q", joint=j, sample=int(s.good.kept[at[0]]), gate=True,
+                               remedy="look at the encoder: it loses counts"))
     return found or s.ok("D07", "the position neither wraps nor jumps", signal="q")
 
 
@@ -154,9 +159,10 @@ def resolution(s: Subject) -> list[Check]:
         too_coarse = step > 1.5 * declared if declared else s.travel[j] < 1000.0 * step
         if too_coarse and np.unique(s.good.log.q[np.isfinite(s.good.log.q[:, j]), j]).size >= 50:
             said = f"the description says {declared:.3g}" if declared else f"only {s.travel[j] / step:.0f} steps in all"
-            found.append(s.say("D08", "warn", f"the encoder counts in steps of {step:.3g} {s.unit('q', j)}, {said}; "
-                               f"noise is set to "
-                               f"R = δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}^2 from the data", signal="q", joint=j,
+            found.append(s.say("D08", "warn",
+                               f"the encoder counts in steps of {step:.3g} {s.unit('q', j)}, {said}; noise is set to R = "
+                               f"δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}^2 from the data",
+                               signal="q", joint=j,
                                remedy="correct encoder_resolution, or look for bits lost on the way"))
     return found or s.ok("D08", f"encoder steps: {', '.join(seen)}", signal="q")
 

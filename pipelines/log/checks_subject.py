@@ -13,7 +13,7 @@ from pipelines.log.faults import quantum
 from pipelines.log.schema import joint_unit
 from pipelines.log.segments import Usable, usable
 
-__all__ = ["MIN_SAMPLES", "Subject"]
+__all__ = ["MIN_SAMPLES", "Subject", "spread"]
 
 MIN_SAMPLES = 20  # fewer samples have no statistics; T08 says so and the checks of signals stay silent
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from pipelines.errors import Check
 from pipelines.log.checks_subject import MIN_SAMPLES, Subject
-from pipelines.log.experiment import Array
 from pipelines.log.faults import GAP_LIMIT
 from pipelines.log.segments import SHORTEST
 
@@ -20,15 +19,21 @@ def length(s: Subject) -> list[Check]:
     """T08, T07: there are samples, and a periodic log holds a whole period."""
     log = s.log
     if log.n_samples < 2:
-        return [s.say("T08", "reject", f"{log.n_samples} samples", signal="t", remedy="record again; a log of one "
-                       "sample shows no motion")]
+        return [s.say("T08", "reject",
+                      f"{log.n_samples} samples",
+                      signal="t",
+                      remedy="record again; a log of one sample shows no motion")]
     if log.n_samples < MIN_SAMPLES:
-        return [s.say("T08", "reject", f"{log.n_samples} samples, fewer than the {MIN_SAMPLES} that any check needs", signal="t",
+        return [s.say("T08", "reject",
+                      f"{log.n_samples} samples, fewer than the {MIN_SAMPLES} that any check needs",
+                      signal="t",
                       remedy="record a longer log")]
     time = s.good.log.t
     duration = float(time.max() - time.min()) + log.sample_time if time.size else 0.0
     if log.period is not None and duration < log.period * (1 - 1e-6) - 0.5 * log.sample_time:
-        return [s.say("T07", "reject", f"{duration:.4g} s < {log.period:.4g} s period", signal="t",
+        return [s.say("T07", "reject",
+                      f"{duration:.4g} s < {log.period:.4g} s period",
+                      signal="t",
                       remedy="record at least one whole period, or correct the attribute period")]
     whole = "" if log.period is None else f", {duration / log.period:.3g} periods"
     return s.ok("T07", f"{log.n_samples} samples in {duration:.4g} s{whole}", signal="t")
@@ -40,18 +45,25 @@ def unit_of_time(s: Subject) -> list[Check]:
         return []
     time, nominal = s.good.time, s.log.sample_time
     if time.is_rate:
-        return [s.say("S09", "reject", f"sample_time is {nominal:.6g}, the steps of t are {time.median:.6g} s: it holds the rate "
-                      "in Hz, not the period", signal="t", remedy=f"write sample_time = {1.0 / nominal:.6g}")]
+        return [s.say("S09", "reject",
+                      f"sample_time is {nominal:.6g}, the steps of t are {time.median:.6g} s: it holds the rate in Hz, not "
+                      "the period",
+                      signal="t",
+                      remedy=f"write sample_time = {1.0 / nominal:.6g}")]
     if not time.unit:
-        return [s.say("S08", "reject", f"t steps by {time.median:.6g}, sample_time is {nominal:.6g} s, and no unit of time makes "
-                      "them the same", signal="t", remedy="correct sample_time, or import the recording with the unit "
-                      "of its time column")]
+        return [s.say("S08", "reject",
+                      f"t steps by {time.median:.6g}, sample_time is {nominal:.6g} s, and no unit of time makes them the "
+                      "same",
+                      signal="t",
+                      remedy="correct sample_time, or import the recording with the unit of its time column")]
     if time.unit == "s":
         return s.ok("S08", f"t steps by {time.median:.6g} s, as sample_time says", signal="t")
     what = "sample numbers" if time.unit == "samples" else f"in {time.unit}"
-    return [s.say("S08", "repair", f"t is declared in s, but is {what}: it steps by {time.median / time.scale:.6g} "
-                                   f"where sample_time "
-                  f"is {nominal:.6g} s; read as that", signal="t", remedy="import the recording with the unit of its time column")]
+    return [s.say("S08", "repair",
+                  f"t is declared in s, but is {what}: it steps by {time.median / time.scale:.6g} where sample_time is "
+                  f"{nominal:.6g} s; read as that",
+                  signal="t",
+                  remedy="import the recording with the unit of its time column")]
 
 
 def order(s: Subject) -> list[Check]:
@@ -59,8 +71,10 @@ def order(s: Subject) -> list[Check]:
     time, found = s.good.time, []
     if time.undefined.size:
         found.append(s.say("D01", "repair" if time.undefined.size <= 0.01 * s.log.n_samples else "reject",
-                           f"{time.undefined.size} time stamps are not numbers, the first is sample {time.undefined[0]}; left out",
-                           signal="t", remedy="look why the recorder lost its clock there"))
+                           f"{time.undefined.size} time stamps are no times, the first is sample {time.undefined[0]}; left "
+                           "out",
+                           signal="t",
+                           remedy="look why the recorder lost its clock there"))
     if time.steps.size:
         k = int(time.steps[0])
         back = (s.log.t[k] - s.log.t[k + 1]) * time.scale
@@ -68,7 +82,8 @@ def order(s: Subject) -> list[Check]:
         then = "" if much else "; the log is split there"
         found.append(s.say("T01", "reject" if much else "repair",
                            f"time steps back {time.steps.size} times, first by {back:.4g} s{then}",
-                           signal="t", sample=k + 1, remedy="record with a monotonic clock, not with the time of day"))
+                           signal="t", sample=k + 1,
+                           remedy="record with a monotonic clock, not with the time of day"))
     return found or s.ok("T01", "time runs forward throughout", signal="t")
 
 
@@ -76,11 +91,15 @@ def repeated_stamps(s: Subject) -> list[Check]:
     """T02: no stamp stands twice."""
     time = s.good.time
     if time.conflicting.size:
-        return [s.say("T02", "reject", f"{time.conflicting.size} stamps stand twice with different values", signal="t",
-                      sample=int(time.conflicting[0]) + 1, remedy="record with a clock that resolves a sample")]
+        return [s.say("T02", "reject",
+                      f"{time.conflicting.size} stamps stand twice with different values",
+                      signal="t", sample=int(time.conflicting[0]) + 1,
+                      remedy="record with a clock that resolves a sample")]
     if time.repeated.size:
-        return [s.say("T02", "repair", f"{time.repeated.size} samples stand twice, stamp and all; dropped", signal="t",
-                      sample=int(time.repeated[0]) + 1, remedy="look why the recorder wrote them twice")]
+        return [s.say("T02", "repair",
+                      f"{time.repeated.size} samples stand twice, stamp and all; dropped",
+                      signal="t", sample=int(time.repeated[0]) + 1,
+                      remedy="look why the recorder wrote them twice")]
     return s.ok("T02", "every stamp stands once", signal="t")
 
 
@@ -90,9 +109,10 @@ def lost_samples(s: Subject) -> list[Check]:
     if not time.dropped.size:
         return s.ok("T03", "no sample dropped", signal="t")
     share = 100.0 * time.dropped_samples / (s.log.n_samples + time.dropped_samples)
-    return [s.say("T03", "warn", f"{time.dropped_samples} samples ({share:.2g} %) dropped at {time.dropped.size} "
-                                 f"places; the observer "
-                  "predicts through them, nothing is interpolated", signal="t", sample=int(time.dropped[0]),
+    return [s.say("T03", "warn",
+                  f"{time.dropped_samples} samples ({share:.2g} %) dropped at {time.dropped.size} places; the observer "
+                  "predicts through them, nothing is interpolated",
+                  signal="t", sample=int(time.dropped[0]),
                   remedy="give the recorder more priority, or record fewer signals")]
 
 
@@ -104,11 +124,14 @@ def gaps(s: Subject) -> list[Check]:
     longest = max((run.stop - run.start for run in runs), default=0)
     words = f"{time.gaps.size} gaps of more than {GAP_LIMIT} samples, {time.gap_lengths.sum():.4g} s together"
     if not runs:
-        return [s.say("T04", "reject", f"{words}; no stretch between them has {SHORTEST} samples", signal="t",
-                      sample=int(time.gaps[0]),
+        return [s.say("T04", "reject",
+                      f"{words}; no stretch between them has {SHORTEST} samples",
+                      signal="t", sample=int(time.gaps[0]),
                       remedy="record again without interruption")]
-    return [s.say("T04", "repair", f"{words}; {len(runs)} stretches are used, the longest of {longest} samples", signal="t",
-                  sample=int(time.gaps[0]), remedy="look why the recorder stopped there")]
+    return [s.say("T04", "repair",
+                  f"{words}; {len(runs)} stretches are used, the longest of {longest} samples",
+                  signal="t", sample=int(time.gaps[0]),
+                  remedy="look why the recorder stopped there")]
 
 
 def jitter(s: Subject) -> list[Check]:
@@ -117,7 +140,9 @@ def jitter(s: Subject) -> list[Check]:
     words = f"the interval varies by {100 * time.jitter:.3g} % of the sample time (rms), at most by {100 * time.worst:.3g} %"
     if time.jitter <= _LARGEST_JITTER:
         return s.ok("T05", words, signal="t")
-    return [s.say("T05", "warn", f"{words}, more than {100 * _LARGEST_JITTER:.0f} %", signal="t",
+    return [s.say("T05", "warn",
+                  f"{words}, more than {100 * _LARGEST_JITTER:.0f} %",
+                  signal="t",
                   remedy="sample by a timer; a frequency response needs even sampling")]
 
 
@@ -127,19 +152,21 @@ def band(s: Subject) -> list[Check]:
     With c_k the correlation of the steps of q at a distance of k samples, motion at f gives c1 = cos(2π f / fs), white
     noise -1/2. Ten samples a period is c1 = 0.81; noise is told from fast motion by c2, to which it does not contribute.
     """
-    slow = [j for j in range(s.log.n_joints) if s.travel[j] > 0 and _undersampled(s, s.good.log.q[:, j], s.steps[j] or 0.0)]
+    slow = [j for j in range(s.log.n_joints) if s.travel[j] > 0 and _undersampled(s, j)]
     rate = 1.0 / s.log.sample_time
     if slow and s.log.experiment != "frf":
-        return [s.say("T09", "reject", f"a rate of {rate:.4g} Hz is too low for this motion: fewer than ten samples "
-                                       f"in its period, the "
-                      "speed between them is lost", signal="q", joint=j, remedy="record faster; ten times the highest "
-                      "frequency at least")
+        return [s.say("T09", "reject",
+                      f"a rate of {rate:.4g} Hz is too low for this motion: fewer than ten samples in its period, the speed "
+                      "between them is lost",
+                      signal="q", joint=j,
+                      remedy="record faster; ten times the highest frequency at least")
                 for j in slow]
     return s.ok("T09", f"a rate of {rate:.4g} Hz resolves the motion", signal="q")
 
 
-def _undersampled(s: Subject, q: Array, step: float) -> bool:
-    even = np.abs(np.diff(s.good.log.t) / s.log.sample_time - 1.0) < 0.5
+def _undersampled(s: Subject, joint: int) -> bool:
+    q, step = s.position[:, joint], s.steps[joint] or 0.0
+    even = (np.abs(np.diff(s.good.log.t) / s.log.sample_time - 1.0) < 0.5) & ~s.good.jumped[1:, joint]
     d = np.where(even & np.isfinite(np.diff(q)), np.diff(q), 0.0)
     power = float(d @ d)
     if d.size < MIN_SAMPLES or power <= 0 or np.sqrt(power / d.size) < 5.0 * step or np.ptp(q[np.isfinite(q)]) < 100.0 * step:

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
 
-__all__ = ["GAP_LIMIT", "Mask", "TimeBase", "emergency_stop", "jumps", "lagged_speed", "missing", "quantum", "saturated",
+__all__ = ["GAP_LIMIT", "Mask", "TimeBase", "jumps", "lagged_speed", "missing", "quantum", "saturated",
            "sentinels", "spikes", "time_base", "torque_limit"]
 
 Mask = npt.NDArray[np.bool_]
@@ -31,6 +31,7 @@ Indices = npt.NDArray[np.intp]
 GAP_LIMIT = 10
 
 _ABSURD = 1e9  # no joint is there, in any unit
+_NO_TIME = 1e20  # nanoseconds since 1970 are 2e18
 _SENTINELS = np.array([999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0, 4294967295.0])
 
 
@@ -42,7 +43,7 @@ class TimeBase:
     scale: float  # [s] per unit of t
     is_rate: bool  # sample_time holds the rate
     median: float  # [s] interval, by the recorded t in seconds
-    undefined: Indices  # samples whose t is not a number
+    undefined: Indices  # samples whose t is not a time
     steps: Indices  # k: t[k + 1] < t[k]
     repeated: Indices  # k: sample k + 1 is sample k once more, stamp and all
     conflicting: Indices  # k: sample k + 1 has the stamp of sample k and other values
@@ -60,7 +61,7 @@ class TimeBase:
 
 def time_base(log: ExperimentLog) -> TimeBase:
     """How the samples of `log` lie in time; see `TimeBase`."""
-    t, nominal = log.t, log.sample_time
+    t, nominal = np.where(np.abs(log.t) < _NO_TIME, log.t, np.nan), log.sample_time
     undefined = np.flatnonzero(~np.isfinite(t))
     interval = np.diff(t)
     forward = interval[np.isfinite(interval) & (interval > 0)]
@@ -91,7 +92,7 @@ def _time_unit(t: Array, forward: Array, nominal: float) -> tuple[str, float, bo
     median, mean = float(np.median(forward)), float(np.mean(forward))
     if any(abs(step / nominal - 1.0) < 0.1 for step in (median, mean)):
         return "s", 1.0, False
-    if abs(median * nominal - 1.0) < 0.02:
+    if median < nominal and abs(median * nominal - 1.0) < 0.02:
         return "s", 1.0, True
     units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
     if median == 1.0 and bool(np.all(np.rint(forward) == forward)):
@@ -169,10 +170,11 @@ def spikes(x: Array, smooth: bool, floor: Array) -> Mask:
             expected = np.sort(np.stack([a, b, c, d]), axis=0)[1:3].mean(axis=0)
             left, right, spread = (a + b) / 2.0, (c + d) / 2.0, np.maximum(np.abs(a - b), np.abs(c - d))
         off = np.abs(x[middle] - expected)
+        off = np.where(np.isfinite(off), off, 0.0)
         # a kink, as at a hard stop, continues one of its sides
         alone = np.minimum(np.abs(x[middle] - left), np.abs(x[middle] - right)) > 0.6 * off
         with np.errstate(invalid="ignore"):
-            limit = np.maximum(4.0 * np.nanquantile(off, 0.99, axis=0), floor) if np.isfinite(off).any() else np.inf
+            limit = np.maximum(4.0 * np.quantile(off, 0.99, axis=0), floor)
             candidate = (off > limit) & alone & (np.abs(left - right) < 0.4 * off) & (spread < 0.4 * off)
         found[middle] |= candidate & _stands_out_locally(off, candidate)
     return found
@@ -212,8 +214,8 @@ def saturated(log: ExperimentLog) -> Mask:
 
 
 def _flat_top(x: Array, q: Array) -> Mask:
-    """Runs at the very maximum of `x` that no smooth peak makes: half a run's length beside it, `x` is down by more than
-    10 quanta, where a parabola that spends the run within one quantum would be down by 3."""
+    """Runs at the very maximum of `x` that no smooth peak makes: within half a run's length beside it, `x` falls by more
+    than 10 quanta, where a parabola that spends the run within one quantum would be down by 3."""
     flat = np.zeros(x.shape, dtype=bool)
     finite = np.isfinite(x)
     if not finite.any():
@@ -222,18 +224,20 @@ def _flat_top(x: Array, q: Array) -> Mask:
     step = quantum(x) or 0.0
     at = np.concatenate(([False], finite & (x >= top - max(0.01 * step, 1e-9 * abs(top))), [False]))
     edges = np.flatnonzero(np.diff(at.astype(np.int8))).reshape(-1, 2)
-    for start, stop in edges:
+    travel = float(np.ptp(q[np.isfinite(q)])) if np.isfinite(q).any() else 0.0
+    for start, stop in edges.tolist():
         half = max(2, (stop - start) // 2)
-        if stop - start < 5 or start - half < 0 or stop + half > x.size:
+        before, after = x[max(0, start - half):start], x[stop:stop + half]
+        if stop - start < 5 or before.size < 2 or after.size < 2:
             continue
-        drop = top - max(x[start - half], x[stop + half - 1])
-        moved = abs(float(q[stop - 1] - q[start]))
-        if drop > max(10.0 * step, 1e-3 * abs(top)) and moved > 0.0:
+        drop = top - max(np.nanmin(before, initial=top), np.nanmin(after, initial=top))
+        moved = float(np.ptp(q[start:stop]))
+        if drop > max(10.0 * step, 1e-3 * abs(top)) and moved > 1e-3 * travel:  # an arm at rest may well stay there
             flat[start:stop] = True
-    return flat if int(flat.sum()) >= 10 else np.zeros_like(flat)
+    return np.asarray(at[1:-1]) if int(flat.sum()) >= 10 else np.zeros_like(flat)
 
 
-def jumps(q: Array, revolute: tuple[bool, ...]) -> tuple[Mask, Array]:
+def jumps(q: Array) -> tuple[Mask, Array]:
     """Steps between two samples that no motion makes, and by how much.
 
     Returns:
@@ -245,8 +249,8 @@ def jumps(q: Array, revolute: tuple[bool, ...]) -> tuple[Mask, Array]:
     padded = np.pad(step, ((3, 3), (0, 0)), mode="edge")
     around = np.median(np.stack([padded[k:k + len(step)] for k in (0, 1, 2, 4, 5, 6)]), axis=0)
     excess = step - around
-    finite = np.abs(excess[np.isfinite(excess).all(axis=1)])
-    usual = np.quantile(finite, 0.99, axis=0) if len(finite) else np.full(step.shape[1], np.inf)
+    excess = np.where(np.isfinite(excess), excess, 0.0)
+    usual = np.quantile(np.abs(excess), 0.99, axis=0)
     with np.errstate(invalid="ignore"):
         jump = np.abs(excess) > np.maximum(30.0 * usual, 0.02)
         ahead = np.pad(excess, ((0, 2), (0, 0)))  # a glitch comes back within two samples; a jump stays
@@ -254,39 +258,4 @@ def jumps(q: Array, revolute: tuple[bool, ...]) -> tuple[Mask, Array]:
         for k in (1, 2):
             jump &= ~(np.abs(excess + ahead[k:k + len(step)]) < 0.4 * np.abs(excess))
             jump &= ~(np.abs(excess + back[2 - k:2 - k + len(step)]) < 0.4 * np.abs(excess))
-    del revolute
     return jump, np.where(jump, excess, 0.0)
-
-
-def emergency_stop(log: ExperimentLog) -> tuple[int, str] | None:
-    """Sample from which on the arm no longer does what was asked of it, up to the end of the log, and how it shows."""
-    if log.experiment in ("hold", "frf") or log.n_samples < 100:
-        return None
-    shortest = max(20, round(0.05 / log.sample_time))
-    if "q_ref" in log:
-        error = np.abs(log.q - log["q_ref"])
-        spread = np.nanstd(log["q_ref"], axis=0)
-        lost = error > np.maximum(np.maximum(0.05, 0.25 * spread), 8.0 * np.nanmedian(error, axis=0))
-        lost |= np.isnan(error)
-        start = int(_start_of_last_run(lost).min())
-        if 0.1 * log.n_samples < start < log.n_samples - shortest:
-            joint = int(_start_of_last_run(lost).argmin())
-            off = float(np.nanmax(error[start:, joint], initial=0.0))
-            return start, f"joint {joint + 1} leaves its reference by {off:.3g} rad and stays away"
-    if log.experiment == "friction":  # a coast-down is meant
-        return None
-    start = int(_start_of_last_run((log.tau == 0.0).all(axis=1)[:, None])[0])
-    if not 0.1 * log.n_samples < start < log.n_samples - shortest:
-        return None
-    speed = np.abs(lagged_speed(log.q, log.sample_time))
-    usual = np.nanquantile(speed, 0.75, axis=0)
-    before = speed[max(0, start - shortest):start]
-    moving = bool((np.nanmax(before, axis=0) > 0.3 * usual).any()) and bool((usual > 0).any())
-    return (start, "all torques drop to zero while the arm moves") if moving else None
-
-
-def _start_of_last_run(mask: Mask) -> Indices:
-    """(joints,) first sample of the run that reaches the end; the number of samples where there is none."""
-    backward = mask[::-1]
-    length = np.where(backward.all(axis=0), len(mask), np.argmin(backward, axis=0))
-    return np.asarray(len(mask) - length, dtype=np.intp)

@@ -22,7 +22,6 @@ from pipelines.log.faults import (
     GAP_LIMIT,
     Mask,
     TimeBase,
-    emergency_stop,
     jumps,
     missing,
     quantum,
@@ -31,6 +30,7 @@ from pipelines.log.faults import (
     time_base,
     torque_limit,
 )
+from pipelines.log.stop import emergency_stop
 
 __all__ = ["SHORTEST", "Usable", "unwrapped", "usable"]
 
@@ -50,6 +50,8 @@ class Usable:
     position_spikes: Mask
     torque_spikes: Mask
     saturated: Mask
+    wrapped: Array  # (samples, joints) [rad] what wraps had added to the recorded position
+    jumped: Mask  # first sample after a jump of the position that is no wrap
     end: int  # samples from here on come after an emergency stop
     time: TimeBase  # of the recording
 
@@ -69,23 +71,25 @@ class Usable:
 def usable(log: ExperimentLog) -> Usable:
     """What of `log` can be used, and how; a log that `checks` rejects may have no run at all."""
     time = time_base(log)
-    keep = np.isfinite(log.t)
+    keep = np.ones(log.n_samples, dtype=bool)
+    keep[time.undefined] = False
     keep[time.repeated + 1] = False
     keep[time.conflicting + 1] = False
     kept = np.flatnonzero(keep)
     signals = {name: replace(signal, values=signal.values[kept]) for name, signal in log.signals.items()}
     signals["t"] = Signal(signals["t"].values * time.scale, "s", signals["t"].long_name)
-    lost = {name: missing(signals[name].values) for name in ("q", "tau")}
+    lost = {name: missing(signal.values) for name, signal in signals.items() if name != "t"}
     for name, mask in lost.items():
         signals[name] = replace(signals[name], values=np.where(mask, np.nan, signals[name].values))
-    position, broken = unwrapped(replace(log, signals=signals))
-    signals["q"] = replace(signals["q"], values=position)
+    wrapped, jumped = unwrapped(replace(log, signals=signals))
+    signals["q"] = replace(signals["q"], values=signals["q"].values - wrapped)
     mended = replace(log, signals=signals)
     gone = lost["q"] | lost["tau"]
     glitches = spikes(mended.q, True, _position_floor(mended)), spikes(mended.tau, False, _torque_floor(mended))
     stop = emergency_stop(mended)
     end = len(kept) if stop is None else stop[0]
-    return Usable(mended, kept, _runs(mended, time, gone, broken, end), gone, *glitches, saturated(mended), end, time)
+    return Usable(mended, kept, _runs(mended, time, gone, jumped, end), gone, *glitches, saturated(mended), wrapped,
+                  jumped, end, time)
 
 
 def _position_floor(log: ExperimentLog) -> Array:
@@ -109,30 +113,33 @@ def _torque_floor(log: ExperimentLog) -> Array:
 
 
 def unwrapped(log: ExperimentLog) -> tuple[Array, Mask]:
-    """Position with wraps at full turns and counter roll-overs undone; and the jumps that are neither (samples - 1,)."""
-    jump, size = jumps(log.q, log.robot.revolute)
+    """What wraps at full turns and counter roll-overs added to each position (samples, joints) [rad]; and the first
+    sample after every jump that is neither."""
+    nothing = np.zeros_like(log.q), np.zeros(log.q.shape, dtype=bool)
+    jump, size = jumps(log.q)
+    jump &= (np.abs(np.diff(log.t)) < 1.5 * log.sample_time)[:, None]  # across a gap the arm may have gone anywhere
     if not jump.any():
-        return log.q, np.zeros(max(0, log.n_samples - 1), dtype=bool)
-    undo, broken = np.zeros_like(size), jump.copy()
+        return nothing
+    undo = np.zeros_like(size)
     for j, joint in enumerate(log.robot.joints):
         step = joint.encoder_resolution or quantum(log.q[:, j])
         periods = ([2.0 * np.pi] if joint.revolute else []) + ([step * c for c in _COUNTERS] if step else [])
         for period in periods:
             turns = np.rint(size[:, j] / period)
-            # what is left beside whole periods must be small beside the period, and the period far above a step
-            fits = broken[:, j] & (turns != 0) & (np.abs(size[:, j] - turns * period) < 0.05 * period) & (np.abs(turns) < 3)
+            # what is left beside whole periods must be small beside the period, and few periods at once
+            fits = jump[:, j] & (turns != 0) & (np.abs(size[:, j] - turns * period) < 0.05 * period) & (np.abs(turns) < 3)
             undo[fits, j] = turns[fits] * period
-            broken[fits, j] = False
-    shift = np.concatenate([np.zeros((1, size.shape[1])), np.cumsum(undo, axis=0)])
-    return log.q - shift, _any_joint(broken)
+            jump[fits, j] = False
+    first = np.zeros((1, log.n_joints))
+    return np.concatenate([first, np.cumsum(undo, axis=0)]), np.concatenate([first > 0, jump])
 
 
-def _runs(log: ExperimentLog, time: TimeBase, gone: Mask, broken: Mask, end: int) -> tuple[slice, ...]:
+def _runs(log: ExperimentLog, time: TimeBase, gone: Mask, jumped: Mask, end: int) -> tuple[slice, ...]:
     """Stretches between steps of the clock, gaps, long missing blocks and position jumps."""
     tick = log.sample_time if time.known else time.median
     with np.errstate(invalid="ignore"):
         ticks = np.diff(log.t) / tick
-        cut = (ticks <= 0.0) | (ticks > GAP_LIMIT + 1.5) | broken
+        cut = (ticks <= 0.0) | (ticks > GAP_LIMIT + 1.5) | _any_joint(jumped[1:])
     blocks = long_blocks(_any_joint(gone))
     bad = np.zeros(log.n_samples, dtype=bool)
     for start, stop in blocks:
