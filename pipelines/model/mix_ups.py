@@ -1,0 +1,102 @@
+"""Look for columns in the wrong place and angles in the wrong scale: other explanations on the same torque rows."""
+
+from __future__ import annotations
+
+from itertools import combinations, permutations
+
+import numpy as np
+
+from pipelines.errors import Check
+from pipelines.model.evidence import Evidence
+from pipelines.model.rigid.body import Array
+from pipelines.model.row_fit import Sampled, quick_residual
+
+__all__ = ["encoder_scale", "position_columns", "torque_columns"]
+
+_BAD, _GOOD, _MUCH_BETTER = 0.15, 0.3, 0.35  # relative residuals, and the ratio of two
+_SCALE_BAD, _SCALE_BETTER = 0.02, 0.25  # a wrong scale can hide well, but the right one then is far better
+_SCALES = {"0.5": 0.5, "2": 2.0, "0.1": 0.1, "10": 10.0, "pi/180 (degrees)": np.pi / 180, "180/pi": 180 / np.pi,
+           "2 pi (turns)": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi, "-1": -1.0}
+
+
+def torque_columns(e: Evidence) -> list[Check]:
+    """S13: would the torques fit better in another order?"""
+    n, square = e.n_joints, e.table**2
+    orders = permutations(range(n)) if n <= 6 else _pairs(n)
+    best = min(orders, key=lambda order: sum(square[j, k] for j, k in enumerate(order)))
+    moved = [j for j in range(n) if best[j] != j]
+    if not moved:
+        return []
+    before, after = e.residual[moved], e.table[moved, [best[j] for j in moved]]
+    if not _better(before, after) or (after > 0.6 * before).any():
+        return []
+    return [_swapped(e, "tau", moved, [best[j] for j in moved], before, after)]
+
+
+def _swapped(e: Evidence, signal: str, moved: list[int], order: list[int], before: Array, after: Array) -> Check:
+    columns = ",".join(str(j + 1) for j in moved)
+    how = "swapped" if len(moved) == 2 else f"in the order {','.join(str(k + 1) for k in order)}"
+    return e.subject.say("S13", "warn",
+                         f"{signal}: columns {columns} fit {how}, residual {_rms(before):.2f} -> {_rms(after):.2f}",
+                         signal=signal, joint=moved[0], gate=True,
+                         remedy="correct the column map of the import, or the wiring of the drives")
+
+
+def _pairs(n: int) -> list[tuple[int, ...]]:
+    orders = [tuple(range(n))]
+    for a, b in combinations(range(n), 2):
+        order = list(range(n))
+        order[a], order[b] = b, a
+        orders.append(tuple(order))
+    return orders
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+def _better(before: Array, after: Array) -> bool:
+    return _rms(before) > _BAD and _rms(after) < _GOOD and _rms(after) < _MUCH_BETTER * _rms(before)
+
+
+def position_columns(e: Evidence) -> list[Check]:
+    """S13: would the positions fit better in another order, alone or with the torques?"""
+    if _rms(e.residual) < _BAD or e.n_joints < 2:
+        return []
+    few = e.thinned()
+    motion, n = few.motion, e.n_joints
+    best: tuple[float, Array, tuple[int, ...], str] | None = None
+    for order in list(permutations(range(n)))[1:] if n <= 3 else _pairs(n)[1:]:
+        pick = list(order)
+        turned = Sampled(motion.t, motion.q[:, pick], motion.dq[:, pick], motion.ddq[:, pick], motion.coulomb[:, pick],
+                         motion.torque, motion.at, motion.reach, motion.sample_time)
+        table = quick_residual(e.body, turned)
+        for signal, residual in (("q", np.diag(table)), ("q and tau", table[np.arange(n), pick])):
+            if best is None or _rms(residual) < best[0]:
+                best = (_rms(residual), residual, order, signal)
+    if best is None or not _better(few.residual, best[1]):
+        return []
+    moved = [j for j in range(n) if best[2][j] != j]
+    return [_swapped(e, best[3], moved, [best[2][j] for j in moved], few.residual, best[1])]
+
+
+def encoder_scale(e: Evidence) -> list[Check]:
+    """S15: would one joint's angle fit better in another scale? Only a joint whose angle bends the arm can tell."""
+    if _rms(e.residual) < _SCALE_BAD:
+        return []
+    few = e.thinned()
+    best: tuple[float, Array, int, str] | None = None
+    for joint in range(e.n_joints):
+        for name, factor in _SCALES.items():
+            scale = np.where(np.arange(e.n_joints) == joint, factor, 1.0)
+            residual = np.diag(quick_residual(e.body, few.motion, q=few.motion.q * scale, dq=few.motion.dq * scale,
+                                              ddq=few.motion.ddq * scale))
+            if best is None or _rms(residual) < best[0]:
+                best = (_rms(residual), residual, joint, name)
+    if best is None or best[0] > _GOOD or best[0] > _SCALE_BETTER * _rms(few.residual):
+        return []
+    return [e.subject.say("S15", "warn",
+                          f"q of joint {best[2] + 1} fits if multiplied by {best[3]}, residual {_rms(few.residual):.2f} -> "
+                          f"{best[0]:.2f}",
+                          signal="q", joint=best[2], gate=True,
+                          remedy="correct the gear ratio, the direction or the counts per turn of this encoder")]

@@ -1,0 +1,186 @@
+"""Does the torque fit the motion: planted mix-ups are named and measured, healthy and faulty arms are left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.checks import Subject
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.robot import LinkParameters
+from pipelines.model.clock_offset import clock_offset
+from pipelines.model.evidence import Evidence
+from pipelines.model.plausibility import excitation_condition, plausibility
+from pipelines.model.rigid.body import rigid_body
+from pipelines.model.row_fit import quick_residual, relative_residual, row_fits, sample_motion
+from tests.faulty import drifting, healthy_without_reference
+from tests.healthy import (
+    COULOMB,
+    VISCOUS,
+    Path,
+    arm,
+    arm_torque,
+    fourier,
+    good_log,
+    healthy_logs,
+    make_log,
+    one_joint,
+    with_signal,
+)
+
+
+def evidence(log: ExperimentLog) -> Evidence:
+    subject = Subject(log)
+    motion = sample_motion(subject.good)
+    assert motion is not None
+    return Evidence(subject, rigid_body(log.robot), motion)
+
+
+def said(log: ExperimentLog) -> list[tuple[str, bool]]:
+    return [(c.code.removeprefix("RRID-"), c.gate) for c in plausibility(Subject(log)) if c.level != "ok"]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_healthy_logs_are_plausible(seed: int) -> None:
+    for log in healthy_logs(range(100 + seed, 101 + seed)):
+        assert said(log) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("pair", [(0, 1), (0, 2), (1, 2)])
+@pytest.mark.parametrize("signal", ["q", "tau"])
+def test_swapped_columns_are_named(seed: int, pair: tuple[int, int], signal: str) -> None:
+    log = healthy_without_reference(good_log(seed))
+    order = [0, 1, 2]
+    order[pair[0]], order[pair[1]] = pair[1], pair[0]
+    (check,) = plausibility(Subject(with_signal(log, **{signal: log[signal][:, order]})))
+    assert (check.code, check.gate) == ("RRID-S13", True)
+    assert check.message.startswith(f"{signal}: columns {pair[0] + 1},{pair[1] + 1} fit swapped")
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("signs", [(-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, 1, -1), (-1, -1, -1)])
+def test_flipped_torques_are_named(seed: int, signs: tuple[int, int, int]) -> None:
+    log = good_log(seed)
+    found = [c for c in plausibility(Subject(with_signal(log, tau=log.tau * signs))) if c.level != "ok"]
+    assert {c.code for c in found} == {"RRID-S14"}
+    assert [f"joint {j + 1}" in c.where for j, c in zip([j for j in range(3) if signs[j] < 0], found, strict=True)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("shift", [-7, -2, 3, 10])
+def test_an_offset_between_the_clocks_is_measured(seed: int, shift: int) -> None:
+    """Torque rolled by whole samples is found within 0.3 samples, its bound covers the truth, and no drift is invented."""
+    log = good_log(seed)
+    e = evidence(with_signal(log, tau=np.roll(log.tau, shift, axis=0)))
+    found = clock_offset(e.rows, e.motion)
+    assert found is not None
+    assert found.samples == pytest.approx(shift, abs=0.3)
+    assert abs(found.samples - shift) < found.bound + 0.05
+    assert abs(found.drift) < 0.3
+
+
+@pytest.mark.parametrize("drift", [-6.0, 3.0])
+def test_a_drift_of_the_clocks_is_measured(drift: float) -> None:
+    """Interpolated to a clock that is `drift` samples off at the end; torque then comes too early by that."""
+    e = evidence(drifting(good_log(), drift))
+    found = clock_offset(e.rows, e.motion)
+    assert found is not None
+    assert found.drift == pytest.approx(-drift * 0.96, rel=0.05)  # the first and last samples are not looked at
+
+
+@pytest.mark.parametrize("factor", [3.0, 0.25, 0.02])
+def test_a_gear_ratio_is_hinted_at(factor: float) -> None:
+    (check,) = [c for c in plausibility(Subject(with_signal(good_log(), tau=good_log().tau * [1, factor, 1]))) if c.level != "ok"]
+    assert (check.code, check.gate) == ("RRID-S15", True)
+    assert f"tau of joint 2 is {factor:.3g} times" in check.message
+
+
+@pytest.mark.parametrize(("joint", "factor", "hint"), [(1, 2.0, "0.5"), (2, -1.0, "-1"), (1, 180 / np.pi, "pi/180")])
+def test_an_encoder_scale_is_hinted_at(joint: int, factor: float, hint: str) -> None:
+    scale = np.where(np.arange(3) == joint, factor, 1.0)
+    log = healthy_without_reference(good_log())
+    found = [c for c in plausibility(Subject(with_signal(log, q=log.q * scale))) if c.code == "RRID-S15" and c.level != "ok"]
+    assert found
+    assert f"q of joint {joint + 1} fits if multiplied by {hint}" in found[0].message
+
+
+def test_a_locked_joint_hides_parameters_and_they_are_named() -> None:
+    """With joint 1 at rest nothing of its inertia shows: p7 is its own, p1, p2, p5, p6 turn with it."""
+    log = make_log(one_joint(fourier(np.random.default_rng(1)), 2))
+    condition, hidden = excitation_condition(evidence(log))
+    assert condition > 1e4
+    assert {"p7", "Coulomb of joint 1", "Coulomb of joint 3"} <= set(hidden)
+
+
+def _payload(path: Path, t: Array) -> Array:
+    joints = list(arm().joints)
+    link = joints[2].link
+    assert link is not None
+    share = link.mass / (link.mass + 0.5)  # 0.5 kg at the tip, the origin of its frame
+    joints[2] = replace(joints[2], link=LinkParameters(link.mass + 0.5, tuple(share * c for c in link.com),
+                                                       link.inertia))  # type: ignore[arg-type]
+    body = rigid_body(replace(arm(), joints=tuple(joints)))
+    p = body.known_parameters()
+    assert p is not None
+    q, dq, ddq = path(t)
+    return body.torque(q, dq, ddq, p) + COULOMB * np.tanh(200 * dq) + VISCOUS * dq
+
+
+STRENGTH = np.array([1.0, 0.7, 0.25])
+CAUSES = {
+    "cogging": lambda path, t: arm_torque(path, t) + 0.4 * STRENGTH * np.sin(18 * path(t)[0]),
+    "stribeck": lambda path, t: arm_torque(path, t) + 0.4 * COULOMB * np.exp(-(path(t)[1] / 0.2) ** 2) * np.tanh(200 * path(t)[1]),
+    "no friction": lambda path, t: arm_torque(path, t) - COULOMB * np.tanh(200 * path(t)[1]) - VISCOUS * path(t)[1],
+    "asymmetric_friction": lambda path, t: arm_torque(path, t) + 0.2 * VISCOUS * np.abs(path(t)[1]),
+    "viscous_drift": lambda path, t: arm_torque(path, t) - 0.5 * VISCOUS * path(t)[1] * (1 - np.exp(-t / 15))[:, None],
+    "spring": lambda path, t: arm_torque(path, t) + 2.5 * STRENGTH * path(t)[0],
+    "torque_gain": lambda path, t: arm_torque(path, t) * [1.1, 1.0, 0.9],
+    "torque_crosstalk": lambda path, t: arm_torque(path, t) @ np.array([[1, 0.1, 0], [0, 1, 0], [0, 0, 1.0]]),
+    "load_friction": lambda path, t: arm_torque(path, t) + 0.06 * np.abs(arm_torque(path, t)) * np.tanh(200 * path(t)[1]),
+    "contact": lambda path, t: arm_torque(path, t) + np.outer((t % 4 > 2) & (t % 4 < 2.2), [5.0, 5.0, 3.0]),
+    "torque_saturation": lambda path, t: np.clip(arm_torque(path, t), -12 * STRENGTH, 12 * STRENGTH),
+    "payload": _payload,
+}
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_is_wrong_with_an_arm_is_not_a_mix_up(cause: str, seed: int) -> None:
+    """Causes at full strength (causes.md): none is called swapped, flipped, wrongly geared or late."""
+    log = make_log(fourier(np.random.default_rng(seed)), torque=CAUSES[cause], seed=seed)
+    assert said(log) == []
+
+
+@pytest.mark.parametrize("delay", [0.005, -0.005])
+def test_a_late_encoder_is_a_warning_not_a_gate(delay: float) -> None:
+    log = make_log(fourier(np.random.default_rng(3)), torque=lambda path, t: arm_torque(path, t - delay))
+    assert said(log) == [("T06", False)]
+
+
+def test_a_delay_of_one_joint_is_not_a_clock() -> None:
+    log = good_log()
+    late = log.q.copy()
+    late[5:, 1] = log.q[:-5, 1]
+    assert ("T06", True) not in said(with_signal(log, q=late))
+
+
+@pytest.mark.parametrize("experiment", ["hold", "friction", "frf"])
+def test_logs_that_do_not_move_the_arm_are_not_judged(experiment: str) -> None:
+    log = make_log(one_joint(fourier(np.random.default_rng(0)), 2), experiment, joint=None if experiment == "hold" else 2)
+    assert plausibility(Subject(log)) == ()
+
+
+def test_quick_residuals_are_the_residuals() -> None:
+    """Normal equations against SVD, on a swapped log so that nothing is zero."""
+    log = with_signal(good_log(), tau=good_log().tau[:, [1, 2, 0]])
+    e = evidence(log)
+    exact = relative_residual(row_fits(e.body, e.motion), e.motion.tau)
+    np.testing.assert_allclose(quick_residual(e.body, e.motion), exact, atol=2e-3)
+
+
+def test_the_fit_of_the_good_log_is_close() -> None:
+    """With the right columns 1 % of the torque at most is left: the smoothing costs little."""
+    assert (evidence(good_log()).residual < 0.01).all()
