@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.checks_subject import Subject, spread
+from pipelines.log.checks_subject import Subject, many, spread
 from pipelines.log.faults import GAP_LIMIT, sentinels, torque_limit
 from pipelines.log.segments import long_blocks
 
@@ -38,8 +38,8 @@ def missing_samples(s: Subject) -> list[Check]:
                                    remedy="look at this channel's cable, and record again"))
             else:
                 found.append(s.say("D01", "repair",
-                                   f"{total} samples of {name} are missing, never more than {GAP_LIMIT} in a row; treated "
-                                   "as not measured",
+                                   f"{many(total, 'sample')} of {name} missing, never more than {GAP_LIMIT} in a row; "
+                                   "treated as not measured",
                                    signal=name, joint=j, sample=first,
                                    remedy="none needed if they stay few"))
     return found or s.ok("D01", "no sample of q or tau is missing")
@@ -62,7 +62,8 @@ def absurd_samples(s: Subject) -> list[Check]:
             at = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
             then = "; treated as missing" if few else ""
             found.append(s.say("D03", "repair" if few else "reject",
-                               f"{which.size} samples of {name} hold {values}, which is no measurement (samples {at}){then}",
+                               f"{many(which.size, 'sample')} of {name} with the value {values}, which is no measurement "
+                               f"(samples {at}){then}",
                                signal=name, joint=j, sample=int(which[0]),
                                remedy="mark what was not measured as NaN, or look at the sensor"))
     return found or s.ok("D03", "no infinite, astronomical or filler value")
@@ -120,7 +121,7 @@ def glitches(s: Subject) -> list[Check]:
         for j in np.flatnonzero(flags.any(axis=0)).tolist():
             which = np.flatnonzero(flags[:, j])
             found.append(s.say("D06", "repair",
-                               f"{which.size} samples of {name} stand out of their neighbours as no motion does; left out",
+                               f"{many(which.size, 'sample')} of {name} out of their neighbours as no motion does; left out",
                                signal=name, joint=j, sample=int(s.good.kept[which[0]]),
                                remedy="look at the shielding of the encoder and at the recorder's transmission"))
     return found or s.ok("D06", "no sample stands out of its neighbours")
@@ -133,14 +134,14 @@ def wraps(s: Subject) -> list[Check]:
         unit = s.unit("q", j)
         if (at := np.flatnonzero(wrapped[:, j])).size:
             found.append(s.say("D07", "warn",
-                               f"the encoder wraps {at.size} times by {abs(wrapped[at[0], j]):.6g} {unit}; unwrapped",
+                               f"the encoder wraps {many(at.size, 'time')} by {abs(wrapped[at[0], j]):.6g} {unit}; unwrapped",
                                signal="q", joint=j, sample=int(s.good.kept[at[0] + 1]),
                                remedy="let the recorder count turns"))
         if (at := np.flatnonzero(jumped[:, j])).size:
             by = s.good.log.q[at[0], j] - s.good.log.q[at[0] - 1, j]
             found.append(s.say("D07", "warn",
-                               f"the position jumps {at.size} times, first by {by:.4g} {unit}, which is no turn and no "
-                               "counter's range; the log is split there",
+                               f"the position jumps {many(at.size, 'time')}, first by {by:.4g} {unit}, which is no turn and "
+                               "no counter's range; the log is split there",
                                signal="q", joint=j, sample=int(s.good.kept[at[0]]), gate=True,
                                remedy="look at the encoder: it loses counts"))
     return found or s.ok("D07", "the position neither wraps nor jumps", signal="q")

@@ -13,7 +13,7 @@ from pipelines.log.faults import quantum
 from pipelines.log.schema import joint_unit
 from pipelines.log.segments import Usable, usable
 
-__all__ = ["MIN_SAMPLES", "Subject", "spread"]
+__all__ = ["MIN_SAMPLES", "Subject", "many", "spread"]
 
 MIN_SAMPLES = 20  # fewer samples have no statistics; T08 says so and the checks of signals stay silent
 
@@ -77,6 +77,11 @@ class Subject:
 
     def ok(self, code: str, message: str, *, signal: str = "") -> list[Check]:
         return [self.say(code, "ok", message, signal=signal)]
+
+
+def many(number: int, thing: str) -> str:
+    """"1 gap", "2 gaps"."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def spread(x: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.checks_subject import MIN_SAMPLES, Subject
+from pipelines.log.checks_subject import MIN_SAMPLES, Subject, many
 from pipelines.log.faults import GAP_LIMIT
 from pipelines.log.segments import SHORTEST
 
@@ -20,7 +20,7 @@ def length(s: Subject) -> list[Check]:
     log = s.log
     if log.n_samples < 2:
         return [s.say("T08", "reject",
-                      f"{log.n_samples} samples",
+                      f"{many(log.n_samples, 'sample')}",
                       signal="t",
                       remedy="record again; a log of one sample shows no motion")]
     if log.n_samples < MIN_SAMPLES:
@@ -71,8 +71,8 @@ def order(s: Subject) -> list[Check]:
     time, found = s.good.time, []
     if time.undefined.size:
         found.append(s.say("D01", "repair" if time.undefined.size <= 0.01 * s.log.n_samples else "reject",
-                           f"{time.undefined.size} time stamps are no times, the first is sample {time.undefined[0]}; left "
-                           "out",
+                           f"{many(time.undefined.size, 'stamp')} in t without a time, the first is sample "
+                           f"{time.undefined[0]}; left out",
                            signal="t",
                            remedy="look why the recorder lost its clock there"))
     if time.steps.size:
@@ -81,7 +81,7 @@ def order(s: Subject) -> list[Check]:
         much = time.steps.size > _MOST_STEPS
         then = "" if much else "; the log is split there"
         found.append(s.say("T01", "reject" if much else "repair",
-                           f"time steps back {time.steps.size} times, first by {back:.4g} s{then}",
+                           f"time steps back {many(time.steps.size, 'time')}, first by {back:.4g} s{then}",
                            signal="t", sample=k + 1,
                            remedy="record with a monotonic clock, not with the time of day"))
     return found or s.ok("T01", "time runs forward throughout", signal="t")
@@ -92,12 +92,12 @@ def repeated_stamps(s: Subject) -> list[Check]:
     time = s.good.time
     if time.conflicting.size:
         return [s.say("T02", "reject",
-                      f"{time.conflicting.size} stamps stand twice with different values",
+                      f"{many(time.conflicting.size, 'stamp')} twice with different values",
                       signal="t", sample=int(time.conflicting[0]) + 1,
                       remedy="record with a clock that resolves a sample")]
     if time.repeated.size:
         return [s.say("T02", "repair",
-                      f"{time.repeated.size} samples stand twice, stamp and all; dropped",
+                      f"{many(time.repeated.size, 'sample')} twice, stamp and all; dropped",
                       signal="t", sample=int(time.repeated[0]) + 1,
                       remedy="look why the recorder wrote them twice")]
     return s.ok("T02", "every stamp stands once", signal="t")
@@ -110,8 +110,8 @@ def lost_samples(s: Subject) -> list[Check]:
         return s.ok("T03", "no sample dropped", signal="t")
     share = 100.0 * time.dropped_samples / (s.log.n_samples + time.dropped_samples)
     return [s.say("T03", "warn",
-                  f"{time.dropped_samples} samples ({share:.2g} %) dropped at {time.dropped.size} places; the observer "
-                  "predicts through them, nothing is interpolated",
+                  f"{many(time.dropped_samples, 'sample')} ({share:.2g} %) dropped at {many(time.dropped.size, 'place')}; "
+                  "the observer predicts through them, nothing is interpolated",
                   signal="t", sample=int(time.dropped[0]),
                   remedy="give the recorder more priority, or record fewer signals")]
 
@@ -122,14 +122,14 @@ def gaps(s: Subject) -> list[Check]:
     if not time.gaps.size:
         return s.ok("T04", f"no gap of more than {GAP_LIMIT} samples", signal="t")
     longest = max((run.stop - run.start for run in runs), default=0)
-    words = f"{time.gaps.size} gaps of more than {GAP_LIMIT} samples, {time.gap_lengths.sum():.4g} s together"
+    words = f"{many(time.gaps.size, 'gap')} of more than {GAP_LIMIT} samples, {time.gap_lengths.sum():.4g} s together"
     if not runs:
         return [s.say("T04", "reject",
                       f"{words}; no stretch between them has {SHORTEST} samples",
                       signal="t", sample=int(time.gaps[0]),
                       remedy="record again without interruption")]
     return [s.say("T04", "repair",
-                  f"{words}; {len(runs)} stretches are used, the longest of {longest} samples",
+                  f"{words}; the longest of {many(len(runs), 'usable part')} has {longest} samples",
                   signal="t", sample=int(time.gaps[0]),
                   remedy="look why the recorder stopped there")]
 

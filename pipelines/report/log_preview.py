@@ -50,7 +50,7 @@ def log_preview(subject: Subject) -> Preview:
              "saturated": _spans(t, good.saturated.any(axis=1)), "after the stop": _spans(t, np.arange(t.size) >= good.end)}
     bounded = [np.where(lost, np.nan, values) for values in recorded]
     return Preview(subject.log.name, subject.log.sample_time, (subject.unit("q", 0), subject.unit("tau", 0)),
-                   np.repeat(t[::size], 2), _envelope(bounded[0], size), _envelope(bounded[1], size),
+                   _bucket_times(t, size), _envelope(bounded[0], size), _envelope(bounded[1], size),
                    _any(lost | good.position_spikes, size), _any(lost | good.torque_spikes | good.saturated, size), intervals,
                    {kind: found for kind, found in spans.items() if found})
 
@@ -61,13 +61,20 @@ def _spans(t: Array, mask: Any) -> tuple[tuple[float, float], ...]:
 
 
 def _envelope(x: Array, size: int) -> Array:
-    """(2 buckets, joints) lowest and highest finite sample of each bucket, NaN where it has none."""
+    """(2 buckets, joints) lowest and highest finite sample of each bucket, the earlier first, NaN where it has none."""
     padded = np.concatenate([x, np.repeat(x[-1:], -len(x) % size, axis=0)]).reshape(-1, size, x.shape[1])
     finite = np.isfinite(padded)
-    low = np.where(finite, padded, np.inf).min(axis=1)
-    high = np.where(finite, padded, -np.inf).max(axis=1)
-    both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
+    low, high = np.where(finite, padded, np.inf), np.where(finite, padded, -np.inf)
+    rising = low.argmin(axis=1) <= high.argmax(axis=1)
+    least, most = low.min(axis=1), high.max(axis=1)
+    both = np.stack([np.where(rising, least, most), np.where(rising, most, least)], axis=1).reshape(-1, x.shape[1])
     return np.where(np.isfinite(both), both, np.nan)
+
+
+def _bucket_times(t: Array, size: int) -> Array:
+    """Two moments in each bucket: its beginning and its middle."""
+    first = np.arange(0, t.size, size)
+    return np.stack([t[first], t[np.minimum(first + size // 2, t.size - 1)]], axis=1).ravel()
 
 
 def _any(mask: Mask, size: int) -> Array:
