@@ -203,7 +203,8 @@ def _verdict(result: Result) -> str:
     parts = [f"{count} {words}" for count, words in
              ((bad, "cannot be used"), (mended, "can be used after mending"), (warned, "should be looked at")) if count]
     # columns in the wrong place or unit explain what else is found
-    worst = min(found, key=lambda c: (c.level != "reject", not c.gate, not c.code.startswith("RRID-S"), _WORST_FIRST.index(c.level)))
+    worst = min(found, key=lambda c: (
+        c.level != "reject", not c.gate, not c.code.startswith("RRID-S"), _WORST_FIRST.index(c.level)))
     return f"Of {total} log{'s' * (total != 1)} {', '.join(parts) or 'none is bad alone'}. First of all: {worst.message}."
 
 
