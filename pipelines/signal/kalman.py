@@ -1,0 +1,78 @@
+"""The textbook Kalman filter, sample by sample: the reference for the fast one, and the path for uneven sampling.
+
+The only door to filterpy (Labbe, "Kalman and Bayesian Filters in Python"). One channel at a time; a missing sample is passed
+as None, because a NaN would poison every later state without a word.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.signal.chain import held_input, transition
+
+__all__ = ["Reference", "Textbook"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """States (samples, order) and their covariances (samples, order, order)."""
+
+    states: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Textbook:
+    """A chain of integrators, Kostić et al. 2004, eq. (18)-(19), run by filterpy in the order update, predict."""
+
+    jerk_std: float  # σ [unit / s^order]
+    noise_variance: float  # R [unit²]
+    order: int = 3
+
+    def filter(self, t: Array, y: Array, mean: Array, covariance: Array) -> Reference:
+        """Updated states of one channel `y` (samples,), NaN where missing, at increasing times `t` [s]."""
+        self._check(t, y)
+        means, covariances = self._batch(t, y, mean, covariance)[1]
+        return Reference(means, covariances)
+
+    def smooth(self, t: Array, y: Array, mean: Array, covariance: Array) -> Reference:
+        """Rauch-Tung-Striebel smoother over all samples; same arguments as `filter`."""
+        self._check(t, y)
+        kalman, (means, covariances), (f, q) = self._batch(t, y, mean, covariance)
+        # filterpy's smoother takes the step from k to k+1 from entry k+1, its filter takes it from entry k
+        states, spread, _, _ = kalman.rts_smoother(means, covariances, Fs=[f[0], *f[:-1]], Qs=[q[0], *q[:-1]])
+        return Reference(states, spread)
+
+    def _check(self, t: Array, y: Array) -> None:
+        if len(t) != len(y) or y.ndim != 1:
+            raise UsageError("C02", f"one channel at a time: {t.shape} times, measurement of shape {y.shape}")
+        if len(y) < 2:
+            raise InputRejected("T08", f"{len(y)} samples: nothing can be reconstructed")
+        if not (np.isfinite(t).all() and np.all(np.diff(t) > 0.0)):
+            raise InputRejected("T01", "time does not increase", remedy="split the log at the step of its clock")
+        if np.isinf(y).any():
+            raise InputRejected("D03", "infinite values among the measurements", remedy="mark what is missing as NaN")
+
+    def _batch(self, t: Array, y: Array, mean: Array,
+               covariance: Array) -> tuple[Any, tuple[Array, Array], tuple[list[Array], list[Array]]]:
+        """The filter, its updated means and covariances, and E and Q of every step."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # filterpy imports parts of SciPy that are going away
+            from filterpy.kalman import KalmanFilter
+        step = np.diff(t, append=2.0 * t[-1] - t[-2])
+        reach = held_input(self.order, step) * self.jerk_std
+        f, q = list(transition(self.order, step)), list(reach[:, :, None] * reach[:, None, :])
+        kalman = KalmanFilter(dim_x=self.order, dim_z=1)
+        kalman.H, kalman.R = np.eye(self.order)[:1], np.array([[self.noise_variance]])
+        kalman.x, kalman.P = np.array(mean, dtype=np.float64), np.array(covariance, dtype=np.float64)
+        seen = [value if np.isfinite(value) else None for value in y.tolist()]
+        means, covariances, _, _ = kalman.batch_filter(seen, Fs=f, Qs=q, update_first=True)
+        return kalman, (means, covariances), (f, q)
