@@ -1,0 +1,107 @@
+"""Zero-phase low-pass, decimation and the averages of a held command, against scipy and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import butter, sosfiltfilt
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.signal.filters import centre_hold, centre_samples, choose_decimation, decimate, design_low_pass, zero_phase
+
+
+@pytest.mark.parametrize("order", range(1, 9))
+@pytest.mark.parametrize("cutoff", [0.5, 5.0, 50.0, 400.0])
+def test_equal_to_sosfiltfilt(order: int, cutoff: float) -> None:
+    """A random walk far from zero, to 1e-10 of its size, edges included."""
+    x = np.random.default_rng(order).standard_normal((5000, 2)).cumsum(axis=0) + 100.0
+    expected = sosfiltfilt(butter(order, cutoff, fs=1000.0, output="sos"), x, axis=0)
+    np.testing.assert_allclose(zero_phase(x, design_low_pass(cutoff, 1000.0, order)), expected, rtol=0,
+                               atol=1e-10 * np.abs(x).max())
+
+
+@settings(max_examples=40, deadline=None)
+@given(samples=st.integers(16, 300), order=st.integers(1, 4), cutoff=st.floats(0.01, 0.49), seed=st.integers(0, 99))
+def test_equal_to_sosfiltfilt_for_any_length(samples: int, order: int, cutoff: float, seed: int) -> None:
+    """Every length meets the blocks differently; short ones are nearly all edge."""
+    x = np.random.default_rng(seed).standard_normal(samples)
+    expected = sosfiltfilt(butter(order, 2 * cutoff, output="sos"), x)
+    np.testing.assert_allclose(zero_phase(x, design_low_pass(cutoff, 1.0, order)), expected, rtol=0, atol=1e-9 * np.abs(x).max())
+
+
+def test_columns_are_filtered_as_signals_are() -> None:
+    """Filtering commutes with the model: Y filtered times β is Yβ filtered, for an array (samples, joints, parameters)."""
+    rng = np.random.default_rng(0)
+    y, beta, low = rng.standard_normal((3000, 3, 15)), rng.standard_normal(15), design_low_pass(20.0, 1000.0)
+    np.testing.assert_allclose(zero_phase(y, low) @ beta, zero_phase(y @ beta, low), rtol=0, atol=1e-12)
+
+
+def test_a_sine_keeps_its_phase_and_loses_half_its_power_at_the_cutoff() -> None:
+    """-6 dB for both passes at the cut-off, no delay."""
+    t = np.arange(20_000) * 1e-3
+    for hz, gain in ((20.0, 0.5), (2.0, 1.0 / (1.0 + (np.tan(0.002 * np.pi) / np.tan(0.02 * np.pi)) ** 8))):
+        found = zero_phase(np.sin(2 * np.pi * hz * t), design_low_pass(20.0, 1000.0))
+        np.testing.assert_allclose(found[3000:-3000], gain * np.sin(2 * np.pi * hz * t)[3000:-3000], rtol=0, atol=1e-9)
+
+
+def test_bad_filters_and_signals_are_refused() -> None:
+    """Cut-off beyond half the rate, strange orders, too few samples, missing samples."""
+    for cutoff, order in ((0.0, 4), (500.0, 4), (np.nan, 4), (20.0, 0), (20.0, 9)):
+        with pytest.raises(UsageError):
+            design_low_pass(cutoff, 1000.0, order)
+    low = design_low_pass(20.0, 1000.0)
+    with pytest.raises(InputRejected, match="T08"):
+        zero_phase(np.zeros(15), low)
+    for bad in (np.nan, np.inf):
+        with pytest.raises(InputRejected, match="D01"):
+            zero_phase(np.concatenate([np.zeros(50), [bad], np.zeros(50)]), low)
+
+
+def test_decimation_keeps_what_passed_the_low_pass() -> None:
+    """No alias above 1e-3 of noise is left in the band when every n-th filtered sample is kept."""
+    rng = np.random.default_rng(1)
+    factor = choose_decimation(20.0, 1000.0)
+    assert factor == 12
+    t = np.arange(48_000) * 1e-3
+    high = np.sin(2 * np.pi * (1000.0 / factor - 15.0) * t + rng.uniform())  # would fold to 15 Hz
+    kept = decimate(zero_phase(high, design_low_pass(20.0, 1000.0)), factor)
+    assert kept.shape == (4000,)
+    assert np.abs(kept[100:-100]).max() < 1e-3
+    assert choose_decimation(400.0, 1000.0) == 1
+
+
+def test_centred_hold_is_the_exact_average() -> None:
+    """A held command integrated over the two steps around a sample."""
+    u = np.random.default_rng(2).standard_normal((50, 2))
+    fine = np.repeat(u, 1000, axis=0)
+    exact = np.stack([fine[1000 * (k - 1):1000 * (k + 1)].mean(axis=0) for k in range(1, 49)])
+    np.testing.assert_allclose(centre_hold(u), exact, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("hz", [10.0, 20.0, 40.0])
+def test_centred_samples_are_the_average_of_a_sine(hz: float) -> None:
+    """The average of sin(ω t) over two steps is sin(ω t) sin(ωT)/(ωT): error (ωT)⁶/1512 inside, (ωT)⁴/180 at the rims."""
+    t, wt = np.arange(400) * 1e-3, 2 * np.pi * hz * 1e-3
+    found = centre_samples(np.sin(2 * np.pi * hz * t + 0.3))
+    error = np.abs(found - np.sinc(wt / np.pi) * np.sin(2 * np.pi * hz * t + 0.3)[1:-1])
+    assert found.shape == (398,)
+    assert error[1:-1].max() < 1.01 * wt**6 / 1512
+    assert error[[0, -1]].max() < 1.01 * wt**4 / 180
+
+
+def test_held_torque_and_averaged_columns_balance() -> None:
+    """A mass under a held random force: with both averages the law F = m a holds to rounding, without them it does not."""
+    u = np.random.default_rng(4).standard_normal(2000)
+    # acceleration is what the force makes it, held too; its samples would be ambiguous, so the speed's law is used: v' = u
+    v = np.concatenate([[0.0], np.cumsum(u)])[:-1]
+    balance = (v[2:] - v[:-2]) / 2.0 - centre_hold(u)
+    assert np.abs(balance).max() < 1e-12
+    assert np.abs((v[2:] - v[:-2]) / 2.0 - u[1:-1]).std() > 0.1
+
+
+def test_an_average_needs_three_samples() -> None:
+    """Two samples have no average over two steps between them."""
+    with pytest.raises(InputRejected, match="T08"):
+        centre_samples(np.zeros(2))

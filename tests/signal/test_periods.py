@@ -1,0 +1,79 @@
+"""Periods averaged, their noise measured, a strange one found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.signal.periods import average_periods
+
+
+def periodic(samples: int, size: float) -> np.ndarray:
+    """Two channels of a periodic signal with harmonics up to a fiftieth of the rate."""
+    phase = 2 * np.pi * np.arange(samples) / size
+    return np.stack([np.sin(phase) + 0.3 * np.cos(int(size / 50) * phase), 2.0 + np.cos(2 * phase)], axis=1)
+
+
+@pytest.mark.parametrize("size", [500, 500.37, 499.5])
+def test_mean_and_noise_are_recovered(size: float) -> None:
+    """Ten periods with white noise, whole number of samples or not: the signal within its claimed deviation, noise within 5 %."""
+    rng, rate = np.random.default_rng(1), 1000.0
+    noise = np.array([0.1, 0.02])
+    x = periodic(int(10 * size) + 1, size)
+    found = average_periods(x + noise * rng.standard_normal(x.shape), rate, size / rate)
+    phase = 2 * np.pi * np.arange(round(size)) / round(size)
+    truth = np.stack([np.sin(phase) + 0.3 * np.cos(int(size / 50) * phase), 2.0 + np.cos(2 * phase)], axis=1)
+    assert found.count == 10
+    assert found.interpolated == (size != 500)
+    np.testing.assert_allclose(np.sqrt(found.noise_variance), noise, rtol=0.05)
+    assert (np.std(found.mean - truth, axis=0) < 1.1 * found.std_of_mean).all()
+    assert np.abs(found.autocorrelation[2:]).max() < 0.1
+
+
+def test_interpolated_periods_of_a_clean_signal_are_exact() -> None:
+    """Without noise, a period of 500.37 samples leaves 1e-6 of the signal as scatter."""
+    found = average_periods(periodic(5004, 500.37), 1000.0, 0.50037)
+    assert np.sqrt(found.noise_variance).max() < 1e-6
+
+
+def test_coloured_noise_shows_in_the_autocorrelation() -> None:
+    """An AR(1) noise of coefficient 0.8 has autocorrelation 0.8^k."""
+    rng = np.random.default_rng(2)
+    e = rng.standard_normal(40_000)
+    for k in range(1, len(e)):
+        e[k] += 0.8 * e[k - 1]
+    found = average_periods(periodic(40_000, 1000)[:, :1] + e[:, None], 1000.0, 1.0, lags=10)
+    np.testing.assert_allclose(found.autocorrelation[:, 0], 0.8 ** np.arange(11), atol=0.04)
+
+
+def test_a_strange_period_is_left_out_and_named() -> None:
+    """Somebody pushed the arm in the third of six periods."""
+    rng = np.random.default_rng(3)
+    x = periodic(3000, 500) + 0.01 * rng.standard_normal((3000, 2))
+    x[1200:1250, 1] += 1.0
+    found = average_periods(x, 1000.0, 0.5)
+    assert found.outliers == (2,)
+    assert found.used == (0, 1, 3, 4, 5)
+    np.testing.assert_allclose(np.sqrt(found.noise_variance), 0.01, rtol=0.06)
+
+
+def test_missing_samples_are_left_out_of_the_mean() -> None:
+    """A hole in one period is filled by nothing: the mean there is that of the other periods."""
+    x = periodic(2000, 500)
+    x[600:640] = np.nan
+    found = average_periods(x, 1000.0, 0.5)
+    np.testing.assert_allclose(found.mean, periodic(500, 500), rtol=0, atol=1e-12)
+
+
+def test_too_little_is_refused() -> None:
+    """Fewer than two periods; a phase never measured; a period of no length."""
+    x = periodic(1500, 500)
+    with pytest.raises(InputRejected, match="T07"):
+        average_periods(x[:999], 1000.0, 0.5)
+    x[100::500] = np.nan
+    with pytest.raises(InputRejected, match="D02"):
+        average_periods(x, 1000.0, 0.5)
+    for period in (0.0, -1.0, np.nan):
+        with pytest.raises(UsageError):
+            average_periods(x, 1000.0, period)
