@@ -31,6 +31,7 @@ _LIMIT = 3.0  # standard deviations within which noise explains the distance to 
 _GAP = 1e-4  # of ½ distance², absolute and relative, where the search stops
 _BOUND = 100.0  # times the largest estimate: what mass and moments stay below
 _STEPS = 200
+_ROUNDING = 1e-13  # of a Hessian with unit diagonal
 
 
 @dataclass(frozen=True)
@@ -137,22 +138,25 @@ class _Barrier:
         return float(-2.0 * np.log(np.einsum("iaa->ia", triangles)).sum() - np.log(room).sum() - np.log(free).sum())
 
     def derivatives(self, phi: Array) -> tuple[Array, Array]:
-        """Gradient (10 · bodies,) and Hessian, block-diagonal. Boyd & Vandenberghe 2004, section A.4."""
+        """Gradient (10 · bodies,), and F with FᵀF the Hessian: from J = T Tᵀ and S_k = T⁻¹ M_k T⁻ᵀ come -tr S_k and
+        tr S_k S_l. Boyd & Vandenberghe 2004, section A.4.
+        """
         table = phi.reshape(self.bodies, 10)
-        gradient, hessian = np.zeros((self.bodies, 10)), np.zeros((self.bodies, 10, self.bodies, 10))
+        gradient, factor = np.zeros((self.bodies, 10)), np.zeros((self.bodies, 17, self.bodies, 10))
         trace = np.einsum("aak->k", _PSEUDO)
         for i in range(self.bodies):
             if i in self.held:
                 inertia = pseudo_inertia(table[i:i + 1])[0]
-                scaled = np.linalg.solve(inertia, _PSEUDO.reshape(4, 40)).reshape(4, 4, 10)  # J⁻¹ M_k
+                inverse = np.linalg.inv(np.linalg.cholesky(inertia))
+                scaled = np.einsum("ab,bck,dc->adk", inverse, _PSEUDO, inverse)
                 room = self.bound - float(np.trace(inertia))
                 gradient[i] = trace / room - np.einsum("aak->k", scaled)
-                hessian[i, :, i] = np.outer(trace, trace) / room**2 + np.einsum("abk,bal->kl", scaled, scaled)
+                factor[i, :16, i], factor[i, 16, i] = scaled.reshape(16, 10), trace / room
             else:
                 room_of = self.bound**2 - np.square(table[i])
                 gradient[i] = 2.0 * table[i] / room_of
-                hessian[i, :, i] = np.diag(2.0 / room_of + np.square(gradient[i]))
-        return gradient.ravel(), hessian.reshape(phi.size, phi.size)
+                factor[i, :10, i] = np.diag(np.sqrt(2.0 / room_of + np.square(gradient[i])))
+        return gradient.ravel(), factor.reshape(-1, phi.size)
 
 
 def _nearest(a: Array, b: Array, barrier: _Barrier) -> Array:
@@ -170,20 +174,33 @@ def _nearest(a: Array, b: Array, barrier: _Barrier) -> Array:
     x = np.concatenate([s[:rank], np.ones(v.shape[0] - rank)]) * (v @ phi)
     t = 1.0 / max(float(np.sum(np.square(x[:rank] - goal))), 1e-3)
     for _ in range(_STEPS):
-        gradient, hessian = barrier.derivatives(basis @ x)
-        gradient, hessian = basis.T @ gradient, basis.T @ hessian @ basis
+        gradient, factor = barrier.derivatives(basis @ x)
+        gradient, factor = basis.T @ gradient, factor @ basis
+        hessian = factor.T @ factor
         gradient[:rank] += t * (x[:rank] - goal)
         hessian[np.arange(rank), np.arange(rank)] += t
         size = np.sqrt(np.diag(hessian))
-        step = -np.linalg.solve(hessian / size / size[:, None], gradient / size) / size
+        step = -np.linalg.solve(hessian / size / size[:, None] + _ROUNDING * np.eye(len(size)), gradient / size) / size
         decrement = -float(gradient @ step)
         if decrement < 0.05:
             if 5.0 * barrier.bodies / t < _GAP * max(1.0, 0.5 * float(np.sum(np.square(x[:rank] - goal)))):
                 break
             t *= 30.0
             continue
-        x = _descend(x, step, decrement, lambda z, t=t: 0.5 * t * float(np.sum(np.square(z[:rank] - goal))) + barrier.value(basis @ z))
+        x = _descend(x, step, decrement, _Objective(barrier, basis, goal, t))
     return np.asarray(basis @ x)
+
+
+@dataclass(frozen=True, eq=False)
+class _Objective:
+    barrier: _Barrier
+    basis: Array
+    goal: Array
+    t: float
+
+    def __call__(self, x: Array) -> float:
+        misfit = float(np.sum(np.square(x[:len(self.goal)] - self.goal)))
+        return 0.5 * self.t * misfit + self.barrier.value(self.basis @ x)
 
 
 def _descend(x: Array, step: Array, decrement: float, value: Callable[[Array], float]) -> Array:

@@ -16,13 +16,14 @@ alone misses what a sharp filter does, averages alone smear a peak.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.fit.equations import Array, Block
+from pipelines.fit.equations import Array, Block, Indices
 from pipelines.fit.least_squares import Solution
 
 __all__ = ["Robust", "robust_covariance"]
@@ -31,8 +32,10 @@ Complex = npt.NDArray[np.complex128]
 
 _ORDER = 24  # of the autoregressions at most
 _BINS = 40  # independent frequencies in a band: its power is then known to 16 %
+_MOST_TAKEN = 0.75  # of a band's noise, by the parameters: beyond, what is left says too little
 _PADDING = 8  # an eighth of a block of zeros, so that its end does not touch its beginning
-_CROSS = 4.0  # standard deviations of a correlation between channels that is not chance
+_CROSS = 5.0  # standard deviations of a correlation between channels that is not chance
+_LAGS = 20  # samples apart, at which it is looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,79 +56,108 @@ class Robust:
 class _Noise:
     """A cross-spectrum S = H L Lᴴ Hᴴ: H shapes each channel, L mixes them, constant within a band."""
 
+    width: int  # parameters
     length: int  # samples of the Fourier transform
     shape: Complex  # (channels, frequencies)
-    edges: npt.NDArray[np.intp]  # (bands + 1,)
+    edges: Indices  # (bands + 1,)
     mix: Complex  # (bands, channels, channels) lower triangular
     orders: tuple[int, ...]
     white: bool
 
 
 def robust_covariance(equations: Iterable[Block], solution: Solution, longest: int) -> Robust:
-    """The covariance of `solution` by two passes over its equations, one where the residual is white.
+    """The covariance of `solution` by two passes over its equations; one where they are a single block, or the residual
+    is white.
 
     Args:
         longest: samples of the longest block (`Statistics.longest`).
     """
-    noise = _noise(equations, solution, _good_length(longest + longest // _PADDING + 1))
+    length = _good_length(longest + longest // _PADDING + 1)
+    noise, alone = _noise(equations, solution, length)
     plain = np.diag(solution.covariance)
     if noise.white:
         return Robust(solution.covariance, True, np.ones(len(plain)), noise.orders)
     meat = np.zeros_like(solution.bread)
-    for block in equations:
-        meat += _block_meat(block, solution.weights, noise)
+    for transformed in (alone,) if alone is not None else (_transform(block, length) for block in equations):
+        meat += _meat(transformed, solution.weights, noise)
     covariance = solution.bread @ meat @ solution.bread
     inflation = np.sqrt(np.diag(covariance) / np.where(plain > 0.0, plain, 1.0))
     covariance[~solution.determined] = covariance[:, ~solution.determined] = np.inf
     return Robust(covariance, False, np.where(solution.determined, inflation, 1.0), noise.orders)
 
 
-def _block_meat(block: Block, weights: Array, noise: _Noise) -> Array:
+@dataclass(frozen=True, eq=False)
+class _Transformed:
+    """The Fourier transforms a(f) of a block's columns."""
+
+    columns: tuple[Indices, ...]
+    spectra: tuple[Complex, ...]  # of each channel (k_j, frequencies)
+
+
+def _transform(block: Block, length: int) -> _Transformed:
+    return _Transformed(block.columns, tuple(np.fft.rfft(values, length, axis=1) for values in block.values))
+
+
+def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
     """1/n Σ_f conj(Z)ᵀ Z with Z = Lᴴ Hᴴ [w_j a_j(f)ᵀ]: S as a square keeps M positive."""
-    bins = noise.shape.shape[1]
-    spectra = [np.fft.rfft(values, noise.length, axis=1) * (w * np.conj(h)) for values, w, h in
-               zip(block.values, weights, noise.shape, strict=True)]
+    width, bins = noise.width, noise.shape.shape[1]
     twice = np.full(bins, np.sqrt(2.0 / noise.length))  # negative frequencies
     twice[0] = np.sqrt(1.0 / noise.length)
     if noise.length % 2 == 0:
         twice[-1] = twice[0]
-    wide = np.repeat(noise.mix, np.diff(noise.edges), axis=0)  # (frequencies, channels, channels)
-    meat = np.zeros((block.width, block.width))
-    for a in range(block.channels):
-        mixed = np.zeros((block.width, bins), dtype=np.complex128)
-        for j in range(a, block.channels):
-            factor = np.conj(wide[:, j, a])
-            if factor.any():
-                mixed[block.columns[j]] += spectra[j] * (factor * twice)
+    spectra = [a * (w * twice * np.conj(h)) for a, w, h in zip(block.spectra, weights, noise.shape, strict=True)]
+    wide = np.repeat(np.conj(noise.mix), np.diff(noise.edges), axis=0)  # (frequencies, channels, channels)
+    meat = np.zeros((width, width))
+    for a in range(len(spectra)):
+        mixed = np.zeros((width, bins), dtype=np.complex128)
+        for j in range(a, len(spectra)):
+            mixed[block.columns[j]] += spectra[j] * wide[:, j, a]
         used = np.flatnonzero(mixed.any(axis=1))
-        real = np.ascontiguousarray(mixed[used]).view(np.float64)
+        real = mixed[used].view(np.float64)
         meat[np.ix_(used, used)] += real @ real.T
     return meat
 
 
-def _noise(equations: Iterable[Block], solution: Solution, length: int) -> _Noise:
-    """The residual's cross-spectrum, its power made good for what the parameters took."""
-    channels, samples = len(solution.sigma), 0
+def _noise(equations: Iterable[Block], solution: Solution, length: int) -> tuple[_Noise, _Transformed | None]:
+    """The residual's cross-spectrum; also the transformed block where there is only one."""
+    channels, samples, blocks = len(solution.sigma), 0, 0
     cross = np.zeros((channels, channels, length // 2 + 1), dtype=np.complex128)
-    for residual in _residuals(equations, solution):
-        spectrum = np.fft.rfft(residual, length, axis=1)
+    leverage = np.zeros((channels, length // 2 + 1))
+    for block in equations:
+        spectrum = np.fft.rfft(block.residual(solution.beta), length, axis=1)
         cross += spectrum[:, None] * np.conj(spectrum)
-        samples += residual.shape[1]
-    taken = np.sqrt(samples / solution.freedom)
-    cross *= (taken[:, None] * taken / samples)[:, :, None]
+        transformed = _transform(block, length)
+        leverage += _leverage(transformed, solution)
+        samples, blocks = samples + block.samples, blocks + 1
+    cross /= samples
     gamma = np.fft.irfft(cross[np.arange(channels), np.arange(channels)], length, axis=1)
     fits = [_autoregression(g, samples, min(_ORDER, samples // 20)) for g in gamma]
     shape = np.array([1.0 / np.fft.rfft(a, length) for a in fits])
     orders = tuple(len(a) - 1 for a in fits)
     edges = _edges(cross.shape[2], max(1, _BINS * length // max(samples, length)))
-    flat = cross / (shape[:, None] * np.conj(shape))
-    mean: Complex = np.asarray(np.add.reduceat(flat, edges[:-1], axis=2) / np.diff(edges), dtype=np.complex128)
-    return _Noise(length, shape, edges, _factor(mean.transpose(2, 0, 1)), orders,
-                  not any(orders) and not _correlated(cross, samples))
+    left = np.sqrt(1.0 - np.minimum(_mean(leverage / samples, edges), _MOST_TAKEN))
+    mean = _mean(cross / (shape[:, None] * np.conj(shape)), edges) / (left[:, None] * left)
+    noise = _Noise(len(solution.beta), length, shape, edges, _factor(mean.transpose(2, 0, 1)), orders,
+                   not any(orders) and not _correlated(cross, length, samples))
+    return noise, transformed if blocks == 1 else None
 
 
-def _residuals(equations: Iterable[Block], solution: Solution) -> Iterator[Array]:
-    return (block.residual(solution.beta) for block in equations)
+def _leverage(block: _Transformed, solution: Solution) -> Array:
+    """w aᴴ C a (channels, frequencies): the share of the noise that the parameters take up, frequency by frequency.
+
+    It is largest where the columns are, which is where S matters: E|r|² = (1 - h) S.
+    """
+    rows = []
+    for index, spectra, w in zip(block.columns, block.spectra, solution.weights, strict=True):
+        values, vectors = np.linalg.eigh(solution.bread[np.ix_(index, index)])
+        part = (vectors * np.sqrt(np.maximum(w * values, 0.0))).T @ spectra
+        rows.append(np.square(part.real).sum(axis=0) + np.square(part.imag).sum(axis=0))
+    return np.array(rows)
+
+
+def _mean(values: Any, edges: Indices) -> Any:
+    """Averages over bands of the last axis."""
+    return np.add.reduceat(values, edges[:-1], axis=-1) / np.diff(edges)
 
 
 def _autoregression(gamma: Array, samples: int, most: int) -> Array:
@@ -150,7 +182,7 @@ def _autoregression(gamma: Array, samples: int, most: int) -> Array:
     return best
 
 
-def _edges(bins: int, width: int) -> npt.NDArray[np.intp]:
+def _edges(bins: int, width: int) -> Indices:
     """Bands of about `width` bins, all alike to one bin."""
     return np.linspace(0, bins, max(1, bins // width) + 1).astype(np.intp)
 
@@ -165,12 +197,12 @@ def _factor(spectrum: Complex) -> Complex:
                       * np.where(power > 0.0, scale, 0.0)[:, :, None])
 
 
-def _correlated(cross: Complex, samples: int) -> bool:
-    """Whether two channels are correlated at the same instant beyond chance."""
-    covariance = 2.0 * cross[:, :, 1:].real.sum(axis=2) + cross[:, :, 0].real
-    std = np.sqrt(np.diag(covariance))
-    apart = covariance - np.diag(np.diag(covariance))
-    return bool(np.any(np.abs(apart) * np.sqrt(samples) > _CROSS * std[:, None] * std))
+def _correlated(cross: Complex, length: int, samples: int) -> bool:
+    """Whether two channels are correlated beyond chance, at the same instant or a little apart."""
+    covariance = np.fft.irfft(cross, length, axis=2)[:, :, [*range(_LAGS), *range(-_LAGS, 0)]]
+    std = np.sqrt(np.maximum(np.einsum("jjl->jl", covariance)[:, 0], 0.0))
+    apart = ~np.eye(len(std), dtype=bool)
+    return bool(np.any(np.abs(covariance[apart]) * np.sqrt(samples) > _CROSS * (std[:, None] * std)[apart][:, None]))
 
 
 def _good_length(least: int) -> int:

@@ -45,7 +45,7 @@ class Block:
         Views where they do; quickest where Y is stored with samples fastest. `acting` (channels, parameters) says which
         columns can act at all; without it those that are zero throughout the block are left out.
         """
-        seen = Y.any(axis=0) if acting is None else acting
+        seen = np.asarray(Y.any(axis=0)) if acting is None else acting
         columns = tuple(np.flatnonzero(row) for row in seen)
         by_channel = Y.transpose(1, 2, 0)
         return cls(Y.shape[2], columns, tuple(rows_of(by_channel[j], index) for j, index in enumerate(columns)), tuple(y.T))

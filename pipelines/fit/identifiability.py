@@ -91,11 +91,11 @@ def _resolved(solution: Solution, inflation: float) -> npt.NDArray[np.bool_]:
 def unresolved(solution: Solution, names: Sequence[str], inflation: float = 1.0) -> Unresolved:
     """Name what cannot be seen: columns that are zero, and groups of columns that only show together."""
     lost = solution.directions[~_resolved(solution, inflation)]
-    involved = np.flatnonzero(np.any(np.abs(lost) > _INVOLVED, axis=0)) if len(lost) else np.zeros(0, dtype=int)
+    involved = [int(k) for k in np.flatnonzero(np.any(np.abs(lost) > _INVOLVED, axis=0))]
     alone, groups = [], []
     for vector in _sparse(lost):
         group = np.flatnonzero(np.abs(vector) > _NAMED * np.abs(vector).max())
-        if len(group) == 1 and not solution.bread[group[0], group[0]] > 0.0:
+        if len(group) == 1 and not solution.acting[group[0]]:
             alone.append(int(group[0]))
         else:
             groups.append(tuple(int(k) for k in group))
@@ -119,7 +119,7 @@ def hard_to_see(solution: Solution, names: Sequence[str], count: int = 3) -> tup
     """The `count` weakest directions, the weakest first."""
     found = []
     for s, v in list(zip(solution.singular_values, solution.directions, strict=True))[::-1][:count]:
-        order = [int(k) for k in np.argsort(-np.abs(v), kind="stable")]
+        order: list[int] = [int(k) for k in np.argsort(-np.abs(v), kind="stable")]
         sign = np.sign(v[order[0]])
         found.append(Direction(float(s), tuple((names[k], float(sign * v[k])) for k in order if abs(v[k]) >= _NAMED)))
     return tuple(found)

@@ -55,6 +55,7 @@ class Solution:
     directions: Array  # (k, k) right singular vectors, one a row
     rank: int  # as far as rounding allows to see; `identifiability` asks what noise allows
     determined: npt.NDArray[np.bool_]  # (k,) whether a parameter is outside every direction that is lost to rounding
+    acting: npt.NDArray[np.bool_]  # (k,) whether any sample shows the parameter at all
     method: Literal["normal equations", "QR"]
 
     @property
@@ -115,7 +116,7 @@ def solve(statistics: Statistics, *, weights: Array | None = None) -> Solution:
     covariance = bread @ np.tensordot(np.square(w * sigma), information, 1) @ bread
     covariance[~determined] = covariance[:, ~determined] = np.inf
     return Solution(beta, covariance, bread, w, sigma, freedom, errors(statistics, beta), seen.scale, seen.singular_values,
-                    seen.directions, int(keep.sum()), determined,
+                    seen.directions, int(keep.sum()), determined, np.einsum("jkk->k", information) > 0.0,
                     "normal equations" if isinstance(statistics, Gram) else "QR")
 
 
