@@ -57,7 +57,7 @@ def main(samples: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         ours, peer = Path(folder) / "log.h5", Path(folder) / "matrix.h5"
         write_log(ours, log)
-        print(f"{samples:.0e} samples, q and tau of 20 channels; ours: the layout of a log, then open_log (hashed, guarded, checked)")
+        print(f"{samples:.0e} samples, q and tau of 20 channels; ours: the layout alone, then open_log (hashed, guarded, checked)")
         print(side_by_side.HEADER)
         for words, order, chunks in peers:
             write_matrix(peer, log, order, chunks)

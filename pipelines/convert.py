@@ -89,10 +89,11 @@ def write(result: Result, folder: Path, request: Request) -> None:
 def report(result: Result) -> Report:
     """A table of what became what."""
     n = len(result.logs)
+    words = ("Each was read back after writing and is equal to its source, sample for sample and attribute for attribute.",
+             "Numbers are written with all their digits.")
     table = Table(("log", "from", "to", "samples", "joints"),
                   tuple((c.name, c.source, c.file, c.samples, c.joints) for c in result.logs),
-                  caption="Each was read back after writing and is equal to its source, sample for sample and attribute for attribute."
-                  if not all(c.file.startswith("csv") for c in result.logs) else "Numbers are written with all their digits.")
+                  caption=words[any(c.file.startswith("csv") for c in result.logs)])
     verdict = f"{n} log{'s' if n != 1 else ''} converted."
     return Report("Convert", verdict, "good", sections=(Section("Logs", tables=(table,)),))
 

@@ -1,8 +1,8 @@
 """Import recordings: CSV, MAT and NumPy files become logs, by a recipe.
 
-Reads    a recipe (TOML, `pipelines.log.recipe`) and the recorded files its patterns match
+Reads    a recipe (TOML, `pipelines.log.recording.recipe`) and the recorded files its patterns match
 Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet for maps without a clock, result.json, report.html
-Source   log-format.md; transmission and torque constants as `pipelines.log.joint_side` says
+Source   log-format.md; transmission and torque constants as `pipelines.log.recording.joint_side` says
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, UsageError
-from pipelines.log import filenames
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
-from pipelines.log.joint_side import Converted, joint_side
-from pipelines.log.make_log import SourceFile, make_log
-from pipelines.log.recipe import ResampleSpec
-from pipelines.log.recordings import Map, Material, Source, assemble, collect, parse_map
-from pipelines.log.repair import Limits, Recording, mend, split_at_gaps
+from pipelines.log.recording import filenames
+from pipelines.log.recording.joint_side import Converted, joint_side
+from pipelines.log.recording.make_log import SourceFile, make_log
+from pipelines.log.recording.recipe import ResampleSpec
+from pipelines.log.recording.recordings import Map, Material, Source, assemble, collect, parse_map
+from pipelines.log.recording.repair import Limits, Recording, mend, split_at_gaps
+from pipelines.log.recording.table_columns import ImportedTable, import_table
 from pipelines.log.results import NOT_STORED
 from pipelines.log.table import write_table
-from pipelines.log.table_columns import ImportedTable, import_table
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.signal.resample import grid, resample
 from pipelines.stage import Inputs, Request, Stage, slug

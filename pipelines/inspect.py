@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check, Level, RrridError
-from pipelines.log.checks import Subject, check_log, check_together
+from pipelines.log.doctor.checks import Subject, check_log, check_together
+from pipelines.log.doctor.faults import quantum
 from pipelines.log.experiment import ExperimentLog
-from pipelines.log.faults import quantum
 from pipelines.log.files import Opened
 from pipelines.log.robot import RobotDescription, format_robot
 from pipelines.log.schema import joint_unit

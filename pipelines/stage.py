@@ -24,7 +24,8 @@ from pipelines.errors import Check, RrridError, UsageError
 from pipelines.log.atomic import replace_folder, staging_folder, write_file
 from pipelines.log.files import Opened, find_logs, hash_file, open_log
 from pipelines.log.results import encode, json_text, write_series
-from pipelines.log.robot import RobotDescription, load_robot
+from pipelines.log.robot import RobotDescription
+from pipelines.log.robot_files import load_robot
 from pipelines.report.report import Report
 
 __all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "read_logs", "run_stage", "slug", "tilde"]

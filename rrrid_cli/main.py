@@ -96,7 +96,7 @@ def schema(what: Annotated[str, typer.Argument(help="model")] = "model") -> None
 
 
 def _guess(path: Path, common: Common) -> None:
-    from pipelines.log.guess import guess_recipe
+    from pipelines.log.recording.guess import guess_recipe
 
     drafted = guess_recipe(path)
     if common.out is not None:

@@ -13,8 +13,9 @@ from functools import lru_cache
 import numpy as np
 
 from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
-from pipelines.log.robot import RobotDescription, format_robot, load_robot
-from pipelines.model.rigid.body import rigid_body
+from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.log.robot_files import load_robot
+from pipelines.model.rigid.choose import rigid_body
 
 TS = 1e-3  # [s]
 ENCODER = 1e-5  # [rad]

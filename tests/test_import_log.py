@@ -19,7 +19,7 @@ from pipelines.import_log import STAGE, Result, Settings, compute, report
 from pipelines.log.files import open_log
 from pipelines.log.results import decode
 from pipelines.stage import Outcome, Request, run_stage
-from tests.log.recording import RECIPE, codes, good, lines, run, text, write
+from tests.log.recording.good import RECIPE, codes, good, lines, run, text, write
 
 
 @pytest.fixture(scope="session")
@@ -444,7 +444,7 @@ def test_f14_a_file_that_changes_meanwhile(folder: Path, monkeypatch: pytest.Mon
             file.write("1\n")
         return compute(inputs, settings)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("tests.log.recording.STAGE", __import__("dataclasses").replace(STAGE, compute=meddle))
+    monkeypatch.setattr("tests.log.recording.good.STAGE", __import__("dataclasses").replace(STAGE, compute=meddle))
     with pytest.raises(InputRejected, match="RRID-F14"):
         run(folder)
 

@@ -197,7 +197,7 @@ def test_a_folder_is_judged_as_a_whole(tmp_path: Path) -> None:
 
 def test_signals_of_the_preview_cover_the_log() -> None:
     """Envelopes keep the extremes: no peak is lost in 400 points."""
-    from pipelines.log.checks import Subject
+    from pipelines.log.doctor.checks import Subject
     from pipelines.report.log_preview import log_preview
 
     log = good_log()

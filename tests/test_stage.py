@@ -109,7 +109,8 @@ def test_an_input_that_changes_meanwhile_is_refused(logs: Path) -> None:
 
 def test_strict_turns_a_repair_into_an_error(logs: Path) -> None:
     """--strict: what would be mended with a word is refused, with the same code."""
-    repaired = _stage(lambda inputs, settings: _Nothing(), checks=lambda result: (Check.of("T02", "repair", "2 samples dropped", where="a"),))
+    mended = Check.of("T02", "repair", "2 samples dropped", where="a")
+    repaired = _stage(lambda inputs, settings: _Nothing(), checks=lambda result: (mended,))
     assert run_stage(repaired, _request(logs), _Nothing()).exit_code == 0
     with pytest.raises(InputRejected, match="RRID-T02 a: 2 samples dropped"):
         run_stage(repaired, _request(logs, strict=True), _Nothing())

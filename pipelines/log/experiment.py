@@ -84,7 +84,7 @@ class ExperimentLog:
     """One experiment on one robot (`log-format.md`, version 1), everything in SI.
 
     `signals` always holds t and, but in planned logs, q and tau. Samples may carry NaN: a recording is shown as it
-    is, and `pipelines.log.checks` says what is wrong with it.
+    is, and `pipelines.log.doctor.checks` says what is wrong with it.
     """
 
     name: str

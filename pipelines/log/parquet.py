@@ -76,7 +76,8 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[Experim
                             thrift_string_size_limit=_LONGEST_METADATA) as file:
             about = _about(file.schema_arrow, where)
             refuse_oversize(8 * file.metadata.num_rows * file.metadata.num_columns, path.stat().st_size, "X06", where)
-            names = {name: columns for name, columns in _signal_columns(file.schema_arrow, where).items() if only is None or name in only}
+            names = {name: columns for name, columns in _signal_columns(file.schema_arrow, where).items()
+                     if only is None or name in only}
             table = file.read([column for columns in names.values() for column in columns], use_threads=False)
     except InputRejected:
         raise

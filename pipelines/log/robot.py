@@ -1,8 +1,9 @@
 """Describe a robot: kinematics, limits, known links and drive, as TOML text that travels inside every log.
 
-    robot = parse_robot(text)          from the text of a log or of a file without references
-    robot = load_robot(path_or_name)   from a file, its URDF embedded, or one that is shipped ("rrr")
-    text  = format_robot(robot)        the canonical text
+    robot = parse_robot(text)      from the text of a log
+    text  = format_robot(robot)    the canonical text
+
+Files, which may name a URDF, are read by `pipelines.log.robot_files`.
 
 The validator is written out here rather than left to pydantic: it runs for every log that is opened, and importing
 pydantic alone costs more than reading a ten-second log.
@@ -13,12 +14,11 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 from pipelines.errors import InputRejected, RrridError, UsageError, did_you_mean
 
-__all__ = ["Drive", "Joint", "LinkParameters", "RobotDescription", "format_robot", "load_robot", "parse_robot"]
+__all__ = ["Drive", "Joint", "LinkParameters", "RobotDescription", "format_robot", "parse_robot"]
 
 Vector = tuple[float, float, float]
 
@@ -261,61 +261,3 @@ def _joint_table(joint: Joint, convention: str) -> dict[str, object]:
     if joint.link is not None:
         table["link"] = {"mass": joint.link.mass, "com": list(joint.link.com), "inertia": list(joint.link.inertia)}
     return table
-
-
-def load_robot(source: str | Path) -> RobotDescription:
-    """Read a robot from a TOML file, a URDF file, or by the bare name of one that is shipped.
-
-    Raises:
-        UsageError: no such robot, or the file is not a robot description.
-    """
-    from pipelines.log.shipped import shipped
-
-    path = Path(source)
-    if not path.exists():
-        path = shipped("robots", str(source))
-    if path.suffix.lower() in (".urdf", ".xacro"):
-        from pipelines.log.urdf import import_urdf
-
-        return import_urdf(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        raise UsageError("C04", f"cannot be read: {problem}", where=path) from None
-    return _embed_urdf(text, path) or parse_robot(text, where=path)
-
-
-def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
-    """`urdf = "arm.urdf"` names a file beside the description: its kinematics become `urdf_text`."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return None
-    kinematics = table.get("kinematics")
-    if not isinstance(kinematics, dict) or not isinstance(kinematics.get("urdf"), str):
-        return None
-    from pipelines.log.urdf import import_urdf
-
-    tip = kinematics.get("tip_link")
-    arm = import_urdf(path.parent / str(kinematics.pop("urdf")), tip_link=tip if isinstance(tip, str) else None)
-    kinematics["urdf_text"] = arm.urdf_text
-    given = table.setdefault("joint", [{"name": j.name, "type": j.type} for j in arm.joints])
-    described = _parse_table(table, path)
-    if len(given) != arm.n_joints:
-        raise UsageError("S02", f"{len(given)} [[joint]] tables, but the URDF has {arm.n_joints} moving joints", where=path)
-    merged = tuple(_fill(mine, urdf) for mine, urdf in zip(described.joints, arm.joints, strict=True))
-    return replace(described, joints=merged, tip_link=arm.tip_link)
-
-
-def _parse_table(table: dict[str, object], path: Path) -> RobotDescription:
-    import tomli_w
-
-    return parse_robot(tomli_w.dumps(table), where=path)
-
-
-def _fill(mine: Joint, urdf: Joint) -> Joint:
-    """`mine` with every limit it leaves open, and the link, taken from the URDF."""
-    plain = Joint(mine.name)
-    open_limits = {key: getattr(urdf, key) for key in ("position", "velocity", "torque", "link")
-                   if getattr(mine, key) == getattr(plain, key)}
-    return replace(mine, type=urdf.type, **open_limits)

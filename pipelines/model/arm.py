@@ -20,7 +20,8 @@ from pipelines.log.robot import RobotDescription, format_robot, parse_robot
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.parameter import Origin, Parameter
-from pipelines.model.rigid.body import Array, Motion, RigidBody, rigid_body
+from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.rigid.choose import rigid_body
 
 __all__ = ["Acting", "Arm", "ArmTorque"]
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.log.checks_subject import Subject
+from pipelines.log.doctor.checks_subject import Subject
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.row_fit import Row, Sampled, relative_residual, row_fits
 

@@ -14,11 +14,12 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.checks_subject import Subject, spread
+from pipelines.log.doctor.checks_subject import Subject, spread
 from pipelines.model.clock_offset import clock_offset
 from pipelines.model.evidence import Evidence
 from pipelines.model.mix_ups import encoder_scale, position_columns, torque_columns
-from pipelines.model.rigid.body import Array, rigid_body
+from pipelines.model.rigid.body import Array
+from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 
 __all__ = ["excitation_condition", "plausibility"]

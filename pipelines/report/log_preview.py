@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.log.checks_subject import Subject
+from pipelines.log.doctor.checks_subject import Subject
+from pipelines.log.doctor.faults import GAP_LIMIT, Mask
 from pipelines.log.experiment import Array
-from pipelines.log.faults import GAP_LIMIT, Mask
 from pipelines.report.report import Figure
 from pipelines.report.sections import interval_figure, joint_signal_figure, timeline_figure
 

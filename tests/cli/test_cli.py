@@ -110,8 +110,8 @@ def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path) -> None:
     code = ("import sys, pipelines.convert as c; from rrrid_cli import main; from dataclasses import replace\n"
             "c.STAGE = replace(c.STAGE, compute=lambda inputs, settings: 1 / 0)\nsys.argv = ['rrrid', *sys.argv[1:]]\nmain.entry()")
     environment = os.environ | {"PYTHONPATH": str(REPO), "TMPDIR": str(logs)}
-    done = subprocess.run([sys.executable, "-c", code, "convert", "logs"], capture_output=True, text=True, cwd=logs, env=environment,
-                          check=False)
+    done = subprocess.run([sys.executable, "-c", code, "convert", "logs"], capture_output=True, text=True, cwd=logs,
+                          env=environment, check=False)
     assert done.returncode == 70
     assert done.stderr.count("\n") == 1
     (crash,) = logs.glob("rrrid-crash-*.txt")

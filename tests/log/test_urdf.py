@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.robot import RobotDescription, format_robot, load_robot, parse_robot
+from pipelines.log.robot import RobotDescription, format_robot, parse_robot
+from pipelines.log.robot_files import load_robot
 from pipelines.log.urdf import chain_from_urdf, import_urdf
 
 _LIMIT = '<limit lower="-1" upper="2" effort="5" velocity="3"/>'

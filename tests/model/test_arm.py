@@ -11,7 +11,8 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue, model_text, parse_model
-from pipelines.log.robot import Joint, load_robot
+from pipelines.log.robot import Joint
+from pipelines.log.robot_files import load_robot
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Predict, Quantity
 from pipelines.model.effects.viscous import Viscous

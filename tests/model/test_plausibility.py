@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.checks import Subject
+from pipelines.log.doctor.checks import Subject
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.robot import LinkParameters
 from pipelines.model.clock_offset import clock_offset
 from pipelines.model.evidence import Evidence
 from pipelines.model.plausibility import excitation_condition, plausibility
-from pipelines.model.rigid.body import rigid_body
+from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import quick_residual, relative_residual, row_fits, sample_motion
 from tests.faulty import drifting, healthy_without_reference
 from tests.healthy import (

@@ -1,9 +1,8 @@
-"""What every rigid body offers, and the choice between the closed form and the general recursion."""
+"""What every rigid body offers, whatever computes it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy.typing as npt
 
 from pipelines.log.robot import RobotDescription
 
-__all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "rigid_body"]
+__all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts"]
 
 Array = npt.NDArray[np.float64]
 
@@ -73,15 +72,3 @@ class RigidBody(Protocol):
     def known_parameters(self) -> Array | None:
         """p of the links the description knows, (parameters,), or None where it does not know them all."""
         ...
-
-
-@lru_cache(maxsize=64)
-def rigid_body(robot: RobotDescription) -> RigidBody:
-    """The closed form (A1)-(A5) where `robot` has the RRR arm's geometry, the general recursion otherwise."""
-    from pipelines.model.rigid import rrr
-
-    if rrr.fits(robot):
-        return rrr.RRR(robot)
-    from pipelines.model.rigid.base import BaseArm
-
-    return BaseArm(robot)

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.log.robot import LinkParameters, RobotDescription, load_robot
+from pipelines.log.robot import LinkParameters, RobotDescription
+from pipelines.log.robot_files import load_robot
 from pipelines.model.rigid.body import Array
 
 

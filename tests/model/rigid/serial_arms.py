@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pipelines.log.robot import Joint, RobotDescription, load_robot
+from pipelines.log.robot import Joint, RobotDescription
+from pipelines.log.robot_files import load_robot
 from pipelines.log.urdf import import_urdf
 
 HALF = math.pi / 2

@@ -10,12 +10,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.log.robot import LinkParameters, RobotDescription, load_robot
+from pipelines.log.robot import LinkParameters, RobotDescription
+from pipelines.log.robot_files import load_robot
 from pipelines.log.urdf import import_urdf
 from pipelines.model.rigid import chain as serial
 from pipelines.model.rigid import rrr
 from pipelines.model.rigid.base import BaseArm, base_set
-from pipelines.model.rigid.body import rigid_body
+from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.rigid.geometry import serial_chain
 from tests.model.rigid.serial_arms import HALF, TX40, Arm, physical_links, table
 

@@ -9,8 +9,10 @@ import numpy as np
 import pinocchio
 import pytest
 
-from pipelines.log.robot import RobotDescription, load_robot
-from pipelines.model.rigid.body import Array, RigidBody, rigid_body
+from pipelines.log.robot import RobotDescription
+from pipelines.log.robot_files import load_robot
+from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.rigid.rrr import RRR, fits
 from tests.model.rigid.rrr_arms import column, random_states, robot_with
 

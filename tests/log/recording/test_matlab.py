@@ -15,10 +15,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.arrays import read_npy
-from pipelines.log.raw import columns_of_arrays
-from pipelines.log.sources import read_table
-from tests.log.recording import good, text
+from pipelines.log.recording.arrays import read_npy
+from pipelines.log.recording.raw import columns_of_arrays
+from pipelines.log.recording.sources import read_table
+from tests.log.recording.good import good, text
 
 
 def signals() -> dict[str, np.ndarray[Any, Any]]:

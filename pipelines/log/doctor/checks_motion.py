@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.checks_subject import Subject, spread
+from pipelines.log.doctor.checks_subject import Subject, spread
+from pipelines.log.doctor.faults import lagged_speed
+from pipelines.log.doctor.stop import emergency_stop
 from pipelines.log.experiment import Array
-from pipelines.log.faults import lagged_speed
-from pipelines.log.stop import emergency_stop
 
 __all__ = ["MOTION_CHECKS", "both_ways"]
 

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import InputRejected, clean
-from pipelines.log.clock import plausible_units
-from pipelines.log.column_roles import companion_of, named_unit, roles_of
-from pipelines.log.evidence import Guess, motion_of, position_unit, sign_of, torque_unit
 from pipelines.log.experiment import Array
-from pipelines.log.raw import RawTable
-from pipelines.log.repair import FEWEST
-from pipelines.log.sources import read_table
+from pipelines.log.recording.clock import plausible_units
+from pipelines.log.recording.column_roles import companion_of, named_unit, roles_of
+from pipelines.log.recording.evidence import Guess, motion_of, position_unit, sign_of, torque_unit
+from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.repair import FEWEST
+from pipelines.log.recording.sources import read_table
 
 __all__ = ["Draft", "guess_recipe"]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
-from pipelines.log.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
 from pipelines.log.experiment import Array
-from pipelines.log.raw import RawTable, header_unit
+from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
+from pipelines.log.recording.raw import RawTable, header_unit
 
 __all__ = ["TextFormat", "read_text"]
 

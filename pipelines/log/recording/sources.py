@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
-from pipelines.log.arrays import read_npy
 from pipelines.log.atomic import fault_of
-from pipelines.log.dialect import TextFormat
 from pipelines.log.files import regular_file
 from pipelines.log.guard import Answer, guarded
-from pipelines.log.matlab import damaged, read_mat5, read_mat73
-from pipelines.log.raw import RawTable, columns_of_arrays
-from pipelines.log.tabular import read_text
+from pipelines.log.recording.arrays import read_npy
+from pipelines.log.recording.dialect import TextFormat
+from pipelines.log.recording.matlab import damaged, read_mat5, read_mat73
+from pipelines.log.recording.raw import RawTable, columns_of_arrays
+from pipelines.log.recording.tabular import read_text
 
 __all__ = ["read_table"]
 

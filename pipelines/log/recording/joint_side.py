@@ -14,9 +14,9 @@ import numpy as np
 from pipelines.errors import Check, InputRejected, UsageError
 from pipelines.log import schema
 from pipelines.log.experiment import Array, Signal
-from pipelines.log.raw import RawTable
-from pipelines.log.recipe import DriveSpec, Numbers, Recipe, SignalSpec
-from pipelines.log.repair import Recording
+from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.recipe import DriveSpec, Numbers, Recipe, SignalSpec
+from pipelines.log.recording.repair import Recording
 from pipelines.log.robot import Drive, RobotDescription
 from pipelines.log.units import UNITS, to_si
 

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.errors import Check, Level
+from pipelines.log.doctor.faults import quantum
+from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.faults import quantum
 from pipelines.log.schema import joint_unit
-from pipelines.log.segments import Usable, usable
 
 __all__ = ["MIN_SAMPLES", "Subject", "many", "spread"]
 

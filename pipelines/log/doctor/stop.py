@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.log.doctor.faults import Mask, lagged_speed
 from pipelines.log.experiment import ExperimentLog
-from pipelines.log.faults import Mask, lagged_speed
 
 __all__ = ["emergency_stop"]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.log.raw import RawTable
-from pipelines.log.sources import read_table
+from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.sources import read_table
 from pipelines.log.units import UNITS
 
 __all__ = ["companion_of", "named_unit", "roles_of"]

@@ -17,8 +17,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.faults import (
+from pipelines.log.doctor.faults import (
     GAP_LIMIT,
     Mask,
     TimeBase,
@@ -30,7 +29,8 @@ from pipelines.log.faults import (
     time_base,
     torque_limit,
 )
-from pipelines.log.stop import emergency_stop
+from pipelines.log.doctor.stop import emergency_stop
+from pipelines.log.experiment import Array, ExperimentLog, Signal
 
 __all__ = ["SHORTEST", "Usable", "unwrapped", "usable"]
 

@@ -15,10 +15,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from pipelines.errors import Check
-from pipelines.log.checks_motion import MOTION_CHECKS, both_ways
-from pipelines.log.checks_signal import SIGNAL_CHECKS
-from pipelines.log.checks_subject import Subject
-from pipelines.log.checks_time import MOTION_BAND, TIME_CHECKS
+from pipelines.log.doctor.checks_motion import MOTION_CHECKS, both_ways
+from pipelines.log.doctor.checks_signal import SIGNAL_CHECKS
+from pipelines.log.doctor.checks_subject import Subject
+from pipelines.log.doctor.checks_time import MOTION_BAND, TIME_CHECKS
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.checks_subject import MIN_SAMPLES, Subject, many
-from pipelines.log.faults import GAP_LIMIT
-from pipelines.log.segments import SHORTEST
+from pipelines.log.doctor.checks_subject import MIN_SAMPLES, Subject, many
+from pipelines.log.doctor.faults import GAP_LIMIT
+from pipelines.log.doctor.segments import SHORTEST
 
 __all__ = ["TIME_CHECKS"]
 

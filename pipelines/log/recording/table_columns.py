@@ -10,8 +10,8 @@ import numpy as np
 
 from pipelines.errors import InputRejected, did_you_mean
 from pipelines.log.experiment import Array
-from pipelines.log.raw import RawTable
-from pipelines.log.recipe import ColumnSpec, TableSpec
+from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.recipe import ColumnSpec, TableSpec
 from pipelines.log.results import NOT_STORED
 from pipelines.log.units import UNITS
 

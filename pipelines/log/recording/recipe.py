@@ -29,7 +29,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from pipelines.log.dialect import TextFormat
+from pipelines.log.recording.dialect import TextFormat
 
 __all__ = ["ColumnSpec", "ControllerSpec", "DriveSpec", "FileSpec", "LogSpec", "MissingSpec", "Numbers", "Recipe", "ResampleSpec",
            "SignalSpec", "TableSpec", "TimeSpec"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.checks_subject import Subject, many, spread
-from pipelines.log.faults import GAP_LIMIT, sentinels, torque_limit
-from pipelines.log.segments import long_blocks
+from pipelines.log.doctor.checks_subject import Subject, many, spread
+from pipelines.log.doctor.faults import GAP_LIMIT, sentinels, torque_limit
+from pipelines.log.doctor.segments import long_blocks
 
 __all__ = ["SIGNAL_CHECKS"]
 

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.raw import RawTable
-from pipelines.log.tabular import read_text
-from tests.log.recording import good, lines, text
+from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.tabular import read_text
+from tests.log.recording.good import good, lines, text
 
 
 def parse(content: str | bytes) -> RawTable:

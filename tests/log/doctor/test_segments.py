@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.log.segments import SHORTEST, usable
+from pipelines.log.doctor.segments import SHORTEST, usable
 from tests.fault_table import FAULTS
 from tests.faulty import drifting
 from tests.healthy import changed, good_log, healthy_logs, make_log, rows, with_signal

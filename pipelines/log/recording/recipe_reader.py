@@ -13,8 +13,8 @@ from typing import Any
 
 from pipelines.errors import InputRejected, UsageError, did_you_mean
 from pipelines.log import schema
-from pipelines.log.dialect import TextFormat
-from pipelines.log.recipe import (
+from pipelines.log.recording.dialect import TextFormat
+from pipelines.log.recording.recipe import (
     ColumnSpec,
     ControllerSpec,
     DriveSpec,

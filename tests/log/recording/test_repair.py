@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from pipelines.errors import Check, InputRejected
-from pipelines.log.clock import time_of
-from pipelines.log.joint_side import drive_of, joint_side
-from pipelines.log.raw import RawTable, expand
-from pipelines.log.recipe import Recipe, TimeSpec
-from pipelines.log.recipe_reader import parse_recipe
-from pipelines.log.repair import Limits, Recording, mend, split_at_gaps
-from pipelines.log.robot import load_robot
+from pipelines.log.recording.clock import time_of
+from pipelines.log.recording.joint_side import drive_of, joint_side
+from pipelines.log.recording.raw import RawTable, expand
+from pipelines.log.recording.recipe import Recipe, TimeSpec
+from pipelines.log.recording.recipe_reader import parse_recipe
+from pipelines.log.recording.repair import Limits, Recording, mend, split_at_gaps
+from pipelines.log.robot_files import load_robot
 from pipelines.signal.resample import grid, resample
-from tests.log.recording import RECIPE, Array, good
+from tests.log.recording.good import RECIPE, Array, good
 
 
 def recording() -> Recording:

@@ -7,10 +7,10 @@ import tomllib
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log import filenames
-from pipelines.log.recipe_reader import find_recipe, parse_recipe
+from pipelines.log.recording import filenames
+from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
 from pipelines.log.shipped import shipped_names
-from tests.log.recording import RECIPE
+from tests.log.recording.good import RECIPE
 
 
 def edited(old: str, new: str) -> str:
@@ -117,7 +117,7 @@ def test_c02_a_broken_pattern_is_refused() -> None:
 
 
 def test_the_docstring_shows_a_recipe_that_is_valid() -> None:
-    from pipelines.log import recipe
+    from pipelines.log.recording import recipe
 
     text = "\n".join(line[4:] for line in (recipe.__doc__ or "").splitlines() if line.startswith("    "))
     assert tomllib.loads(text)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.evidence import rollover
 from pipelines.log.files import open_log
-from pipelines.log.guess import guess_recipe
-from pipelines.log.recipe_reader import parse_recipe
-from tests.log.recording import good, run, text, write
+from pipelines.log.recording.evidence import rollover
+from pipelines.log.recording.guess import guess_recipe
+from pipelines.log.recording.recipe_reader import parse_recipe
+from tests.log.recording.good import good, run, text, write
 
 
 def drafted(folder: Path, content: str, name: str = "run.csv") -> str:

@@ -9,16 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError, did_you_mean
-from pipelines.log import filenames
-from pipelines.log.clock import time_of
 from pipelines.log.experiment import Array
-from pipelines.log.joint_side import drive_of, unit_declared
-from pipelines.log.raw import RawTable, expand
-from pipelines.log.recipe import FileSpec, Recipe, TableSpec
-from pipelines.log.recipe_reader import find_recipe, parse_recipe
-from pipelines.log.repair import Recording
-from pipelines.log.robot import Drive, RobotDescription, load_robot, parse_robot
-from pipelines.log.sources import read_table
+from pipelines.log.recording import filenames
+from pipelines.log.recording.clock import time_of
+from pipelines.log.recording.joint_side import drive_of, unit_declared
+from pipelines.log.recording.raw import RawTable, expand
+from pipelines.log.recording.recipe import FileSpec, Recipe, TableSpec
+from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
+from pipelines.log.recording.repair import Recording
+from pipelines.log.recording.sources import read_table
+from pipelines.log.robot import Drive, RobotDescription, parse_robot
+from pipelines.log.robot_files import load_robot
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError, clean
-from pipelines.log import filenames, schema
+from pipelines.log import schema
 from pipelines.log.experiment import Array, Controller, Derived, ExperimentLog, Signal
-from pipelines.log.recipe import LogSpec
-from pipelines.log.recordings import Assembled, Material, Source
+from pipelines.log.recording import filenames
+from pipelines.log.recording.recipe import LogSpec
+from pipelines.log.recording.recordings import Assembled, Material, Source
 from pipelines.log.robot import format_robot
 
 __all__ = ["SourceFile", "make_log"]

@@ -8,8 +8,8 @@ import numpy as np
 
 from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
-from pipelines.log.raw import RawTable
-from pipelines.log.recipe import TimeSpec
+from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.recipe import TimeSpec
 from pipelines.log.units import to_si
 
 __all__ = ["declared_step", "plausible_units", "time_of"]
