@@ -14,6 +14,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected, UsageError, clean
 from pipelines.log import schema
+from pipelines.log.derive import created
 from pipelines.log.experiment import Array, Controller, Derived, ExperimentLog, Signal
 from pipelines.log.recording import filenames
 from pipelines.log.recording.recipe import LogSpec
@@ -108,10 +109,4 @@ def _derived(files: tuple[SourceFile, ...], material: Material, steps: tuple[str
     record = {"recipe": material.recipe_path.name, "files": {file.name: file.sha256 for file in files}, "converted": list(steps),
               "altered": list(altered)}
     sha256 = files[0].sha256 if len(files) == 1 else hashlib.sha256("\n".join(file.sha256 for file in files).encode()).hexdigest()
-    return Derived("import", json.dumps(record, sort_keys=True), sha256, recorded or _created())
-
-
-def _created() -> str:
-    """Equal inputs give equal logs: not the clock on the wall, but the time that reproducible builds agree on."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
-    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(int(epoch) if epoch.isdigit() and len(epoch) < 12 else 0))
+    return Derived("import", json.dumps(record, sort_keys=True), sha256, created(recorded))
