@@ -23,13 +23,14 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.signal import blocks
 from pipelines.signal import segments as seg
 from pipelines.signal.chain import Stationary, lyapunov, stationary
-from pipelines.signal.segments import Opening, Part, Piece, Prior
+from pipelines.signal.segments import Opening, Part, Piece, Prior, Run
 
 __all__ = ["Observer", "Start", "Track", "design", "observe"]
 
 Array = npt.NDArray[np.float64]
 
 BLOCK = 32  # samples: longer blocks cost arithmetic, shorter ones carries
+CHUNK = 512 * BLOCK  # samples worked on at once
 
 
 @dataclass(frozen=True)
@@ -159,18 +160,21 @@ def design(sample_time: float, jerk_std: Array | float, noise_variance: Array | 
     return Observer(sample_time, sigma.copy(), variance.copy(), stationary(order, index))
 
 
-def observe(y: Array, observer: Observer, start: Start | None = None) -> Track:
-    """Causal reconstruction of `y` (samples, joints), NaN where nothing was measured. Equal to the Kalman filter throughout."""
+def observe(y: Array, observer: Observer, start: Start | None = None, out: Array | None = None) -> Track:
+    """Causal reconstruction of `y` (samples, joints), NaN where nothing was measured. Equal to the Kalman filter throughout.
+
+    `out` (joints, order, samples) is memory for the states, for whoever reconstructs many logs: new pages cost more than the work.
+    """
     samples, joints = checked(y, observer)
-    states = np.empty((joints, observer.order, samples))
+    states = np.empty((joints, observer.order, samples)) if out is None else out
     pieces: list[Piece] = []
     for part in seg.parts(y):
         whole = len(part.joints) == joints
         own = observer if whole else observer.pick(part.joints)
-        out = states if whole else np.empty((len(part.joints), observer.order, samples))
-        pieces += _observe_part(part, own, seg.begin(own, part, start), out)
+        room = states if whole else np.empty((len(part.joints), observer.order, samples))
+        pieces += _observe_part(part, own, seg.begin(own, part, start), room)
         if not whole:
-            states[part.joints] = out
+            states[part.joints] = room
     return Track(states.transpose(1, 2, 0), observer.std.T, tuple(pieces))
 
 
@@ -192,7 +196,7 @@ def _observe_part(part: Part, observer: Observer, prior: Prior, out: Array) -> l
             pieces.append(Piece(position, part.joints, seg.deviations(observer, ahead.covariance)))
             prior = ahead.prior
         if last > first:
-            std, prior = filter_run(observer, part.take(first, last), prior, out[:, :, first:last])
+            std, prior = filter_run(observer, part.run(first, last), prior, out[:, :, first:last])
             pieces.append(Piece(first, part.joints, std))
         position = last
     out[:, 0] += part.offset[:, None]
@@ -218,28 +222,45 @@ def block_starts(observer: Observer, y: Array, mean: Array, spare: int = 0) -> t
     return beside, drive[:, -1]
 
 
-def advance(observer: Observer, y: Array, mean: Array) -> tuple[Array, Array]:
-    """`block_starts`, and the stationary prediction of the sample after the last."""
-    beside, after = block_starts(observer, y, mean)
-    rest = y.shape[1] - beside.shape[1] * BLOCK
-    if rest:
-        power, leave, _ = observer.kernel
-        after = (power[:, rest] @ after[..., None])[..., 0] + (y[:, None, -rest:] @ leave[:, BLOCK - rest:])[:, 0]
-    return beside, after
+def chunks(samples: int) -> list[tuple[int, int]]:
+    """Pieces of whole blocks and a last one: what is worked on at once stays in the cache, and memory does not grow."""
+    return [(at, min(samples, at + CHUNK)) for at in range(0, samples, CHUNK)]
 
 
-def filter_run(observer: Observer, y: Array, prior: Prior, out: Array) -> tuple[Array, Prior]:
-    """An unbroken stretch (joints, samples): stationary everywhere, then corrected where the start is still felt."""
-    kernel, samples = observer.kernel[2], y.shape[1]
-    beside, after = block_starts(observer, y, prior.mean)
-    whole = beside.shape[1] * BLOCK
-    if whole:
-        np.matmul(beside[:, None], kernel, out=out[:, :, :whole].reshape(*out.shape[:2], -1, BLOCK))
-    if samples > whole:
-        rest = samples - whole
-        out[:, :, whole:] = (y[:, None, None, whole:] @ kernel[:, :, :rest, :rest]
-                             + after[:, None, None] @ kernel[:, :, BLOCK:, :rest])[:, :, 0]
-        after = advance(observer, y[:, whole:], after)[1]
+def after_rest(observer: Observer, rest: Array, mean: Array) -> Array:
+    """The stationary prediction after less than a block of measurements, `rest` (joints, samples)."""
+    size = rest.shape[1]
+    if not size:
+        return mean
+    power, leave, _ = observer.kernel
+    return np.asarray((power[:, size] @ mean[..., None])[..., 0] + (rest[:, None] @ leave[:, BLOCK - size:])[:, 0])
+
+
+def advance(observer: Observer, y: Run, mean: Array) -> list[Array]:
+    """Stationary predictions of the first sample of every chunk and of the sample after the last."""
+    means = [mean]
+    for a, b in chunks(y.samples):
+        piece = y.take(a, b)
+        after = block_starts(observer, piece, means[-1])[1]
+        means.append(after_rest(observer, piece[:, len(piece[0]) // BLOCK * BLOCK:], after))
+    return means
+
+
+def filter_run(observer: Observer, y: Run, prior: Prior, out: Array) -> tuple[Array, Prior]:
+    """An unbroken stretch into `out` (joints, order, samples): stationary everywhere, then corrected where the start is felt."""
+    kernel, samples, after = observer.kernel[2], y.samples, prior.mean
+    for a, b in chunks(samples):
+        piece = y.take(a, b)
+        beside, after = block_starts(observer, piece, after)
+        whole = beside.shape[1] * BLOCK
+        if whole:
+            np.matmul(beside[:, None], kernel, out=out[:, :, a:a + whole].reshape(*out.shape[:2], -1, BLOCK))
+        rest = piece[:, whole:]
+        if rest.size:
+            size = rest.shape[1]
+            out[:, :, b - size:b] = (rest[:, None, None] @ kernel[:, :, :size, :size]
+                                     + after[:, None, None] @ kernel[:, :, BLOCK:, :size])[:, :, 0]
+            after = after_rest(observer, rest, after)
     start = (observer.diffuse_opening if prior.excess is None
              else seg.opening(observer, prior.excess, min(samples, observer.settled)))
     offset = seg.offsets(observer, start, prior, y, out)

@@ -15,7 +15,7 @@ from pipelines.signal.chain import input_covariance, transition
 if TYPE_CHECKING:
     from pipelines.signal.observer import Observer, Start
 
-__all__ = ["Gap", "Opening", "Part", "Piece", "Prior", "after", "begin", "deviations", "diffuse", "gap_covariance",
+__all__ = ["Gap", "Opening", "Part", "Piece", "Prior", "Run", "after", "begin", "deviations", "diffuse", "gap_covariance",
            "offsets", "opening", "parts", "predict_gap", "spread"]
 
 Array = npt.NDArray[np.float64]
@@ -44,8 +44,23 @@ class Part:
     values: Array  # (samples, joints), as measured
     offset: Array  # (joints,)
 
+    def run(self, first: int, last: int) -> Run:
+        return Run(self.values[first:last], self.offset)
+
+
+@dataclass(frozen=True)
+class Run:
+    """An unbroken stretch of measurements."""
+
+    values: Array  # (samples, joints)
+    offset: Array  # (joints,)
+
+    @property
+    def samples(self) -> int:
+        return len(self.values)
+
     def take(self, first: int, last: int) -> Array:
-        """(joints, samples) of one run, the offset taken off."""
+        """(joints, last - first), the offset taken off."""
         return np.subtract(self.values[first:last].T, self.offset[:, None], order="C")
 
 
@@ -144,10 +159,10 @@ def opening(observer: Observer, excess: Array, count: int) -> Opening:
     return Opening(power, spread(excess, known), observer.filter.updater[:, None] @ power[:, :count])
 
 
-def offsets(observer: Observer, opening: Opening, prior: Prior, y: Array, out: Array) -> Array:
+def offsets(observer: Observer, opening: Opening, prior: Prior, y: Run, out: Array) -> Array:
     """δ_k = (I + D G_k)^-1 D g_k from the innovations of the stationary filter whose states are `out`: (joints, count, order)."""
-    count = min(y.shape[1], opening.spread.shape[1])
-    surprise = y[:, :count].copy()
+    count = min(y.samples, opening.spread.shape[1])
+    surprise = y.take(0, count)
     surprise[:, 0] -= prior.mean[:, 0]
     surprise[:, 1:] -= ((observer.filter.transition[:, 0] / observer.rate)[:, None] @ out[:, :, :count - 1])[:, 0]
     drive = opening.power[:, :count, 0] * (surprise * observer.filter.remainder[:, None])[..., None]

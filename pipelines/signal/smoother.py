@@ -21,8 +21,8 @@ import numpy.typing as npt
 
 from pipelines.signal import blocks
 from pipelines.signal import segments as seg
-from pipelines.signal.observer import BLOCK, Observer, Start, Track, advance, block_starts, checked, filter_run
-from pipelines.signal.segments import Part, Piece, Prior
+from pipelines.signal.observer import BLOCK, Observer, Start, Track, advance, block_starts, checked, chunks, filter_run
+from pipelines.signal.segments import Part, Piece, Prior, Run
 
 __all__ = ["Smoother", "smooth", "smooth_in_parts"]
 
@@ -93,19 +93,19 @@ class Smoother:
         return _ends(self.observer, seg.diffuse(self.observer), np.zeros_like(self.observer.filter.prior), 2 * size)
 
 
-def smooth(y: Array, observer: Observer | Smoother, start: Start | None = None) -> Track:
-    """Best reconstruction of `y` (samples, joints), NaN where nothing was measured, from all its samples."""
+def smooth(y: Array, observer: Observer | Smoother, start: Start | None = None, out: Array | None = None) -> Track:
+    """Best reconstruction of `y` (samples, joints), NaN where nothing was measured, from all its samples; `out` as in `observe`."""
     own = observer if isinstance(observer, Smoother) else Smoother(observer)
     samples, joints = checked(y, own.observer)
-    states = np.empty((joints, own.observer.order, samples))
+    states = np.empty((joints, own.observer.order, samples)) if out is None else out
     pieces: list[Piece] = []
     for part in seg.parts(y):
         whole = len(part.joints) == joints
         here = own if whole else own.pick(part.joints)
-        out = states if whole else np.empty((len(part.joints), own.observer.order, samples))
-        pieces += _smooth_part(here, part, seg.begin(here.observer, part, start), out)
+        room = states if whole else np.empty((len(part.joints), own.observer.order, samples))
+        pieces += _smooth_part(here, part, seg.begin(here.observer, part, start), room)
         if not whole:
-            states[part.joints] = out
+            states[part.joints] = room
     return Track(states.transpose(1, 2, 0), own.std, tuple(pieces))
 
 
@@ -141,8 +141,7 @@ def _smooth_part(smoother: Smoother, part: Part, prior: Prior, out: Array) -> li
     for stretch in reversed(_forward(observer, part, prior)):
         target = out[:, :, stretch.first:stretch.last]
         if stretch.measured:
-            y = part.take(stretch.first, stretch.last)
-            later, stds = _smooth_run(smoother, y, stretch, later, target)
+            later, stds = _smooth_run(smoother, part.run(stretch.first, stretch.last), stretch, later, target)
         else:
             later, stds = _smooth_gap(observer, stretch, later, target)
         pieces += [Piece(stretch.first + at, part.joints, std) for at, std in stds]
@@ -160,22 +159,22 @@ def _forward(observer: Observer, part: Part, prior: Prior) -> list[_Stretch]:
         if last > first:
             before, shift = prior, none
             if last < part.samples:
-                y = part.take(first, last)
-                after = advance(observer, y, prior.mean)[1]
+                y = part.run(first, last)
+                after = advance(observer, y, prior.mean)[-1]
                 prior = Prior(after, np.zeros_like(observer.filter.prior))
                 if last - first < observer.settled:
-                    prior = filter_run(observer, y, before, np.empty((len(y), observer.order, last - first)))[1]
+                    prior = filter_run(observer, y, before, np.empty((len(after), observer.order, last - first)))[1]
                     shift = prior.mean - after
             stretches.append(_Stretch(first, last, True, before, shift))
         position = last
     return stretches
 
 
-def _smooth_run(smoother: Smoother, y: Array, stretch: _Stretch, later: _Later,
+def _smooth_run(smoother: Smoother, y: Run, stretch: _Stretch, later: _Later,
                 out: Array) -> tuple[_Later, list[tuple[int, Array]]]:
     """A run of measured samples: stationary smoother, then the offset of its start."""
     observer = smoother.observer
-    f, samples, reach = observer.filter, y.shape[1], observer.settled
+    f, samples, reach = observer.filter, y.samples, observer.settled
     eye = np.eye(observer.order)
     weigh = np.linalg.inv(eye + later.information @ f.prior)
     pull = later.pull + (later.information @ stretch.shift[..., None])[..., 0]
@@ -229,8 +228,17 @@ def _smooth_gap(observer: Observer, stretch: _Stretch, later: _Later, out: Array
     return _Later(known[:, 0], pull[:, 0, :, 0]), [(0, seg.deviations(observer, spread))]
 
 
-def _stationary(smoother: Smoother, y: Array, mean: Array, end: Array, out: Array) -> Array:
-    """The stationary smoother of `y` (joints, samples) from state `mean` to λ `end`, into `out`; returns λ at the start."""
+def _stationary(smoother: Smoother, y: Run, mean: Array, end: Array, out: Array) -> Array:
+    """The stationary smoother of a run from state `mean` to λ `end`, into `out`; returns λ at the start."""
+    pieces = chunks(y.samples)
+    means = [mean] if len(pieces) == 1 else advance(smoother.observer, y, mean)[:-1]
+    for (a, b), before in zip(reversed(pieces), reversed(means), strict=True):
+        end = _chunk(smoother, y.take(a, b), before, end, out[:, :, a:b])
+    return end
+
+
+def _chunk(smoother: Smoother, y: Array, mean: Array, end: Array, out: Array) -> Array:
+    """The same for `y` (joints, samples) at once: blocks forward, blocks backward, and all states in one product."""
     observer, n = smoother.observer, smoother.observer.order
     beside, after = block_starts(observer, y, mean, spare=n)
     count = beside.shape[1]

@@ -117,3 +117,14 @@ def test_infinite_measurements_are_refused() -> None:
     """An infinity is no missing sample."""
     with pytest.raises(InputRejected):
         smooth(np.array([[0.0], [np.inf], [0.0]]), design(T, 500.0, R))
+
+
+def test_a_log_longer_than_one_chunk() -> None:
+    """Worked on chunk by chunk, observer and smoother of 50 000 samples give what filterpy gives near every joint of chunks."""
+    y = swing(50_000, 1, STEP)
+    y[30_000:30_003] = np.nan
+    observer, mean, covariance = design(T, 500.0, R), np.zeros(3), np.diag([1e-6, 1.0, 1e3])
+    start, book = Start(mean[None], covariance[None]), Textbook(500.0, R)
+    for run, reference in ((observe, book.filter), (smooth, book.smooth)):
+        expected = reference(np.arange(50_000) * T, y[:, 0], mean, covariance).states
+        assert_near(run(y, observer, start).states[:, :, 0].T, expected, 1e-8)
