@@ -75,22 +75,22 @@ def test_white_noise_is_recognised() -> None:
 
 
 def test_against_the_covariance_of_known_noise() -> None:
-    """With 200 000 samples the estimated covariance is the exact one of AR(1) noise, C Aᵀ V A C, to a few per cent."""
-    memory, samples = 0.9, 200_000
+    """With 80 000 samples the estimated covariance is the exact one of AR(1) noise, C Aᵀ V A C, to a few per cent."""
+    memory, samples = 0.9, 80_000
     one = problem(samples=samples)
     noise = autoregressive(np.random.default_rng(0), samples, memory)
     blocks = one.blocks(one.clean + noise, 20_000)
     found = solve(gather(blocks), weights=1 / SIGMA**2)
     robust = robust_covariance(blocks, found, 20_000)
     meat = np.zeros_like(found.bread)
-    lags = memory ** np.arange(200) / (1 - memory**2)  # autocovariance of x(k) = memory x(k-1) + e(k)
+    lags = memory ** np.arange(120) / (1 - memory**2)  # autocovariance of x(k) = memory x(k-1) + e(k)
     for j in range(CHANNELS):
         a = one.Y[:, j] / SIGMA[j]
         for lag, gamma in enumerate(lags):
             product = gamma * a[lag:].T @ a[:samples - lag]
             meat += product if lag == 0 else product + product.T
     exact = np.sqrt(np.diag(found.bread @ meat @ found.bread))
-    np.testing.assert_allclose(robust.std, exact, rtol=0.06)
+    np.testing.assert_allclose(robust.std, exact, rtol=0.08)
 
 
 def test_a_silent_channel_and_a_lost_parameter() -> None:
