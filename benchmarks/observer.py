@@ -140,7 +140,7 @@ def grow(largest: int) -> None:
         print(f"smoother in parts, {n:.1e}: {parts_memory(observer, n):.1f} MB in all")
 
 
-def best(run: Callable[[], object], repeats: int = 5) -> float:
+def best(run: Callable[[], object], repeats: int = 15) -> float:
     run()
     times = []
     for _ in range(repeats):
