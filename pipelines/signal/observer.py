@@ -193,13 +193,13 @@ def _observe_part(part: Part, observer: Observer, prior: Prior, out: Array) -> l
         if first > position:
             ahead = seg.predict_gap(observer, prior, first - position)
             out[:, :, position:first] = ahead.states.swapaxes(1, 2) * observer.rate[..., None]
+            out[:, 0, position:first] += part.offset[:, None]
             pieces.append(Piece(position, part.joints, seg.deviations(observer, ahead.covariance)))
             prior = ahead.prior
         if last > first:
             std, prior = filter_run(observer, part.run(first, last), prior, out[:, :, first:last])
             pieces.append(Piece(first, part.joints, std))
         position = last
-    out[:, 0] += part.offset[:, None]
     return pieces
 
 
@@ -208,18 +208,23 @@ def block_starts(observer: Observer, y: Array, mean: Array, spare: int = 0) -> t
 
     `spare` columns are left beside them for what a smoother knows from behind.
     """
-    power, leave, _ = observer.kernel
     joints, samples = y.shape
     count, n = samples // BLOCK, observer.order
     # inputs and start of a block side by side: one product gives all that follows from both
     beside = np.empty((joints, count, BLOCK + n + spare))
     beside[:, :, :BLOCK] = y[:, :count * BLOCK].reshape(joints, count, BLOCK)
-    drive = np.empty((joints, count + 1, n))
-    drive[:, 0] = mean
-    np.matmul(beside[:, :, :BLOCK], leave, out=drive[:, 1:])
-    blocks.scan(power[:, BLOCK], drive)
-    beside[:, :, BLOCK:BLOCK + n] = drive[:, :-1]
-    return beside, drive[:, -1]
+    starts = _starts(observer, beside[:, :, :BLOCK], mean)
+    beside[:, :, BLOCK:BLOCK + n] = starts[:, :-1]
+    return beside, starts[:, -1]
+
+
+def _starts(observer: Observer, y: Array, mean: Array) -> Array:
+    """Stationary predictions at the start of every block of `y` (joints, blocks, BLOCK) and after the last."""
+    power, leave, _ = observer.kernel
+    starts = np.empty((len(y), y.shape[1] + 1, observer.order))
+    starts[:, 0] = mean
+    np.matmul(y, leave, out=starts[:, 1:])
+    return blocks.scan(power[:, BLOCK], starts)
 
 
 def chunks(samples: int) -> list[tuple[int, int]]:
@@ -241,14 +246,16 @@ def advance(observer: Observer, y: Run, mean: Array) -> list[Array]:
     means = [mean]
     for a, b in chunks(y.samples):
         piece = y.take(a, b)
-        after = block_starts(observer, piece, means[-1])[1]
-        means.append(after_rest(observer, piece[:, len(piece[0]) // BLOCK * BLOCK:], after))
+        whole = (b - a) // BLOCK * BLOCK
+        after = _starts(observer, piece[:, :whole].reshape(len(piece), -1, BLOCK), means[-1])[:, -1]
+        means.append(after_rest(observer, piece[:, whole:], after))
     return means
 
 
 def filter_run(observer: Observer, y: Run, prior: Prior, out: Array) -> tuple[Array, Prior]:
     """An unbroken stretch into `out` (joints, order, samples): stationary everywhere, then corrected where the start is felt."""
     kernel, samples, after = observer.kernel[2], y.samples, prior.mean
+    head = np.empty((*out.shape[:2], min(samples, observer.settled)))  # before the first value is put back: it would cost digits
     for a, b in chunks(samples):
         piece = y.take(a, b)
         beside, after = block_starts(observer, piece, after)
@@ -261,10 +268,11 @@ def filter_run(observer: Observer, y: Run, prior: Prior, out: Array) -> tuple[Ar
             out[:, :, b - size:b] = (rest[:, None, None] @ kernel[:, :, :size, :size]
                                      + after[:, None, None] @ kernel[:, :, BLOCK:, :size])[:, :, 0]
             after = after_rest(observer, rest, after)
+        head[:, :, a:b] = out[:, :, a:min(b, head.shape[2])]
+        out[:, 0, a:b] += y.offset[:, None]
     start = (observer.diffuse_opening if prior.excess is None
              else seg.opening(observer, prior.excess, min(samples, observer.settled)))
-    offset = seg.offsets(observer, start, prior, y, out)
-    count = offset.shape[1]
+    offset, count = seg.offsets(observer, start, prior, y, head), head.shape[2]
     out[:, :, :count] += (start.felt[:, :count] @ offset[..., None])[..., 0].swapaxes(1, 2) * observer.rate[..., None]
     std = observer.diffuse_std if prior.excess is None else seg.deviations(observer, start.covariance(observer))
     return std[:, :count], seg.after(start, offset[:, -1], after, samples)

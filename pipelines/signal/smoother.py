@@ -144,8 +144,8 @@ def _smooth_part(smoother: Smoother, part: Part, prior: Prior, out: Array) -> li
             later, stds = _smooth_run(smoother, part.run(stretch.first, stretch.last), stretch, later, target)
         else:
             later, stds = _smooth_gap(observer, stretch, later, target)
+            target[:, 0] += part.offset[:, None]
         pieces += [Piece(stretch.first + at, part.joints, std) for at, std in stds]
-    out[:, 0] += part.offset[:, None]
     return pieces
 
 
@@ -234,6 +234,7 @@ def _stationary(smoother: Smoother, y: Run, mean: Array, end: Array, out: Array)
     means = [mean] if len(pieces) == 1 else advance(smoother.observer, y, mean)[:-1]
     for (a, b), before in zip(reversed(pieces), reversed(means), strict=True):
         end = _chunk(smoother, y.take(a, b), before, end, out[:, :, a:b])
+        out[:, 0, a:b] += y.offset[:, None]
     return end
 
 
