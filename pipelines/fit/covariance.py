@@ -35,6 +35,7 @@ _BINS = 40  # independent frequencies in a band: its power is then known to 16 %
 _MOST_TAKEN = 0.75  # of a band's noise, by the parameters: beyond, what is left says too little
 _PADDING = 8  # an eighth of a block of zeros, so that its end does not touch its beginning
 _CROSS = 5.0  # standard deviations of a correlation between channels that is not chance
+_COHERENT = 14.0  # times one over the number of frequencies: once in a million bands by chance
 _LAGS = 20  # samples apart, at which it is looked for
 
 
@@ -105,15 +106,19 @@ def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
     twice[0] = np.sqrt(1.0 / noise.length)
     if noise.length % 2 == 0:
         twice[-1] = twice[0]
-    spectra = [a * (w * twice * np.conj(h)) for a, w, h in zip(block.spectra, weights, noise.shape, strict=True)]
-    wide = np.repeat(np.conj(noise.mix), np.diff(noise.edges), axis=0)  # (frequencies, channels, channels)
     meat = np.zeros((width, width))
-    for a in range(len(spectra)):
-        mixed = np.zeros((width, bins), dtype=np.complex128)
-        for j in range(a, len(spectra)):
-            mixed[block.columns[j]] += spectra[j] * wide[:, j, a]
-        used = np.flatnonzero(mixed.any(axis=1))
-        real = mixed[used].view(np.float64)
+    for a in range(len(weights)):
+        felt = [j for j in range(a, len(weights)) if noise.mix[:, j, a].any()]
+        factors = {j: weights[j] * twice * np.conj(noise.shape[j] * np.repeat(noise.mix[:, j, a], np.diff(noise.edges)))
+                   for j in felt}
+        if felt == [a]:  # its phase does not matter
+            used, mixed = block.columns[a], block.spectra[a] * np.abs(factors[a])
+        else:
+            used = np.unique(np.concatenate([block.columns[j] for j in felt])) if felt else block.columns[a][:0]
+            mixed = np.zeros((len(used), bins), dtype=np.complex128)
+            for j in felt:
+                mixed[np.searchsorted(used, block.columns[j])] += block.spectra[j] * factors[j]
+        real = mixed.view(np.float64)
         meat[np.ix_(used, used)] += real @ real.T
     return meat
 
@@ -136,9 +141,13 @@ def _noise(equations: Iterable[Block], solution: Solution, length: int) -> tuple
     orders = tuple(len(a) - 1 for a in fits)
     edges = _edges(cross.shape[2], max(1, _BINS * length // max(samples, length)))
     left = np.sqrt(1.0 - np.minimum(_mean(leverage / samples, edges), _MOST_TAKEN))
-    mean = _mean(cross / (shape[:, None] * np.conj(shape)), edges) / (left[:, None] * left)
+    flat = cross / (shape[:, None] * np.conj(shape))
+    mean = _mean(flat, edges) / (left[:, None] * left)
+    together = _correlated(flat, mean, length, samples)
+    if not together:
+        mean[~np.eye(channels, dtype=bool)] = 0.0
     noise = _Noise(len(solution.beta), length, shape, edges, _factor(mean.transpose(2, 0, 1)), orders,
-                   not any(orders) and not _correlated(cross, length, samples))
+                   not any(orders) and not together)
     return noise, transformed if blocks == 1 else None
 
 
@@ -197,12 +206,20 @@ def _factor(spectrum: Complex) -> Complex:
                       * np.where(power > 0.0, scale, 0.0)[:, :, None])
 
 
-def _correlated(cross: Complex, length: int, samples: int) -> bool:
-    """Whether two channels are correlated beyond chance, at the same instant or a little apart."""
-    covariance = np.fft.irfft(cross, length, axis=2)[:, :, [*range(_LAGS), *range(-_LAGS, 0)]]
-    std = np.sqrt(np.maximum(np.einsum("jjl->jl", covariance)[:, 0], 0.0))
-    apart = ~np.eye(len(std), dtype=bool)
-    return bool(np.any(np.abs(covariance[apart]) * np.sqrt(samples) > _CROSS * (std[:, None] * std)[apart][:, None]))
+def _correlated(flat: Complex, mean: Complex, length: int, samples: int) -> bool:
+    """Whether two channels go together beyond chance: at the same instant or a little apart, or within a band.
+
+    Of channels that are independent, coherence over n frequencies exceeds c with probability exp(-n c) at most.
+    """
+    apart = ~np.eye(len(flat), dtype=bool)
+    covariance = np.fft.irfft(flat[apart], length, axis=1)[:, [*range(_LAGS), *range(-_LAGS, 0)]]
+    power = np.einsum("jjf->jf", flat).real.mean(axis=1)
+    if np.any(np.abs(covariance) * np.sqrt(samples) > _CROSS * np.sqrt(power[:, None] * power)[apart][:, None]):
+        return True
+    each = np.einsum("jjb->jb", mean).real
+    frequencies = flat.shape[2] * min(1.0, samples / length) / mean.shape[2]
+    coherent = np.square(np.abs(mean)) * frequencies > _COHERENT * each[:, None] * each
+    return bool(np.any(coherent[apart]))
 
 
 def _good_length(least: int) -> int:
