@@ -1,47 +1,60 @@
 """The motion of a log: position, speed and acceleration of every joint, by the method asked for.
 
     found = reconstruct(log, Reconstruction())
-    found.motion.q, .dq, .ddq                  at the log's own samples; NaN where no usable stretch is
+    found.motion.q, .dq, .ddq                  at the log's own samples, finite at each of them
 
 Kostić et al. 2004, Section IV.C.4, eq. (16)-(21). A log that holds the signals already, derived from the same recording
 with the same settings, is taken at its word; anything else is computed.
+
+Samples without a measurement are predicted through by the model of the observer, from both sides, with the deviation that
+comes of it. Where that exceeds what the joint ever did (after a lost connection, say) nothing is known but that: the value is
+drawn straight from the last to the next that is known, its deviation is the range of the joint, its largest speed or acceleration.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.log.derive import derived_by
-from pipelines.log.doctor.segments import Usable, usable
+from pipelines.log.doctor.faults import Mask
+from pipelines.log.doctor.segments import Usable, long_blocks, usable
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.rigid.body import Motion
-from pipelines.signal.gaps import Stretch, even_stretches, lay
-from pipelines.signal.observer import Observer, design, observe
-from pipelines.signal.smoother import smooth
-from pipelines.signal.tuning import sigma_for_bandwidth, tune_jerk, tune_smoother
+from pipelines.model.tuned import METHODS, Observers, Reconstruction, encoder_resolution, tuned_observers
+from pipelines.signal.grid import Grid, Tracker, grids, on_grid
+from pipelines.signal.observer import Observer, Track, observe
+from pipelines.signal.smoother import Smoother, smooth
 
-__all__ = ["METHODS", "Reconstructed", "Reconstruction", "encoder_resolution", "reconstruct"]
+__all__ = ["METHODS", "Measured", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "measured", "reconstruct"]
 
-METHODS = ("smoother", "observer", "central-differences", "zero-phase")
-# A joint that stands still has no jerk to tune by: the slowest level ever tried would do, any level reconstructs rest.
-_FALLBACK_RESOLUTION = 1e-6  # [rad] where neither description nor samples show a step: far below any encoder
+Indices = npt.NDArray[np.intp]
+Run = Callable[[Array], tuple[Array, Array]]
+
+_SIGNALS = ("q_hat", "dq_hat", "ddq_hat")
+_LONG = 4096  # missing samples: of more, only the first are predicted
+_END = 1024
+_LEAD = 2  # missing samples at the very start that are predicted from what comes after
+_BEYOND = 5.0  # usual deviations: no cap below it, however still a joint stands
+_CUTOFF_HZ = 100.0  # of the zero-phase filter where no bandwidth is asked for
 
 
-@dataclass(frozen=True)
-class Reconstruction:
-    """How motion is reconstructed. What is None is found from the data, joint by joint."""
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """The positions of a log as the filters see them."""
 
-    method: str = "smoother"
-    order: int = 3  # of the chain of integrators: 3 is the paper's
-    jerk_std: tuple[float, ...] | None = None  # σ [rad/s^order], one a joint or one for all
-    bandwidth: tuple[float, ...] | None = None  # [Hz] -3 dB of the position, instead of jerk_std
+    good: Usable
+    y: Array  # (kept samples, joints) [rad], unwrapped, NaN where missing or a glitch
+    step: float  # [s] nominal
+    grids: tuple[Grid, ...]  # stretches of an unbroken clock
 
-    def as_settings(self) -> dict[str, object]:
-        """What a derived log must have been made with to be used."""
-        return asdict(self)
+    @property
+    def longest(self) -> Grid:
+        return max(self.grids, key=lambda grid: grid.last - grid.first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,96 +63,193 @@ class Reconstructed:
 
     motion: Motion  # at every sample of the recording
     std: tuple[Array, Array, Array] | None  # of q, dq, ddq, each (samples, joints); None where the method has none
-    observer: Observer | None  # as tuned on the longest stretch
-    whiteness: Array | None  # (joints,) of its innovations, about standard normal where the observer fits
+    observers: Observers | None  # as tuned on the longest stretch; None where the method has none
     good: Usable  # which samples, stretches and masks
     derived: bool  # taken from the log instead of computed
 
-
-def encoder_resolution(good: Usable) -> Array:
-    """Δθ of each joint [rad] (joints,): the description's, or the step the samples show, whichever is coarser."""
-    from pipelines.log.doctor.faults import quantum
-
-    shown = [quantum(column) or 0.0 for column in good.log.q.T]
-    said = [joint.encoder_resolution or 0.0 for joint in good.log.robot.joints]
-    return np.array([max(pair) or _FALLBACK_RESOLUTION for pair in zip(shown, said, strict=True)])
+    def signals(self) -> dict[str, Array]:
+        """What a derived log gets."""
+        values = dict(zip(_SIGNALS, (self.motion.q, self.motion.dq, self.motion.ddq), strict=True))
+        return values | {f"{name}_std": std for name, std in zip(_SIGNALS, self.std or (), strict=False)}
 
 
-def reconstruct(log: ExperimentLog, how: Reconstruction) -> Reconstructed:
-    """The motion of `log`.
+def measured(log: ExperimentLog, good: Usable | None = None) -> Measured:
+    """The positions of `log` on even grids.
 
     Raises:
         InputRejected: T04, no stretch of it is long enough; T05, its clock is too uneven.
     """
-    good = usable(log)
+    good = usable(log) if good is None else good
     if not good.runs:
-        raise InputRejected("T04", "no stretch without a gap is long enough to reconstruct motion from", where=log.source or log.name,
-                            remedy="'rrrid inspect' shows what is missing; record again")
-    if derived_by(log, "reconstruct", how.as_settings()):
-        return _taken(log, good)
-    y = np.where(good.missing | good.position_spikes, np.nan, good.log.q)
-    states = np.full((3, *log.q.shape), np.nan)
-    std = np.full((3, *log.q.shape), np.nan)
-    observer, whiteness = tuned_observer(good, y, how) if how.method in ("smoother", "observer") else (None, None)
-    for run in good.runs:
-        for stretch in even_stretches(good.log.t[run], log.sample_time):
-            rows = good.kept[run][stretch.first:stretch.last]
-            found, sigma = _track(lay(y[run], stretch), stretch, how, observer, log.sample_time)
-            states[:, rows] = found
-            if sigma is not None:
-                std[:, rows] = sigma
-    motion = Motion(log.t, states[0], states[1], states[2])
-    return Reconstructed(motion, None if observer is None else (std[0], std[1], std[2]), observer, whiteness, good, False)
+        raise InputRejected("T04", "no stretch without a gap is long enough to reconstruct motion from",
+                            where=log.source or log.name, remedy="'rrrid inspect' shows what is missing; record again")
+    y = np.where(good.position_spikes, np.nan, good.log.q)
+    lost = np.isnan(y)
+    if lost.all(axis=0).any():
+        raise InputRejected("D02", f"joint {int(np.argmax(lost.all(axis=0))) + 1} has no measurement at all",
+                            where=log.source or log.name, remedy="leave the joint out, or record it again")
+    edges = np.flatnonzero(np.diff(lost.any(axis=1).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    ends = [place for a, b in edges.tolist() if b - a > _LONG for place in (a + _END, b)]
+    cuts = np.concatenate([np.flatnonzero(good.jumped.any(axis=1)), [good.end], ends]).astype(np.intp)
+    step = log.sample_time if good.time.known else good.time.median
+    return Measured(good, y, step, tuple(grids(good.log.t, step, cuts)))
+
+
+def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = None) -> Reconstructed:
+    """The motion of `log`; `good` is `usable(log)`, for whoever has it already.
+
+    Raises:
+        UsageError: C02, settings that do not fit the log.
+        InputRejected: T04, no stretch of it is long enough; T05, its clock is too uneven.
+    """
+    how.check(log.n_joints)
+    if derived_by(log, "reconstruct", how.as_settings()) and all(name in log for name in _SIGNALS):
+        return _taken(log, usable(log) if good is None else good)
+    seen = measured(log, good)
+    states, std = np.full((3, *seen.y.shape), np.nan), np.full((3, *seen.y.shape), np.nan)
+    filtering = how.method in ("smoother", "observer")
+    tuned = tuned_observers(seen.good, seen.y, seen.longest, seen.step, how) if filtering else None
+    track = _differences(seen, how) if tuned is None else _filter(tuned, how)
+    for grid in seen.grids:
+        rows = slice(grid.first, grid.last)
+        if grid.size > 1 and np.isfinite(seen.y[rows]).any():
+            found, deviation = on_grid(seen.y[rows], grid, seen.step, track)
+            states[:, rows] = found[:3]
+            std[:, rows] = np.nan if deviation is None else deviation[:3]
+    bound = _known_at_all(seen, states, std, tuned)
+    _fill(states, std, bound)
+    states, std = (_at_recording(seen.good.kept, values, log.n_samples) for values in (states, std))
+    std[:, seen.good.time.undefined] = bound[:, None]
+    return Reconstructed(Motion(log.t, *states), (std[0], std[1], std[2]) if filtering else None, tuned, seen.good, False)
 
 
 def _taken(log: ExperimentLog, good: Usable) -> Reconstructed:
     motion = Motion(log.t, log["q_hat"], log["dq_hat"], log["ddq_hat"])
     known = "q_hat_std" in log
-    return Reconstructed(motion, (log["q_hat_std"], log["dq_hat_std"], log["ddq_hat_std"]) if known else None, None, None, good, True)
+    return Reconstructed(motion, (log["q_hat_std"], log["dq_hat_std"], log["ddq_hat_std"]) if known else None, None, good, True)
 
 
-def tuned_observer(good: Usable, y: Array, how: Reconstruction) -> tuple[Observer, Array]:
-    """The observer of the longest run, with the whiteness of its innovations there."""
-    run = max(good.runs, key=lambda r: r.stop - r.start)
-    stretch = max(even_stretches(good.log.t[run], good.log.sample_time), key=lambda s: s.last - s.first)
-    samples, step, n = lay(y[run], stretch), good.log.sample_time, good.log.n_joints
-    resolution = encoder_resolution(good)
-    tuned = (tune_smoother if how.method == "smoother" else tune_jerk)(samples, step, resolution, how.order)
-    sigma = tuned.jerk_std
-    if how.jerk_std is not None:
-        sigma = np.broadcast_to(np.array(how.jerk_std), n)
-    elif how.bandwidth is not None:
-        sigma = sigma_for_bandwidth(np.broadcast_to(np.array(how.bandwidth), n), step, tuned.noise_variance, how.order)
-    observer = design(step, sigma, tuned.noise_variance, how.order)
-    from pipelines.signal.tuning import innovations, whiteness
+def _filter(tuned: Observers, how: Reconstruction) -> Tracker:
+    """The filter of one grid: (samples, joints) with NaN where missing -> (3 or more, samples, joints) and deviations."""
+    if how.method == "observer":
+        return _padded(tuned.causal, lambda y, joints: observe(y, tuned.causal if joints is None else tuned.causal.pick(joints)))
+    inner, outer = _smoother(tuned.smoothing), _smoother(tuned.causal)
+    if tuned.smoothing is tuned.causal:
+        return inner
 
-    return observer, whiteness(innovations(samples, observer)).statistic
+    def run(y: Array) -> tuple[Array, Array]:
+        (states, std), (ends, ends_std) = inner(y), outer(y)
+        for j, reach in enumerate(_reach(tuned.smoothing).tolist()):
+            near = _near_ends(np.isnan(y[:, j]), reach)
+            states[:, near, j], std[:, near, j] = ends[:, near, j], ends_std[:, near, j]
+        return states, std
 
-
-def _track(y: Array, stretch: Stretch, how: Reconstruction, observer: Observer | None, step: float) -> tuple[Array, Array | None]:
-    """(3, samples, joints) of one stretch at its measured places, and the standard deviations."""
-    if observer is not None:
-        track = smooth(y, observer) if how.method == "smoother" else observe(y, observer)
-        return track.states[:3, stretch.place], track.full_std()[:3, stretch.place]
-    if how.method == "central-differences":
-        return _central(y, step)[:, stretch.place], None
-    return _zero_phase(y, step, how)[:, stretch.place], None
+    return run
 
 
-def _central(y: Array, step: float) -> Array:
-    """(y_{k+1} - y_{k-1}) / 2T and (y_{k+1} - 2 y_k + y_{k-1}) / T²; the outermost samples are not known."""
-    dq, ddq = np.full_like(y, np.nan), np.full_like(y, np.nan)
-    dq[1:-1] = (y[2:] - y[:-2]) / (2.0 * step)
-    ddq[1:-1] = (y[2:] - 2.0 * y[1:-1] + y[:-2]) / step**2
-    return np.stack([y, dq, ddq])
+def _smoother(observer: Observer) -> Run:
+    own = Smoother(observer)
+    return _padded(observer, lambda y, joints: smooth(y, own if joints is None else own.pick(joints)))
 
 
-def _zero_phase(y: Array, step: float, how: Reconstruction) -> Array:
-    """Butterworth of order 4 forward and backward, then central differences; 100 Hz where no bandwidth is asked for."""
-    from pipelines.signal.filters import design_low_pass, zero_phase
+def _padded(observer: Observer, filter_: Callable[[Array, Indices | None], Track]) -> Run:
+    """`filter_` over the joints and samples that it can know; NaN elsewhere; and an acceleration whatever the order."""
+    order = observer.order
 
-    if np.isnan(y).any():
-        raise InputRejected("T03", "a zero-phase filter needs every sample, and some are missing",
-                            remedy="reconstruct with the smoother, which predicts through gaps")
-    cutoff = 100.0 if how.bandwidth is None else max(how.bandwidth)
-    return _central(zero_phase(y, design_low_pass(min(cutoff, 0.4 / step), 1.0 / step)), step)
+    def run(y: Array) -> tuple[Array, Array]:
+        states, std = (np.full((max(3, order), *y.shape), np.nan) for _ in range(2))
+        present = np.isfinite(y)
+        lead = present.argmax(axis=0)
+        lead[lead <= _LEAD] = 0
+        lead[present.sum(axis=0) <= order] = len(y)  # fewer samples than states: the joint is not known here
+        for first in np.unique(lead[lead < len(y)]).tolist():
+            joints = np.flatnonzero(lead == first)
+            whole = len(joints) == y.shape[1]
+            track = filter_(y[first:], None) if whole else filter_(y[first:, joints], joints)
+            where = slice(None) if whole else joints
+            states[:order, first:, where] = track.states
+            std[:order, first:, where] = track.full_std()
+        if order == 2:  # the held acceleration itself, known as well as it is bounded
+            states[2] = np.gradient(states[1], observer.sample_time, axis=0)
+            std[2] = np.where(np.isfinite(std[1]), observer.jerk_std, np.nan)
+        return states, std
+
+    return run
+
+
+def _reach(observer: Observer) -> Indices:
+    """(joints,) samples after which an end is forgotten to about 1/1000."""
+    samples = 7.0 / -np.log(np.abs(observer.filter.poles).max(axis=1))
+    return np.asarray(np.ceil(samples), dtype=np.intp)
+
+
+def _near_ends(lost: Mask, reach: int) -> Mask:
+    """Samples within `reach` of an end or of a long block that is missing."""
+    near = np.zeros(len(lost), dtype=bool)
+    for a, b in [(0, 0), (len(lost), len(lost)), *long_blocks(lost)]:
+        near[max(0, a - reach):b + reach] = True
+    return near
+
+
+def _differences(seen: Measured, how: Reconstruction) -> Tracker:
+    """Central differences, of the samples or of what a zero-phase low-pass leaves of them: textbook rivals without deviations."""
+    def central(y: Array) -> tuple[Array, Array | None]:
+        dq, ddq = np.full_like(y, np.nan), np.full_like(y, np.nan)
+        dq[1:-1] = (y[2:] - y[:-2]) / (2.0 * seen.step)
+        ddq[1:-1] = (y[2:] - 2.0 * y[1:-1] + y[:-2]) / seen.step**2
+        return np.stack([y, dq, ddq]), None
+
+    def zero_phase_central(y: Array) -> tuple[Array, Array | None]:
+        from pipelines.signal.filters import design_low_pass, zero_phase
+
+        whole = y if np.isfinite(y).all() else _completed(seen, y)
+        cutoff = _CUTOFF_HZ if how.bandwidth is None else max(how.bandwidth)
+        low_pass = design_low_pass(min(cutoff, 0.4 / seen.step), 1.0 / seen.step)
+        return central(zero_phase(whole, low_pass) if len(y) > low_pass.padding else whole)
+
+    return zero_phase_central if how.method == "zero-phase" else central
+
+
+def _completed(seen: Measured, y: Array) -> Array:
+    """Missing samples as the smoother predicts them."""
+    how = Reconstruction()
+    states, _ = _filter(tuned_observers(seen.good, seen.y, seen.longest, seen.step, how), how)(y)
+    return np.where(np.isfinite(y), y, states[0])
+
+
+def _known_at_all(seen: Measured, states: Array, std: Array, tuned: Observers | None) -> Array:
+    """(3, joints) what can be said of a joint where nothing was measured: its range, largest speed and acceleration."""
+    inside = np.zeros(len(seen.y), dtype=bool)
+    for run in seen.good.runs:
+        inside[run] = True
+    usual = np.zeros(states[:, 0].shape)
+    if tuned is not None:
+        usual[:min(3, tuned.causal.order)] = tuned.causal.std.T[:3]
+        usual[2] = tuned.causal.jerk_std if tuned.causal.order == 2 else usual[2]
+    with np.errstate(invalid="ignore"):
+        sure = inside[:, None] & ~(std > 10.0 * np.maximum(usual, 1e-300)[:, None])
+    size = np.where(sure & np.isfinite(states), np.abs(states), 0.0).max(axis=1)
+    size[0] = np.nanmax(seen.y, axis=0) - np.nanmin(seen.y, axis=0)
+    return np.asarray(np.maximum(np.maximum(size, _BEYOND * usual), 1e-12))
+
+
+def _fill(states: Array, std: Array, bound: Array) -> None:
+    """In place: nothing is less certain than `bound` (3, joints), and nothing is undefined."""
+    with np.errstate(invalid="ignore"):
+        unknown = ~np.isfinite(states) | (std >= bound[:, None])
+    index = np.arange(states.shape[1])
+    for i, j in np.argwhere(unknown.any(axis=1)).tolist():
+        gap = unknown[i, :, j]
+        if not gap.all():
+            states[i, gap, j] = np.interp(index[gap], index[~gap], states[i, ~gap, j])
+        else:
+            states[i, :, j] = 0.0
+        std[i, gap, j] = bound[i, j]
+
+
+def _at_recording(kept: Indices, values: Array, samples: int) -> Array:
+    """From the kept samples to all of the recording: one left out is the one before it."""
+    if len(kept) == samples:
+        return values
+    place = np.searchsorted(kept, np.arange(samples), side="right") - 1
+    return values[:, np.maximum(place, 0)]

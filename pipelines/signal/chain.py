@@ -99,7 +99,11 @@ def stationary(order: int, tracking_index: Array) -> Stationary:
     for _ in range(order - 1):
         rows.append((np.linalg.matrix_power(nilpotent, len(rows)) @ unit)[0])
     # D(δ) = δ^n (1 + c (δ - N)^-1 E k), δ = z - 1: coefficient n-1-i of D is c N^i E k, a triangular system
-    descending = np.stack([np.poly(d).real[1:] for d in delta])
+    product = np.zeros((len(delta), order + 1), dtype=np.complex128)  # Π (δ - δ_i), highest power first
+    product[:, 0] = 1.0
+    for k in range(order):
+        product[:, 1:k + 2] -= delta[:, k, None] * product[:, :k + 1]
+    descending = product[:, 1:].real
     gain = np.linalg.solve(np.array(rows), descending.T).T / step[:, None] ** np.arange(order)
     remainder = np.prod(1.0 + delta, axis=1).real
     e = transition(order, step)

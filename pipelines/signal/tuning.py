@@ -10,6 +10,7 @@ cross-validation finds (Craven & Wahba 1979).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -186,12 +187,12 @@ def _tune_channel(y: Array, order: int, step: float) -> tuple[float, float, bool
     values, lively = _window(y, step)
     given = step**2 / 12.0
     slowest = (8.0 * 37.0 / len(values)) ** order  # settles within a part of the window
-    grid = np.geomspace(min(slowest, 1e-2), 1e4, 30)
+    bank = _first_bank(order, min(slowest, 1e-2))
+    grid = bank.filter.tracking_index
     if not lively.any():
         return float(grid[0]), given, False, False, np.nan
     for _ in range(3):  # twice finer around the best of either criterion
-        mean_square = _mean_square(values, lively, order, grid)
-        remainder = stationary(order, grid).remainder
+        mean_square, remainder = _mean_square(values, lively, bank), bank.filter.remainder
         expected = given / remainder
         fixed = np.log(expected) + mean_square / expected  # -2 log likelihood a sample, R given
         noise = np.clip(mean_square * remainder, given, _NOISE_CAP * given)
@@ -202,7 +203,8 @@ def _tune_channel(y: Array, order: int, step: float) -> tuple[float, float, bool
         index, variance = float(grid[best]), float(noise[best] if believed else given)
         ratio = grid[1] / grid[0]
         grid = np.geomspace(index / ratio, index * ratio, 13)
-    white = np.where(lively, _surprise(values, order, np.array([index]))[0], np.nan)
+        bank = _Bank(order, grid)
+    white = np.where(lively, _Bank(order, np.array([index])).surprise(values)[0], np.nan)
     return index, variance, believed, True, float(whiteness(white[len(white) // 4:, None]).statistic[0])
 
 
@@ -221,30 +223,47 @@ def _window(y: Array, step: float) -> tuple[Array, npt.NDArray[np.bool_]]:
         begin = int(np.argmax(travel[_WINDOW - 1:] - travel[:len(run) - _WINDOW + 1]))
         run = run[begin:begin + _WINDOW]
     run = run[:len(run) // BLOCK * BLOCK]
-    pieces = np.array_split(run, max(1, len(run) // _STILL))
-    lively = np.concatenate([np.full(len(p), np.ptp(p) > 2.5 * step) for p in pieces])
-    return run, lively
+    size, longer = divmod(len(run), max(1, len(run) // _STILL))
+    sizes = np.full(max(1, len(run) // _STILL), size)
+    sizes[:longer] += 1
+    starts = np.cumsum(sizes) - sizes
+    travelled = np.maximum.reduceat(run, starts) - np.minimum.reduceat(run, starts)
+    return run, np.repeat(travelled > 2.5 * step, sizes)
 
 
-def _mean_square(values: Array, lively: npt.NDArray[np.bool_], order: int, index: Array) -> Array:
-    """Mean squared innovation of every filter in `index`, over motion and after a quarter of the window."""
+class _Bank:
+    """Many stationary filters and what a block of each does; those first tried are the same for every channel and log."""
+
+    def __init__(self, order: int, index: Array) -> None:
+        f = self.filter = stationary(order, index)
+        self.power = blocks.powers(f.predictor, BLOCK)
+        self.entry = (self.power[:, :BLOCK] @ (f.transition @ f.gain[..., None])[:, None])[..., 0]  # A^i E k
+        late = np.concatenate([np.zeros((len(index), 1)), self.entry[:, :-1, 0]], axis=1)
+        self.inside = np.eye(BLOCK) - blocks.impulse_toeplitz(late)
+        self.free = -self.power[:, :BLOCK, 0].swapaxes(1, 2)
+
+    def surprise(self, values: Array) -> Array:
+        """Innovations (filters, samples) of one channel; whole blocks only."""
+        y = (values - values[0]).reshape(1, -1, BLOCK)
+        drive = np.zeros((len(self.entry), y.shape[1], self.filter.order))
+        away = np.arange(BLOCK) - (BLOCK - 1) / 2.0
+        slope = float(away @ y[0, 0] / (away @ away))  # the filters start on the straight line through the first block
+        drive[:, 0, 0], drive[:, 0, 1] = y[0, 0].mean() + slope * away[0], slope / self.filter.step
+        drive[:, 1:] = y[:, :-1] @ self.entry[:, ::-1]
+        blocks.scan(self.power[:, BLOCK], drive)
+        return np.asarray(y @ self.inside + drive @ self.free).reshape(len(self.entry), -1)
+
+
+@lru_cache(maxsize=16)
+def _first_bank(order: int, slowest: float) -> _Bank:
+    return _Bank(order, np.geomspace(slowest, 1e4, 30))
+
+
+def _mean_square(values: Array, lively: npt.NDArray[np.bool_], bank: _Bank) -> Array:
+    """Mean squared innovation of every filter, over motion and after a quarter of the window."""
     counted = lively.copy()
     if np.count_nonzero(lively[len(values) // 4:]) > len(values) // 16:
         counted[:len(values) // 4] = False  # long enough for the slowest filter to settle
-    return np.asarray(np.maximum((_surprise(values, order, index)[:, counted] ** 2).mean(axis=1), 1e-300))
-
-
-def _surprise(values: Array, order: int, index: Array) -> Array:
-    """Innovations (filters, samples) of one channel under many stationary filters at once; whole blocks only."""
-    f = stationary(order, index)
-    power = blocks.powers(f.predictor, BLOCK)
-    entry = (power[:, :BLOCK] @ (f.transition @ f.gain[..., None])[:, None])[..., 0]  # A^i E k
-    late = np.concatenate([np.zeros((len(index), 1)), entry[:, :-1, 0]], axis=1)
-    kernel = np.concatenate([np.eye(BLOCK) - blocks.impulse_toeplitz(late), -power[:, :BLOCK, 0].swapaxes(1, 2)], axis=1)
-    y = (values - values[0]).reshape(1, -1, BLOCK)
-    drive = np.zeros((len(index), y.shape[1], order))
-    head = np.polynomial.polynomial.polyfit(np.arange(BLOCK), y[0, 0], 1)
-    drive[:, 0, 0], drive[:, 0, 1] = head[0], head[1] / f.step
-    drive[:, 1:] = y[:, :-1] @ entry[:, ::-1]
-    blocks.scan(power[:, BLOCK], drive)
-    return np.asarray(y @ kernel[:, :BLOCK] + drive @ kernel[:, BLOCK:]).reshape(len(index), -1)
+    surprise = bank.surprise(values)
+    return np.asarray(np.maximum(np.einsum("fk,fk,k->f", surprise, surprise, counted.astype(np.float64))
+                                 / np.count_nonzero(counted), 1e-300))

@@ -1,0 +1,110 @@
+"""The observer that fits the encoders of a log: noise from their resolution or their samples, jerk as asked or as they show."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.doctor.faults import quantum
+from pipelines.log.doctor.segments import Usable
+from pipelines.log.experiment import Array
+from pipelines.signal.chain import ORDERS
+from pipelines.signal.grid import Grid, lay_on, settle_late
+from pipelines.signal.observer import Observer, design
+from pipelines.signal.smoother import smooth
+from pipelines.signal.tuning import sigma_for_bandwidth, tune_jerk, tune_smoother
+
+__all__ = ["METHODS", "Observers", "Reconstruction", "encoder_resolution", "tuned_observers"]
+
+METHODS = ("smoother", "observer", "central-differences", "zero-phase")
+_FALLBACK_RESOLUTION = 1e-6  # [rad] where neither description nor samples show a step: far below any encoder
+_ROUNDS = 3  # of tuning a wandering clock: noise that lateness makes goes down by about 1/30 a round
+_BRIDGE_HZ = 100.0  # of the observer that bridges missing samples before anything is tuned
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """How motion is reconstructed. What is None is found from the data, joint by joint."""
+
+    method: str = "smoother"
+    order: int = 3  # of the chain of integrators: 3 is the paper's
+    jerk_std: tuple[float, ...] | None = None  # σ [rad/s^order], one a joint or one for all
+    bandwidth: tuple[float, ...] | None = None  # [Hz] -3 dB of the observer's position, instead of jerk_std
+
+    def as_settings(self) -> dict[str, object]:
+        """What a derived log must have been made with to be used."""
+        return asdict(self)
+
+    def check(self, joints: int) -> None:
+        """C02: one of the methods and orders there are, and one positive number a joint or one for all."""
+        if self.method not in METHODS:
+            raise UsageError("C02", f"'{self.method}' is no method", where="--method", remedy=f"one of {', '.join(METHODS)}")
+        if self.order not in ORDERS:
+            raise UsageError("C02", f"an observer of order {self.order}", where="--order", remedy="choose order 2, 3 or 4")
+        if self.jerk_std is not None and self.bandwidth is not None:
+            raise UsageError("C02", "jerk and bandwidth say the same thing twice", where="--bandwidth", remedy="give one of them")
+        for name, values in (("--jerk-std", self.jerk_std), ("--bandwidth", self.bandwidth)):
+            if values is not None and len(values) not in (1, joints):
+                raise UsageError("C02", f"{len(values)} values for {joints} joints", where=name, remedy="give one, or one a joint")
+            if values is not None and not all(0.0 < value < np.inf for value in values):
+                raise UsageError("C02", "a value that is not positive", where=name, remedy="give positive numbers")
+
+
+def encoder_resolution(good: Usable) -> Array:
+    """Δθ of each joint [rad] (joints,): the description's, or the step the samples show, whichever is coarser."""
+    shown = [quantum(column) or 0.0 for column in good.log.q.T]
+    said = [joint.encoder_resolution or 0.0 for joint in good.log.robot.joints]
+    return np.array([max(pair) or _FALLBACK_RESOLUTION for pair in zip(shown, said, strict=True)])
+
+
+@dataclass(frozen=True)
+class Observers:
+    """The observer of eq. (20), and the one whose jerk is best for a filter that sees both sides; the same where it was asked for.
+
+    A smooth motion is no random walk: between its samples the smoother may trust them with 20 to 50 times less jerk than
+    the observer, which looks ahead. Where the smoother looks ahead as well, at an end or over a long gap, the observer's is right.
+    """
+
+    causal: Observer
+    smoothing: Observer
+
+
+def tuned_observers(good: Usable, y: Array, grid: Grid, step: float, how: Reconstruction) -> Observers:
+    """The observers for `y` (samples, joints), tuned on the rows of `grid`; lateness of its clock taken off where that is real."""
+    rows, resolution = y[grid.first:grid.last], encoder_resolution(good)
+    found = _tuned(lay_on(rows, grid), step, resolution, how)
+    late = grid.lateness(step)
+    for _ in range(_ROUNDS if late.any() else 0):
+        moved = settle_late(rows, grid, late, smooth(lay_on(rows, grid), found.smoothing).states)
+        other = _tuned(moved, step, resolution, how)
+        if other.smoothing.noise_variance.sum() > 0.9 * found.smoothing.noise_variance.sum():
+            break
+        found = other
+    return found
+
+
+def _tuned(laid: Array, step: float, resolution: Array, how: Reconstruction) -> Observers:
+    try:
+        causal = tune_jerk(laid, step, resolution, how.order)
+    except InputRejected:  # no stretch without a missing sample is long enough
+        laid = _bridged(laid, step, resolution, how.order)
+        causal = tune_jerk(laid, step, resolution, how.order)
+    sigma, joints = causal.jerk_std, laid.shape[1]
+    if how.jerk_std is not None:
+        sigma = np.broadcast_to(np.array(how.jerk_std), joints)
+    elif how.bandwidth is not None:
+        sigma = sigma_for_bandwidth(np.broadcast_to(np.array(how.bandwidth), joints), step, causal.noise_variance, how.order)
+    observer = design(step, sigma, causal.noise_variance, how.order)
+    if how.method == "observer" or how.jerk_std is not None or how.bandwidth is not None:
+        return Observers(observer, observer)
+    both = tune_smoother(laid, step, resolution, how.order)
+    return Observers(observer, design(step, both.jerk_std, both.noise_variance, how.order))
+
+
+def _bridged(laid: Array, step: float, resolution: Array, order: int) -> Array:
+    """Missing samples as a quick smoother predicts them: for the tuning alone."""
+    variance = resolution**2 / 12.0
+    quick = design(step, sigma_for_bandwidth(min(_BRIDGE_HZ, 0.1 / step), step, variance, order), variance, order)
+    return np.where(np.isfinite(laid), laid, smooth(laid, quick).states[0])
