@@ -16,13 +16,13 @@ import typer
 
 from pipelines.errors import Interrupted, RrridError, UsageError
 from rrrid_cli.console import Teller, say_error, say_outcome
-from rrrid_cli.options import Common, LogPaths, with_common
+from rrrid_cli.options import Common, LogPaths, numbers, with_common
 
 __all__ = ["app", "entry"]
 
 TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
 
-STAGES = ("run", "inspect", "import", "convert")
+STAGES = ("run", "inspect", "import", "convert", "reconstruct")
 
 app = typer.Typer(name="rrrid", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
@@ -82,6 +82,22 @@ def convert(
     from pipelines.convert import STAGE
 
     _go(STAGE, tuple(logs), common, {"to": to})
+
+
+@app.command()
+@with_common
+def reconstruct(
+    logs: LogPaths, common: Common,
+    method: Annotated[str | None, typer.Option(help="smoother, observer, zero-phase or central-differences. [smoother]")] = None,
+    order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 or 4. [3]")] = None,
+    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^3]: one, or one a joint. [data's]")] = None,
+    bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
+) -> None:
+    """Reconstruct position, speed and acceleration from the encoders: Kalman observer and smoother."""
+    from pipelines.reconstruct import STAGE
+
+    _go(STAGE, tuple(logs), common, {"method": method, "order": order, "jerk_std": numbers(jerk_std, "--jerk-std"),
+                                     "bandwidth": numbers(bandwidth, "--bandwidth")})
 
 
 @app.command()

@@ -11,7 +11,9 @@ from typing import Annotated, Any
 
 import typer
 
-__all__ = ["Common", "LogPaths", "with_common"]
+from pipelines.errors import UsageError
+
+__all__ = ["Common", "LogPaths", "numbers", "with_common"]
 
 LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS")]
 
@@ -34,6 +36,17 @@ class Common:
     quiet: bool
     verbose: bool
     debug: bool
+
+
+def numbers(texts: list[str] | None, where: str) -> tuple[float, ...] | None:
+    """"1,2,3", or an option given several times, as numbers; None where it was not given."""
+    if not texts:
+        return None
+    try:
+        return tuple(float(part) for text in texts for part in text.split(","))
+    except ValueError:
+        raise UsageError("C02", f"'{','.join(texts)}' is no list of numbers", where=where,
+                         remedy="write for example 50,60,70") from None
 
 
 def _flag(words: str, *names: str) -> Any:

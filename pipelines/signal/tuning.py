@@ -20,8 +20,8 @@ from pipelines.signal import blocks
 from pipelines.signal.chain import ORDERS, Stationary, stationary
 from pipelines.signal.observer import BLOCK, Observer, observe
 
-__all__ = ["Tuned", "Whiteness", "innovations", "observer_bandwidth", "paper_rule", "sigma_for_bandwidth", "tune_jerk",
-           "tune_smoother", "whiteness"]
+__all__ = ["Tuned", "Whiteness", "innovations", "observer_bandwidth", "paper_rule", "sigma_for_bandwidth",
+           "smoother_bandwidth", "tune_jerk", "tune_smoother", "whiteness"]
 
 Array = npt.NDArray[np.float64]
 
@@ -69,6 +69,17 @@ def observer_bandwidth(observer: Observer) -> Array:
         through = _position_gain(f, np.exp(middle)) >= np.sqrt(0.5)
         low, high = np.where(through, middle, low), np.where(through, high, middle)
     return np.asarray(np.exp(low) / (2.0 * np.pi * observer.sample_time))
+
+
+def smoother_bandwidth(observer: Observer) -> Array:
+    """The same of the smoother that goes with it: Λ² N / (w^n + Λ² N) = 1/√2, see `sigma_for_bandwidth`. (channels,)"""
+    f = observer.filter
+    low, high = np.full(len(f.tracking_index), np.log(1e-12)), np.full(len(f.tracking_index), np.log(4.0))
+    for _ in range(60):
+        w = np.exp(0.5 * (low + high))
+        through = w**f.order <= (np.sqrt(2.0) - 1.0) * f.tracking_index**2 * f.numerator(w)
+        low, high = np.where(through, np.log(w), low), np.where(through, high, np.log(w))
+    return np.asarray(np.arcsin(np.minimum(np.exp(low / 2.0) / 2.0, 1.0)) / (np.pi * observer.sample_time))
 
 
 def sigma_for_bandwidth(bandwidth_hz: Array | float, sample_time: float, noise_variance: Array | float, order: int = 3,

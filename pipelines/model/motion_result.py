@@ -1,0 +1,159 @@
+"""What is found out about the reconstructed motion of one log: the observer, what it leaves, how well the motion is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.results import NOT_STORED
+from pipelines.log.schema import joint_unit
+from pipelines.model import motion_quality as quality
+from pipelines.model.motion import Measured, Reconstructed, Reconstruction, measured
+from pipelines.model.tuned import tuned_observers
+from pipelines.signal.observer import Observer
+from pipelines.signal.tuning import smoother_bandwidth
+
+__all__ = ["LogResult", "ObserverResult", "Place", "Series", "SmootherResult", "assess"]
+
+_BUCKETS = 400  # of an envelope
+_WHITE = 3.0  # standard deviations
+_SLIGHT = 0.2  # rms autocorrelation that changes a variance by less than a tenth
+
+
+@dataclass(frozen=True)
+class ObserverResult:
+    """The Kalman observer of eq. (18)-(20). Every array is per joint."""
+
+    order: int
+    sample_time: float  # [s]
+    gains: Array  # (joints, order) k_i of eq. (20) [1, 1/s, 1/s², ...]
+    bandwidth_hz: Array  # -3 dB of the position
+    measurement_std: Array  # [rad] √R
+    jerk_std: Array  # [rad/s^order] σ, as tuned or as asked for
+    jerk_std_paper: Array  # the paper's first guess, the largest jerk of the reference
+
+
+@dataclass(frozen=True)
+class SmootherResult:
+    """The smoother between the ends of a log: zero phase, and less jerk than an observer needs. Arrays per joint."""
+
+    jerk_std: Array  # [rad/s^order]
+    measurement_std: Array  # [rad]
+    bandwidth_hz: Array  # -3 dB of the position
+
+
+@dataclass(frozen=True)
+class Series:
+    """What the figures show: lowest and highest sample of each short stretch (points, joints)."""
+
+    t: Array  # [s] (points,)
+    error: Array  # [rad] measured minus reconstructed; NaN where nothing was measured
+    speed: Array
+    speed_std: Array  # largest of the stretch
+    acceleration: Array
+    acceleration_std: Array
+    frequency: Array  # [Hz] (bins,)
+    error_density: Array  # [rad²/Hz] (bins, joints)
+
+
+@dataclass(frozen=True)
+class LogResult:
+    """One log. Every array is per joint, in SI units (m for prismatic joints)."""
+
+    name: str
+    source: str
+    file: str  # the derived log, relative to the output folder
+    method: str
+    samples: int
+    predicted: int  # samples in which the position of some joint was not measured, and is predicted
+    units: tuple[str, ...]  # of position
+    observer: ObserverResult
+    smoother: SmootherResult | None
+    innovation_whiteness: Array  # about standard normal where white; null for a joint that stands still
+    innovation_correlation: Array  # rms of their autocorrelation over 30 lags
+    innovation_verdict: tuple[str, ...]  # what that means
+    reconstruction_error_max: Array  # [rad] max |measured - reconstructed|, Fig. 10(a)
+    reconstruction_error_rms: Array  # [rad]
+    peak_speed: Array
+    peak_acceleration: Array
+    position_std: Array  # of the reconstruction, in the middle of all samples
+    speed_std: Array
+    acceleration_std: Array
+    noise_floor: quality.NoiseFloor | None  # between the periods of a periodic log
+    series: Series | None
+    log: ExperimentLog = field(metadata=NOT_STORED, repr=False)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a log came from, and the derived log's file without its ending."""
+
+    source: str
+    file: str
+
+
+def assess(log: ExperimentLog, found: Reconstructed, how: Reconstruction, place: Place, derived: ExperimentLog,
+           draw: bool) -> LogResult:
+    """All about the motion `found` of `log`; the series for figures if `draw`."""
+    seen = measured(log, found.good)
+    tuned = found.observers or tuned_observers(seen.good, seen.y, seen.longest, seen.step, how)
+    error, observer = quality.reconstruction_error(seen, found), tuned.causal
+    (white, correlation), inside = quality.innovation_whiteness(seen, observer), _inside(seen)
+    return LogResult(
+        log.name, place.source, place.file, how.method, log.n_samples, int(np.isnan(seen.y).any(axis=1).sum()),
+        tuple(joint_unit("q", joint.revolute) for joint in log.robot.joints),
+        _observer(observer, quality.paper_jerk(seen, found, how.order)),
+        _smoother(tuned.smoothing) if how.method == "smoother" else None,
+        white, correlation, tuple(_words(w, c) for w, c in zip(white.tolist(), correlation.tolist(), strict=True)),
+        np.nanmax(np.abs(error), axis=0), np.sqrt(np.nanmean(error**2, axis=0)),
+        np.abs(found.motion.dq[inside]).max(axis=0), np.abs(found.motion.ddq[inside]).max(axis=0), *quality.typical_std(found),
+        quality.noise_floor(log, seen), _series(seen, found, error) if draw else None, derived)
+
+
+def _inside(seen: Measured) -> npt.NDArray[np.intp]:
+    """Indices, in the recording, of the samples of usable stretches."""
+    return np.concatenate([seen.good.kept[run] for run in seen.good.runs])
+
+
+def _observer(observer: Observer, paper: Array) -> ObserverResult:
+    return ObserverResult(observer.order, observer.sample_time, observer.gain, observer.bandwidth_hz,
+                          np.sqrt(observer.noise_variance), observer.jerk_std, paper)
+
+
+def _smoother(observer: Observer) -> SmootherResult:
+    return SmootherResult(observer.jerk_std, np.sqrt(observer.noise_variance), smoother_bandwidth(observer))
+
+
+def _words(statistic: float, correlation: float) -> str:
+    if np.isnan(statistic):
+        return "none: the joint stands still"
+    if abs(statistic) < _WHITE:
+        return "white: the observer takes from the encoder all that a model of random jerk can"
+    if correlation < _SLIGHT:
+        return f"nearly white, correlation {correlation:.2f}: the motion is smoother than random jerk, the standard deviations hold"
+    return (f"coloured, correlation {correlation:.2f}: an encoder error with a pattern, a vibration, or a jerk level that was "
+            "asked for and does not fit; the standard deviations may be too small")
+
+
+def _series(seen: Measured, found: Reconstructed, error: Array) -> Series:
+    kept = seen.good.kept
+    size = max(1, -(-len(kept) // _BUCKETS))
+    first = np.arange(0, len(kept), size)
+    t = seen.good.log.t
+    std = found.std or (np.full_like(error, np.nan),) * 3
+    spectrum = quality.error_spectrum(seen, error)
+    return Series(np.stack([t[first], t[np.minimum(first + size // 2, len(t) - 1)]], axis=1).ravel(), _envelope(error, size),
+                  _envelope(found.motion.dq[kept], size), _envelope(std[1][kept], size),
+                  _envelope(found.motion.ddq[kept], size), _envelope(std[2][kept], size), spectrum.frequency, spectrum.density)
+
+
+def _envelope(x: Array, size: int) -> Array:
+    """(2 buckets, joints): lowest and highest of each bucket of `size` samples, NaN where it has none."""
+    first = np.arange(0, len(x), size)
+    low = np.minimum.reduceat(np.where(np.isnan(x), np.inf, x), first, axis=0)
+    high = np.maximum.reduceat(np.where(np.isnan(x), -np.inf, x), first, axis=0)
+    both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
+    return np.where(np.isfinite(both), both, np.nan)

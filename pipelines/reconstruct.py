@@ -1,0 +1,105 @@
+"""Reconstruct position, speed and acceleration of every joint from its encoder.
+
+Reads    any logs but planned ones
+Writes   logs/<name>.h5 or .parquet with q_hat, dq_hat, ddq_hat and their std; result.json, result.h5, report.html
+Source   Kostić et al. 2004, Section IV.C.2 and IV.C.4, eq. (16)-(21), Figs. 7 and 10; Rauch, Tung & Striebel 1965
+
+The observer is eq. (20), its jerk the one its innovations ask for; the default goes on to smooth, with later samples as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.errors import Check, InputRejected, NothingMatched
+from pipelines.log.derive import derive, recording
+from pipelines.log.doctor.checks import Subject, check_log
+from pipelines.log.experiment import Array
+from pipelines.log.files import Opened, write_log
+from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.model.motion import Reconstruction, reconstruct
+from pipelines.model.motion_result import LogResult, ObserverResult, Place, assess
+from pipelines.report.motion_report import motion_report
+from pipelines.report.report import Report
+from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+
+__all__ = ["STAGE", "Result", "Settings", "compute", "report"]
+
+Settings = Reconstruction
+
+_DRAWN = 8  # logs whose series are kept for figures
+
+
+@dataclass(frozen=True)
+class Result:
+    """Every log; in front the observer of the longest one, and the worst error of all logs of its robot."""
+
+    observer: ObserverResult
+    reconstruction_error_max: Array  # [rad] (joints,)
+    innovation_whiteness: Array  # of the longest log
+    logs: tuple[LogResult, ...]
+    checks: tuple[Check, ...]
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Reconstruct the motion of every log that has one.
+
+    Raises:
+        NothingMatched: all logs are plans.
+        InputRejected: the doctor rejects a log: its first reason.
+        UsageError: C02, settings that do not fit.
+    """
+    taken: set[str] = set()
+    found: list[LogResult] = []
+    checks: list[Check] = []
+    for opened in inputs.logs:
+        if opened.log.origin == "planned":
+            checks.append(Check.of("S01", "warn", "is a plan: nothing moved, nothing to reconstruct", where=opened.path))
+            continue
+        stem = slug(opened.path.stem)
+        while stem in taken:
+            stem += "+"
+        taken.add(stem)
+        one, said = _one(opened, inputs.robot, settings, f"logs/{stem}", len(found) < _DRAWN)
+        found.append(one)
+        checks += said
+    if not found:
+        raise NothingMatched("C06", "no log holds a measured position", remedy="name logs of experiments, not plans")
+    longest = max(found, key=lambda log: log.samples)
+    alike = [log.reconstruction_error_max for log in found if len(log.units) == len(longest.units)]
+    return Result(longest.observer, np.fmax.reduce(alike), longest.innovation_whiteness, tuple(found), tuple(checks))
+
+
+def _one(opened: Opened, robot: RobotDescription | None, settings: Settings, file: str,
+         draw: bool) -> tuple[LogResult, list[Check]]:
+    bare = recording(opened.log)
+    if robot is not None:
+        if robot.n_joints != bare.n_joints:
+            raise InputRejected("S02", f"log has {bare.n_joints} joints, model {robot.n_joints}", where=opened.path,
+                                remedy="give the description of this robot")
+        bare = replace(bare, robot_text=format_robot(robot))
+    subject = Subject(bare)
+    checks = [check for check in check_log(subject) if check.level != "ok"]
+    if reject := next((check for check in checks if check.level == "reject"), None):
+        raise reject.as_error()
+    found = reconstruct(bare, settings, subject.good)
+    derived = derive(bare, "reconstruct", settings.as_settings(), found.signals())
+    return assess(bare, found, settings, Place(opened.path.name, file), derived, draw), checks
+
+
+def write(result: Result, folder: Path, request: Request) -> None:
+    """Write every log with its motion, in the container asked for."""
+    for item in result.logs:
+        request.tell(f"writing {item.file}")
+        write_log(folder / f"{item.file}.{request.format}", item.log)
+
+
+def report(result: Result) -> Report:
+    """The verdict, the observer, and how well the motion is known."""
+    return motion_report(result.logs)
+
+
+STAGE = Stage("reconstruct", "Reconstruct motion", Settings, compute, report, read_logs, write, checks=lambda result: result.checks)

@@ -1,0 +1,144 @@
+"""The report on reconstructed motion: how near it comes to the encoders, the observer that made it, how well it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.model.motion_result import LogResult, ObserverResult, Series
+from pipelines.report.figures import Array, joint_axes, joint_size
+from pipelines.report.motion_figures import draw_banded, draw_bode, draw_density
+from pipelines.report.report import Figure, Report, Section, Table
+from pipelines.report.sections import joint_signal_figure
+from pipelines.report.style import format_number
+from pipelines.signal.observer import design
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["motion_report"]
+
+_PAPER = 5e-4  # [rad] what Kostić et al. 2004, Fig. 10(a), calls good enough
+_METHODS = {"smoother": "the Kalman smoother, which knows later samples too",
+            "observer": "the Kalman observer, as a controller could",
+            "central-differences": "central differences",
+            "zero-phase": "a zero-phase low-pass and central differences"}
+
+
+def motion_report(logs: Sequence[LogResult]) -> Report:
+    """Verdict, key figures, one section a log."""
+    worst = max(logs, key=lambda log: float(log.reconstruction_error_max.max()))
+    error, joint = float(worst.reconstruction_error_max.max()), int(worst.reconstruction_error_max.argmax()) + 1
+    near = error <= _PAPER
+    which = "The motion of the log" if len(logs) == 1 else f"The motion of {len(logs)} logs"
+    unit = worst.units[joint - 1]
+    verdict = (f"{which} is reconstructed by {_METHODS[worst.method]}; it stays within {format_number(error, 2)} {unit} of what "
+               f"the encoders measured{'' if len(logs) == 1 else f' (worst: {worst.name}, joint {joint})'}, "
+               f"{'below' if near else 'above'} the {format_number(_PAPER)} rad that the paper calls good enough.")
+    sections = [_explanation(logs), *(_log_section(log, i) for i, log in enumerate(logs) if log.series is not None)]
+    if more := [log.name for log in logs if log.series is None]:
+        sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
+    return Report("Reconstructed motion", verdict, "good" if near else "attention", _key_figures(logs), tuple(sections))
+
+
+def _key_figures(logs: Sequence[LogResult]) -> Table:
+    rows = tuple((log.name, log.samples, log.predicted, float(log.reconstruction_error_max.max()), float(log.peak_speed.max()),
+                  _largest(log.speed_std), float(log.peak_acceleration.max()), _largest(log.acceleration_std)) for log in logs)
+    return Table(("log", "samples", "predicted", "error, largest [rad]", "speed, largest [rad/s]", "its std [rad/s]",
+                  "acceleration, largest [rad/s^2]", "its std [rad/s^2]"), rows,
+                 "The worst joint of each log. Predicted: samples in which a position was not measured.")
+
+
+def _largest(values: Array) -> float | None:
+    return None if np.isnan(values).all() else float(np.nanmax(values))
+
+
+def _explanation(logs: Sequence[LogResult]) -> Section:
+    coloured = sum(any(words.startswith("coloured") for words in log.innovation_verdict) for log in logs)
+    text = ["The observer takes each joint for a chain of integrators that random jerk drives. The encoder's resolution and its "
+            "samples say how noisy it is; the jerk is the one that predicts the next sample best, unless it was asked for. The "
+            "paper's rule, the largest jerk of the reference, is a first guess and filters hardly at all."]
+    if logs[0].smoother is not None:
+        text.append("The smoother sees both sides of a sample and needs far less jerk. Near the ends of a log and over long gaps "
+                    "it takes the observer's, because there it has to look ahead as well.")
+    if coloured:
+        text.append(f"In {coloured} of {len(logs)} logs the observer's innovations, what each sample adds to its prediction, are "
+                    "coloured: see the first section below.")
+    return Section("How it was done", tuple(text))
+
+
+def _log_section(log: LogResult, number: int) -> Section:
+    assert log.series is not None
+    floor = log.noise_floor
+    text = [f"Innovations of joint {j + 1}: {words}." for j, words in enumerate(log.innovation_verdict)] if number == 0 else []
+    if floor is not None:
+        left_out = f" (left out: period {', '.join(map(str, floor.left_out))})" if floor.left_out else ""
+        text.append(f"{floor.periods} periods were averaged; what differs between them is the noise floor in the table{left_out}.")
+    return Section(f"Log {log.name}", tuple(text), _tables(log), tuple(_figures(log, log.series, number == 0)))
+
+
+def _tables(log: LogResult) -> tuple[Table, ...]:
+    o = log.observer
+    columns: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
+    columns |= {f"k{i + 1} [{('1', '1/s', '1/s^2', '1/s^3')[i]}]": o.gains[:, i].tolist() for i in range(o.order)}
+    columns |= {"bandwidth [Hz]": o.bandwidth_hz.tolist(), "encoder noise [rad]": o.measurement_std.tolist(),
+                f"jerk σ [rad/s^{o.order}]": o.jerk_std.tolist(), f"paper's rule [rad/s^{o.order}]": o.jerk_std_paper.tolist(),
+                "whiteness": log.innovation_whiteness.tolist()}
+    known: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
+    if log.smoother is not None:
+        known |= {"smoother's σ [rad/s^" + f"{o.order}]": log.smoother.jerk_std.tolist(), "its bandwidth [Hz]": log.smoother.bandwidth_hz.tolist()}
+    known |= {"error, largest [rad]": log.reconstruction_error_max.tolist(), "rms [rad]": log.reconstruction_error_rms.tolist(),
+              "std q [rad]": log.position_std.tolist(), "std dq [rad/s]": log.speed_std.tolist(),
+              "std ddq [rad/s^2]": log.acceleration_std.tolist()}
+    if log.noise_floor is not None:
+        known |= {"floor q [rad]": log.noise_floor.position.tolist(), "floor τ [N m]": log.noise_floor.torque.tolist()}
+    return (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white."),
+            _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
+
+
+def _table(columns: dict[str, Sequence[float]], caption: str) -> Table:
+    return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), caption)
+
+
+def _figures(log: LogResult, s: Series, first: bool) -> list[Figure]:
+    joints, unit = len(log.units), log.units[0]
+    band = " The band is two standard deviations, where it is wide enough to see." if not np.isnan(log.speed_std).all() else ""
+    largest = format_number(float(log.reconstruction_error_max.max()), 2)
+    error = (f"Measured minus reconstructed position: {largest} {unit} at most. "
+             "It should look like the steps of the encoder, without a trace of the motion.")
+    spectrum = ("Spectrum of that difference: flat above the bandwidth, where it is the encoder's noise. A peak would be an error "
+                "of the encoder, or a vibration that the reconstruction does not follow.")
+    figures = [_bode(log.observer, f"bode-{log.name}")] if first else []
+    return [
+        *figures,
+        joint_signal_figure(f"error-{log.name}", error, s.t, s.error, unit, quantity="measured − reconstructed"),
+        Figure(f"spectrum-{log.name}", spectrum,
+               lambda drawing: draw_density(drawing.subplots(), s.frequency, s.error_density, unit), (6.0, 2.8)),
+        Figure(f"speed-{log.name}", f"Reconstructed speed.{band}",
+               _banded(joints, s.t, s.speed, s.speed_std, f"{unit}/s", "speed"), joint_size(joints)),
+        Figure(f"acceleration-{log.name}", f"Reconstructed acceleration.{band}",
+               _banded(joints, s.t, s.acceleration, s.acceleration_std, f"{unit}/s^2", "acceleration"), joint_size(joints))]
+
+
+def _banded(joints: int, t: Array, values: Array, std: Array, unit: str, quantity: str) -> Callable[[Drawing], None]:
+    return lambda drawing: draw_banded(joint_axes(drawing, joints), t, values, std, unit, quantity)
+
+
+def _bode(o: ObserverResult, name: str) -> Figure:
+    """Fig. 7 of the paper, from the observer's numbers alone."""
+    observer = design(o.sample_time, o.jerk_std, o.measurement_std**2, o.order)
+    frequency = np.geomspace(0.5, 0.5 / o.sample_time, 200)
+    response = np.moveaxis(observer.response(frequency), 2, 0)[:3]
+    s = 2j * np.pi * frequency
+    names = ("position", "speed [1/s]", "acceleration [1/s²]")[:len(response)]
+
+    def draw(drawing: Drawing) -> None:
+        draw_bode(drawing.subplots(len(response), 2, sharex=True), frequency, list(response), names,
+                  [s**i for i in range(len(response))])
+
+    widths = ", ".join(f"{format_number(hz, 3)}" for hz in o.bandwidth_hz)
+    return Figure(name, f"What the observer does to a measured position, eq. (20): it passes it up to {widths} Hz (-3 dB, joint by "
+                  "joint), and differentiates below that like the dotted line; above, noise is held back instead of amplified.",
+                  draw, (6.0, 1.9 * len(response) + 0.4), alt="Bode plot of the Kalman observer")
