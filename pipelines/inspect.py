@@ -203,8 +203,8 @@ def _verdict(result: Result) -> str:
     parts = [f"{count} {words}" for count, words in
              ((bad, "cannot be used"), (mended, "can be used after mending"), (warned, "should be looked at")) if count]
     # columns in the wrong place or unit explain what else is found
-    worst = min(found, key=lambda c: (
-        c.level != "reject", not c.gate, not c.code.startswith("RRID-S"), _WORST_FIRST.index(c.level)))
+    worst = min(found, key=lambda c: (c.level != "reject", not c.gate, not c.code.startswith("RRID-S"),
+                                      _WORST_FIRST.index(c.level)))
     return f"Of {total} log{'s' * (total != 1)} {', '.join(parts) or 'none is bad alone'}. First of all: {worst.message}."
 
 
@@ -213,8 +213,7 @@ def _key_figures(result: Result) -> Table:
     for check in result.checks:
         count[check.level] += 1
     rows = (("logs", len(result.logs) + len(result.rejected)), ("checks", len(result.checks)), ("passed", count["ok"]),
-            ("look at it", count["warn"]),
-            ("mended", count["repair"]), ("not usable", count["reject"]))
+            ("look at it", count["warn"]), ("mended", count["repair"]), ("not usable", count["reject"]))
     return Table(("what", "number"), rows)
 
 
@@ -230,8 +229,8 @@ def _passed_section(result: Result) -> Section:
         if check.level == "ok":
             groups[check.code].append(check)
     rows = tuple((code, len(group), group[0].message) for code, group in sorted(groups.items()))
-    return Section("What was looked at and is in order", (), (Table(("code", "logs", "what was measured, in the first "
-                   "of them"), rows),))
+    columns = ("code", "logs", "what was measured, in the first of them")
+    return Section("What was looked at and is in order", (), (Table(columns, rows),))
 
 
 def _logs_section(result: Result) -> Section:

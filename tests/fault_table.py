@@ -24,7 +24,7 @@ from tests.faulty import (
     turning,
     wrapped,
 )
-from tests.healthy import changed, fourier, good_log, make_log, one_joint, rows, with_signal
+from tests.healthy import changed, fourier, good_log, make_log, one_joint, rows, with_extra, with_signal
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,8 @@ FAULTS = (
           "repair", "first by 1.499 s", "sample 3000"),
     Fault("T01 often", lambda g: retimed(g, lambda t: t - 0.05 * (np.arange(t.size) // 300)),
           "reject", "19 times", "sample 300"),
+    Fault("T01 throughout", lambda g: retimed(g, lambda t: t[::-1].copy()), "reject", "back 5999 times", "sample 1"),
+    Fault("T02 still", lambda g: retimed(g, np.zeros_like), "reject", "stands still at 0", "sample 1"),
     Fault("T02", repeated, "repair", "1 sample twice", "sample 3001"),
     Fault("T02 conflict", lambda g: changed(repeated(g), "q", (3001, 1), 0.3), "reject", "different values", "sample 3001"),
     Fault("T03", lambda g: dropped(g, lambda k: k[~np.isin(k % 600, (500, 501))]),
@@ -94,6 +96,12 @@ FAULTS = (
           "repair", "400 samples of tau", "signal tau, joint 1, sample 2000"),
     Fault("D02 channel", lambda g: changed(g, "q", (slice(None), 1), np.nan),
           "reject", "no measurement at all", "signal q, joint 2"),
+    Fault("D02 reference", lambda g: changed(g, "dq_ref", (slice(None), 1), np.nan),
+          "warn", "no measurement at all", "signal dq_ref, joint 2", True),
+    Fault("D02 temperature", lambda g: with_extra(g, "temperature", np.nan),
+          "warn", "no measurement at all", "signal temperature, joint 1", True),
+    Fault("D01 temperature", lambda g: changed(with_extra(g, "temperature", 20.0), "temperature", (slice(0, 600), 0), np.nan),
+          "warn", "600 of 6000 samples are missing", "signal temperature, joint 1", False),
     Fault("D03 inf", lambda g: changed(g, "tau", ([400, 401], 1), np.inf),
           "repair", "samples 400, 401", "signal tau, joint 2, sample 400"),
     Fault("D03 huge", lambda g: changed(g, "q", (40, 2), 1e+300), "repair", "1e+300", "signal q, joint 3, sample 40"),

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from pipelines.log.doctor.checks_subject import Subject
-from pipelines.log.doctor.faults import GAP_LIMIT, Mask
+from pipelines.log.doctor.faults import Mask
 from pipelines.log.experiment import Array
+from pipelines.log.limits import GAP_TICKS
 from pipelines.report.report import Figure
 from pipelines.report.sections import interval_figure, joint_signal_figure, timeline_figure
 
@@ -44,7 +45,7 @@ def log_preview(subject: Subject) -> Preview:
     intervals = np.diff(t)
     if intervals.size > _INTERVALS:
         intervals = np.quantile(intervals, np.linspace(0.0, 1.0, _INTERVALS))
-    gaps = np.flatnonzero(np.diff(t) > (GAP_LIMIT + 1.5) * subject.log.sample_time)
+    gaps = np.flatnonzero(np.diff(t) > GAP_TICKS * subject.log.sample_time)
     spans = {"gap": tuple((float(t[k]), float(t[k + 1])) for k in gaps),
              "missing": _spans(t, lost.any(axis=1)), "glitch": _spans(t, good.spikes.any(axis=1)),
              "saturated": _spans(t, good.saturated.any(axis=1)), "after the stop": _spans(t, np.arange(t.size) >= good.end)}
@@ -85,16 +86,16 @@ def _any(mask: Mask, size: int) -> Array:
 def preview_figures(preview: Preview, uneven: bool) -> tuple[Figure, ...]:
     """Position and torque over time; the sampling where it is `uneven`; where samples are left out, if any are."""
     figures: list[Figure] = [
-        joint_signal_figure(f"position-{preview.name}", "Measured position; lowest and highest sample of each short "
-                       "stretch.", preview.t, preview.q,
-                            preview.units[0], quantity="position", flagged=preview.flagged_q > 0, flag_name="missing or glitch"),
-        joint_signal_figure(f"torque-{preview.name}", "Torque; samples that no fit uses are marked.", preview.t,
-                            preview.tau, preview.units[1], quantity="torque",
+        joint_signal_figure(f"position-{preview.name}", "Measured position; lowest and highest sample of each short stretch.",
+                            preview.t, preview.q, preview.units[0], quantity="position",
+                            flagged=preview.flagged_q > 0, flag_name="missing or glitch"),
+        joint_signal_figure(f"torque-{preview.name}", "Torque; samples that no fit uses are marked.",
+                            preview.t, preview.tau, preview.units[1], quantity="torque",
                             flagged=preview.flagged_tau > 0, flag_name="missing, glitch or saturated")]
     if uneven:
         clock = np.concatenate([[0.0], np.cumsum(preview.intervals)])
-        figures.append(interval_figure(f"intervals-{preview.name}", "How evenly the log was sampled; one bar would be "
-                       "perfect.", clock, preview.sample_time))
+        figures.append(interval_figure(f"intervals-{preview.name}",
+                                       "How evenly the log was sampled; one bar would be perfect.", clock, preview.sample_time))
     if preview.spans:
         figures.append(timeline_figure(f"timeline-{preview.name}", "Where samples are missing or left out.",
                                        (float(preview.t[0]), float(preview.t[-1])),

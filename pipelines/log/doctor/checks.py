@@ -18,7 +18,7 @@ from pipelines.errors import Check
 from pipelines.log.doctor.checks_motion import MOTION_CHECKS, both_ways
 from pipelines.log.doctor.checks_signal import SIGNAL_CHECKS
 from pipelines.log.doctor.checks_subject import Subject
-from pipelines.log.doctor.checks_time import MOTION_BAND, TIME_CHECKS
+from pipelines.log.doctor.checks_time import CLOCK_CHECKS, MOTION_BAND, TIME_CHECKS
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 
@@ -45,6 +45,8 @@ def check_log(log: ExperimentLog | Subject, trusted: tuple[str, ...] = ()) -> tu
         return tuple(TIME_CHECKS[0](subject))
     if subject.planned:
         return ()  # a plan has neither clock nor sensors
+    if not subject.good.time.advances:
+        return tuple(found for check in CLOCK_CHECKS for found in check(subject) if found.level != "ok")
     checks = CHECKS if subject.sampled else TIME_CHECKS
     found = [found for check in checks for found in check(subject) if found.code not in trusted]
     follows = {f"RRID-{code}" for check in found if check.level == "reject" for code in _CONSEQUENCES.get(check.code, ())}

@@ -9,6 +9,7 @@ from pipelines.log.doctor.checks_subject import Subject, spread
 from pipelines.log.doctor.faults import lagged_speed
 from pipelines.log.doctor.stop import emergency_stop
 from pipelines.log.experiment import Array
+from pipelines.log.limits import percent
 
 __all__ = ["MOTION_CHECKS", "both_ways"]
 
@@ -118,7 +119,7 @@ def follows_reference(s: Subject) -> list[Check]:
             continue
         error = q[ok] - reference[ok]
         share = float(np.std(error)) / max(float(np.std(reference[ok])), 1e-12)
-        seen.append(f"{100 * share:.2g} %")
+        seen.append(percent(share, 2))
         if share > 0.5:
             found.append(s.say("S16", "reject" if share > 0.8 else "warn",
                                f"position and reference differ by {100 * share:.0f} % of the motion "

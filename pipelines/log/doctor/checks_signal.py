@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
+from pipelines.log import schema
 from pipelines.log.doctor.checks_subject import Subject, many, spread
-from pipelines.log.doctor.faults import GAP_LIMIT, sentinels, torque_limit
+from pipelines.log.doctor.faults import torque_limit
 from pipelines.log.doctor.segments import long_blocks
+from pipelines.log.limits import ABSURD, GAP_LIMIT, sentinels
 
 __all__ = ["SIGNAL_CHECKS"]
 
@@ -17,8 +19,12 @@ _HALF = 0.5
 
 def missing_samples(s: Subject) -> list[Check]:
     """D01, D02: NaN stands for a measurement that was not made; a few are fine, a whole channel is not."""
-    found: list[Check] = []
-    for name in ("q", "tau"):
+    needed = ("q", "tau", "v") if s.log.experiment == "frf" else ("q", "tau")
+    found = [check for name in s.log.signals if name in schema.SIGNALS and name not in (*needed, "t")
+             for check in _missing_beside(s, name)]
+    for name in needed:
+        if name not in s.log:
+            continue  # reading a log has refused what it cannot be without
         undefined = np.isnan(s.log[name])
         for j in np.flatnonzero(undefined.any(axis=0)).tolist():
             column, total = undefined[:, j], int(undefined[:, j].sum())
@@ -42,7 +48,22 @@ def missing_samples(s: Subject) -> list[Check]:
                                    "treated as not measured",
                                    signal=name, joint=j, sample=first,
                                    remedy="none needed if they stay few"))
-    return found or s.ok("D01", "no sample of q or tau is missing")
+    return found or s.ok("D01", "no sample is missing")
+
+
+def _missing_beside(s: Subject, name: str) -> list[Check]:
+    """D01, D02 of a signal that fits can do without: a stage that needs it must hear of it, the others need not stop."""
+    undefined = np.isnan(s.log[name])
+    found = []
+    for j in np.flatnonzero(undefined.any(axis=0)).tolist():
+        total, first = int(undefined[:, j].sum()), int(np.argmax(undefined[:, j]))
+        whole = total == len(undefined)
+        words = "there is no measurement at all" if whole else f"{total} of {len(undefined)} samples are missing"
+        found.append(s.say("D02" if whole else "D01", "warn", f"{name} of joint {j + 1}: {words}",
+                           signal=name, joint=j, sample=first, gate=whole,
+                           remedy="leave the signal out of the log, or look at this channel and record again" if whole
+                           else "none needed if nothing is made of this signal"))
+    return found
 
 
 def absurd_samples(s: Subject) -> list[Check]:
@@ -52,7 +73,7 @@ def absurd_samples(s: Subject) -> list[Check]:
         if name == "t":
             continue
         with np.errstate(invalid="ignore"):
-            huge = (np.abs(signal.values) >= 1e9) & ~np.isnan(signal.values)
+            huge = (np.abs(signal.values) >= ABSURD) & ~np.isnan(signal.values)
         filler = sentinels(signal.values) if name in ("q", "tau") else np.zeros_like(huge)
         bad = huge | filler
         for j in np.flatnonzero(bad.any(axis=0)).tolist():

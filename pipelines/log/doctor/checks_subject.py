@@ -11,11 +11,10 @@ from pipelines.errors import Check, Level
 from pipelines.log.doctor.faults import quantum
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.limits import FEWEST
 from pipelines.log.schema import joint_unit
 
-__all__ = ["MIN_SAMPLES", "Subject", "many", "spread"]
-
-MIN_SAMPLES = 20  # fewer samples have no statistics; T08 says so and the checks of signals stay silent
+__all__ = ["Subject", "many", "spread"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +33,8 @@ class Subject:
 
     @property
     def sampled(self) -> bool:
-        """Whether there are signals to judge."""
-        return not self.planned and self.log.n_samples >= MIN_SAMPLES
+        """Whether there are signals to judge; of fewer samples T08 says all there is to say."""
+        return not self.planned and self.log.n_samples >= FEWEST
 
     @cached_property
     def steps(self) -> tuple[float | None, ...]:

@@ -5,14 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.doctor.checks_subject import MIN_SAMPLES, Subject, many
-from pipelines.log.doctor.faults import GAP_LIMIT
-from pipelines.log.doctor.segments import SHORTEST
+from pipelines.log.doctor.checks_subject import Subject, many
+from pipelines.log.limits import (
+    FEWEST,
+    GAP_LIMIT,
+    LARGEST_JITTER,
+    MOST_STEPS,
+    SHORTEST,
+    percent,
+    recorded_span,
+    shorter_than_period,
+)
 
-__all__ = ["TIME_CHECKS"]
-
-_MOST_STEPS = 5  # a clock that was set back more often than this is not a clock
-_LARGEST_JITTER = 0.05  # of the sample time (T05)
+__all__ = ["CLOCK_CHECKS", "MOTION_BAND", "TIME_CHECKS"]
 
 
 def length(s: Subject) -> list[Check]:
@@ -23,14 +28,14 @@ def length(s: Subject) -> list[Check]:
                       f"{many(log.n_samples, 'sample')}",
                       signal="t",
                       remedy="record again; a log of one sample shows no motion")]
-    if log.n_samples < MIN_SAMPLES:
+    if log.n_samples < FEWEST:
         return [s.say("T08", "reject",
-                      f"{log.n_samples} samples, fewer than the {MIN_SAMPLES} that any check needs",
+                      f"{log.n_samples} samples, fewer than the {FEWEST} that any check needs",
                       signal="t",
                       remedy="record a longer log")]
     time = s.good.log.t
-    duration = float(time.max() - time.min()) + log.sample_time if time.size else 0.0
-    if log.period is not None and duration < log.period * (1 - 1e-6) - 0.5 * log.sample_time:
+    duration = recorded_span(time, log.sample_time)
+    if log.period is not None and shorter_than_period(time, log.sample_time, log.period):
         return [s.say("T07", "reject",
                       f"{duration:.4g} s < {log.period:.4g} s period",
                       signal="t",
@@ -78,7 +83,7 @@ def order(s: Subject) -> list[Check]:
     if time.steps.size:
         k = int(time.steps[0])
         back = (s.log.t[k] - s.log.t[k + 1]) * time.scale
-        much = time.steps.size > _MOST_STEPS
+        much = time.steps.size > MOST_STEPS
         then = "" if much else "; the log is split there"
         found.append(s.say("T01", "reject" if much else "repair",
                            f"time steps back {many(time.steps.size, 'time')}, first by {back:.4g} s{then}",
@@ -91,8 +96,9 @@ def repeated_stamps(s: Subject) -> list[Check]:
     """T02: no stamp stands twice."""
     time = s.good.time
     if time.conflicting.size:
+        words = f"{many(time.conflicting.size, 'stamp')} twice with different values"
         return [s.say("T02", "reject",
-                      f"{many(time.conflicting.size, 'stamp')} twice with different values",
+                      words if time.advances or time.steps.size else f"time stands still at {s.log.t[time.conflicting[0]]:.6g}",
                       signal="t", sample=int(time.conflicting[0]) + 1,
                       remedy="record with a clock that resolves a sample")]
     if time.repeated.size:
@@ -137,11 +143,11 @@ def gaps(s: Subject) -> list[Check]:
 def jitter(s: Subject) -> list[Check]:
     """T05: samples come at even intervals."""
     time = s.good.time
-    words = f"the interval varies by {100 * time.jitter:.3g} % of the sample time (rms), at most by {100 * time.worst:.3g} %"
-    if time.jitter <= _LARGEST_JITTER:
+    words = f"the interval varies by {percent(time.jitter)} of the sample time (rms), at most by {percent(time.worst)}"
+    if time.jitter <= LARGEST_JITTER:
         return s.ok("T05", words, signal="t")
     return [s.say("T05", "warn",
-                  f"{words}, more than {100 * _LARGEST_JITTER:.0f} %",
+                  f"{words}, more than {percent(LARGEST_JITTER)}",
                   signal="t",
                   remedy="sample by a timer; a frequency response needs even sampling")]
 
@@ -169,11 +175,12 @@ def _undersampled(s: Subject, joint: int) -> bool:
     even = (np.abs(np.diff(s.good.log.t) / s.log.sample_time - 1.0) < 0.5) & ~s.good.jumped[1:, joint]
     d = np.where(even & np.isfinite(np.diff(q)), np.diff(q), 0.0)
     power = float(d @ d)
-    if d.size < MIN_SAMPLES or power <= 0 or np.sqrt(power / d.size) < 5.0 * step or np.ptp(q[np.isfinite(q)]) < 100.0 * step:
+    if d.size < FEWEST or power <= 0 or np.sqrt(power / d.size) < 5.0 * step or np.ptp(q[np.isfinite(q)]) < 100.0 * step:
         return False
     c1, c2 = float(d[1:] @ d[:-1]) / power, float(d[2:] @ d[:-2]) / power
     return (c1 < 0.81 and c2 < 0.5 and c2 < c1) or c1 < -0.6
 
 
+CLOCK_CHECKS = (length, order, repeated_stamps)  # of a clock that never runs forward nothing else can be said
 TIME_CHECKS = (length, unit_of_time, order, repeated_stamps, lost_samples, gaps, jitter)
 MOTION_BAND = band

@@ -20,19 +20,15 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.limits import ABSURD, GAP_LIMIT, GAP_TICKS, sentinels
 
 __all__ = ["GAP_LIMIT", "Mask", "TimeBase", "jumps", "lagged_speed", "missing", "quantum", "saturated",
-           "sentinels", "spikes", "time_base", "torque_limit"]
+           "spikes", "time_base", "torque_limit"]
 
 Mask = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
-# A model-based observer predicts through this many missing samples; beyond, the log is taken apart (T03, T04).
-GAP_LIMIT = 10
-
-_ABSURD = 1e9  # no joint is there, in any unit
 _NO_TIME = 1e20  # nanoseconds since 1970 are 2e18
-_SENTINELS = np.array([999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0, 4294967295.0])
 
 
 @dataclass(frozen=True)
@@ -53,6 +49,7 @@ class TimeBase:
     dropped_samples: int
     jitter: float  # rms deviation of the regular intervals from their median, in sample times
     worst: float  # largest such deviation
+    advances: bool  # any stamp is later than the one before it
 
     @property
     def known(self) -> bool:
@@ -66,8 +63,9 @@ def time_base(log: ExperimentLog) -> TimeBase:
     interval = np.diff(t)
     forward = interval[np.isfinite(interval) & (interval > 0)]
     none = np.zeros(0, dtype=np.intp)
-    if forward.size == 0:
-        return TimeBase("s", 1.0, False, nominal, undefined, none, none, none, none, np.zeros(0), none, 0, 0.0, 0.0)
+    if forward.size == 0:  # it stands still or runs backwards throughout: no two samples lie apart, so none repeats another
+        return TimeBase("s", 1.0, False, nominal, undefined, np.flatnonzero(interval < 0.0), none,
+                        np.flatnonzero(interval == 0.0), none, np.zeros(0), none, 0, 0.0, 0.0, False)
     unit, scale, is_rate = _time_unit(t, forward, nominal)
     median = float(np.median(forward)) * scale
     tick = nominal if unit and not is_rate else median
@@ -75,16 +73,16 @@ def time_base(log: ExperimentLog) -> TimeBase:
         ticks = interval * scale / tick
     same = np.flatnonzero(interval == 0.0)
     exact = np.array([_repeats(log, k) for k in same.tolist()], dtype=np.bool_)
-    gaps = np.flatnonzero(ticks > GAP_LIMIT + 1.5)
-    near = ticks[(ticks > 0.0) & (ticks <= GAP_LIMIT + 1.5)]
+    gaps = np.flatnonzero(ticks > GAP_TICKS)
+    near = ticks[(ticks > 0.0) & (ticks <= GAP_TICKS)]
     regular = near[np.abs(near - 1.0) < 0.5]
     regular = regular if regular.size > near.size / 2 else near
     off = np.abs(regular - np.median(regular)) if regular.size else np.zeros(1)
     jitter = float(np.sqrt(np.mean(off**2)))
     # Where the clock itself wanders by half a sample, a long interval says nothing about a lost one.
-    late = np.flatnonzero((ticks > 1.5) & (ticks <= GAP_LIMIT + 1.5)) if jitter < 0.15 else none
+    late = np.flatnonzero((ticks > 1.5) & (ticks <= GAP_TICKS)) if jitter < 0.15 else none
     return TimeBase(unit, scale, is_rate, median, undefined, np.flatnonzero(interval < 0.0), same[exact], same[~exact],
-                    gaps, interval[gaps] * scale, late, int(np.sum(np.rint(ticks[late]) - 1)), jitter, float(off.max()))
+                    gaps, interval[gaps] * scale, late, int(np.sum(np.rint(ticks[late]) - 1)), jitter, float(off.max()), True)
 
 
 def _time_unit(t: Array, forward: Array, nominal: float) -> tuple[str, float, bool]:
@@ -108,22 +106,10 @@ def _repeats(log: ExperimentLog, k: int) -> bool:
     return all(np.array_equal(s.values[k], s.values[k + 1], equal_nan=True) for s in log.signals.values())
 
 
-def sentinels(x: Array) -> Mask:
-    """Samples that hold a filler such as -999 instead of a measurement: far from all others, and exactly that number."""
-    suspect = np.isin(np.abs(x), _SENTINELS)
-    for column in np.flatnonzero(suspect.any(axis=0)):
-        rest = x[~suspect[:, column] & np.isfinite(x[:, column]), column]
-        rest = rest[np.abs(rest) < _ABSURD]
-        low, high = (rest.min(), rest.max()) if rest.size else (0.0, 0.0)
-        reach = max(high - low, 10.0)
-        suspect[:, column] &= (x[:, column] < low - reach) | (x[:, column] > high + reach)
-    return suspect
-
-
 def missing(x: Array) -> Mask:
     """Samples without a measurement: not a number, infinite, absurdly large, or a sentinel."""
     with np.errstate(invalid="ignore"):
-        return ~(np.abs(x) < _ABSURD) | sentinels(x)
+        return ~(np.abs(x) < ABSURD) | sentinels(x)
 
 
 def quantum(x: Array) -> float | None:

@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.doctor.faults import (
-    GAP_LIMIT,
     Mask,
     TimeBase,
     jumps,
@@ -31,10 +30,9 @@ from pipelines.log.doctor.faults import (
 )
 from pipelines.log.doctor.stop import emergency_stop
 from pipelines.log.experiment import Array, ExperimentLog, Signal
+from pipelines.log.limits import GAP_LIMIT, GAP_TICKS, SHORTEST
 
 __all__ = ["SHORTEST", "Usable", "unwrapped", "usable"]
-
-SHORTEST = 100  # samples; a shorter stretch is over before an observer or a filter has settled
 
 _COUNTERS = tuple(2**bits for bits in (12, 13, 14, 16, 17, 18, 19, 20, 24, 32))
 
@@ -139,7 +137,7 @@ def _runs(log: ExperimentLog, time: TimeBase, gone: Mask, jumped: Mask, end: int
     tick = log.sample_time if time.known else time.median
     with np.errstate(invalid="ignore"):
         ticks = np.diff(log.t) / tick
-        cut = (ticks <= 0.0) | (ticks > GAP_LIMIT + 1.5) | _any_joint(jumped[1:])
+        cut = (ticks <= 0.0) | (ticks > GAP_TICKS) | _any_joint(jumped[1:])
     blocks = long_blocks(_any_joint(gone))
     bad = np.zeros(log.n_samples, dtype=bool)
     for start, stop in blocks:

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from pipelines.log.doctor.checks import CHECKS, LogCheck, Subject, check_log, check_together
-from pipelines.log.doctor.faults import quantum, sentinels, spikes, time_base
+from pipelines.log.doctor.faults import quantum, spikes, time_base
 from pipelines.log.files import Opened
+from pipelines.log.limits import sentinels
 from tests.faulty import healthy_without_reference, turning
 from tests.healthy import changed, good_log, healthy_logs, make_log, one_joint, rows, stops, with_signal
 
