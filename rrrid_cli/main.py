@@ -22,7 +22,7 @@ __all__ = ["app", "entry"]
 
 TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
 
-STAGES = ("run", "inspect", "import", "convert", "reconstruct")
+STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps")
 
 app = typer.Typer(name="rrrid", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
@@ -98,6 +98,26 @@ def reconstruct(
 
     _go(STAGE, tuple(logs), common, {"method": method, "order": order, "jerk_std": numbers(jerk_std, "--jerk-std"),
                                      "bandwidth": numbers(bandwidth, "--bandwidth")})
+
+
+@app.command("estimate-bps")
+@with_common
+def estimate_bps(
+    logs: LogPaths, common: Common,
+    method: Annotated[str | None, typer.Option(help="Motion by smoother, observer, zero-phase or central-differences.")] = None,
+    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Keep every so-manieth sample. [four a period of the low-pass]")] = None,
+    min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint.")] = None,
+    blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn, without validate logs. [10]")] = None,
+    symmetric: Annotated[bool | None, typer.Option("--symmetric", help="Mirror-symmetric links: p4 = p15 = 0.")] = None,
+    unweighted: Annotated[bool, typer.Option("--unweighted", help="All joints alike, as eq. (15).")] = False,
+) -> None:
+    """Estimate base parameters and friction by least squares, with their uncertainty."""
+    from pipelines.estimate_bps import STAGE
+
+    _go(STAGE, tuple(logs), common, {
+        "method": method, "filter": filter, "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "blocks": blocks,
+        "symmetric": symmetric, "weighted": False if unweighted else None, "compare": False if common.no_report else None})
 
 
 @app.command()

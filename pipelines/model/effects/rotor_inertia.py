@@ -1,0 +1,37 @@
+"""The inertia of a motor's rotor, seen through its gear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["RotorInertia"]
+
+
+@dataclass(frozen=True)
+class RotorInertia(Effect):
+    """τ = I ddq, on its own joint only: a rotor turns with its joint, whatever the arm's posture.
+
+    At joint side: gear ratio squared times the rotor's own inertia. Its gyroscopic torques are small beside it.
+    """
+
+    name = "rotor_inertia"
+    title = "Rotor inertia"
+    parameters = (Quantity("inertia", "kg m^2", 0.0, 100.0, "inertia at joint side"),)
+    signature = "A torque in proportion to the joint's own acceleration, the same in every posture."
+    explanation = "The rotor and the gear's fast shaft turn with the motor; the gear ratio enters squared."
+    remedy = "Add it to the model; it is a property of the machine, not a fault."
+    experiment = "Accelerate the joint in two postures with different load inertia."
+    twins = ("torque_gain", "link_length")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, self.own(motion.ddq))
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        import numpy as np
+
+        added = np.zeros((arm.n_joints, arm.n_joints))
+        added[self._index, self._index] = values["inertia"]
+        return Hooks(inertia=added)

@@ -1,0 +1,29 @@
+"""A constant torque, moving or at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["TorqueOffset"]
+
+
+@dataclass(frozen=True)
+class TorqueOffset(Effect):
+    """τ = τ0."""
+
+    name = "torque_offset"
+    title = "Torque offset"
+    parameters = (Quantity("offset", "N m", -20.0, 20.0, "constant torque to add to the model"),)
+    signature = "A torque that is the same at any position, speed and time, also at rest."
+    explanation = "The zero of the current sensor or of the amplifier is off, or a cable or spring pulls evenly."
+    remedy = "Calibrate the zero of the current measurement; look for a cable under tension."
+    experiment = "Hold still for two seconds, and cross the same position in both directions."
+    twins = ("asymmetric_friction", "spring")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, np.ones(len(motion.t)))

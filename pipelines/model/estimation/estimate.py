@@ -1,0 +1,137 @@
+"""Estimate base parameters and friction from the equations of several logs.
+
+    found = estimate(identify, columns)             fit, covariance, what is visible
+    judged = held_out(found, validate)              the same numbers on logs that were not fitted
+    apart = by_blocks(identify_equations, blocks)   where there are none: every block judged by the others
+
+Kostić et al. 2004, eq. (12)-(15): the equations of all logs stacked, joints weighted by their own residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.fit.convergence import Convergence, convergence
+from pipelines.fit.covariance import Robust, robust_covariance
+from pipelines.fit.equations import Block, split
+from pipelines.fit.identifiability import Unresolved, condition_number, typical_size, unresolved, visible
+from pipelines.fit.least_squares import Errors, Solution, errors, fit, solve
+from pipelines.fit.statistics import Gram, Statistics, gather, gather_growing
+from pipelines.model.estimation.regression import Columns
+
+__all__ = ["Estimate", "Stacked", "by_blocks", "estimate", "power_of"]
+
+Array = npt.NDArray[np.float64]
+
+_KEPT_IN_MEMORY = 64 << 20  # [B] of conditioned equations; longer ones are made again at every pass
+_PARTS = 40  # of the convergence series
+
+
+class Stacked:
+    """The equations of several logs, one after the other; kept in memory where they are few."""
+
+    def __init__(self, logs: Sequence[Iterable[Block]]) -> None:
+        self.logs = logs
+        self._kept: list[Block] | None = []
+
+    def __iter__(self) -> Iterator[Block]:
+        if self._kept:
+            yield from self._kept
+            return
+        kept, size = [], 0
+        for log in self.logs:
+            for block in log:
+                size += sum(v.nbytes for v in block.values)
+                if self._kept is not None and size <= _KEPT_IN_MEMORY:
+                    kept.append(block)
+                yield block
+        self._kept = kept if size <= _KEPT_IN_MEMORY else None
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters, how well they are known, and how well they explain the equations they were fitted to."""
+
+    columns: Columns
+    solution: Solution
+    robust: Robust
+    statistics: Statistics
+    equations: Stacked
+
+    @property
+    def beta(self) -> Array:
+        return self.solution.beta
+
+    @property
+    def std(self) -> Array:
+        return self.robust.std
+
+    @cached_property
+    def visible(self) -> npt.NDArray[np.bool_]:
+        """(k,) whether the logs show the parameter: its value, or that it is small beside its like."""
+        units = [column.unit + column.name.partition(":")[0].rstrip("0123456789") for column in self.columns.names]
+        known = visible(self.beta, self.std, typical_size(self.beta, self.std, units))
+        return np.asarray(known & self.solution.determined)
+
+    @cached_property
+    def unresolved(self) -> Unresolved:
+        return unresolved(self.solution, [column.name for column in self.columns.names], float(self.robust.inflation.max()))
+
+    @cached_property
+    def condition_number(self) -> float:
+        """Of Φ in (13): rigid columns, unweighted, SI."""
+        return condition_number(self.statistics, self.columns.rigid)
+
+    def convergence(self) -> Convergence:
+        """How the estimates settle as samples come in, Fig. 12."""
+        size = max(1, self.statistics.samples // _PARTS)
+        return convergence(gather_growing(split(self.equations, size), _PARTS), self.solution, self.robust.inflation)
+
+
+def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool = True) -> Estimate:
+    """Fit the equations of `logs`; without `weighted` every joint counts alike, as in eq. (15)."""
+    stacked = Stacked(logs)
+    gram = gather(stacked)
+    weights = None if weighted else np.ones(columns.body.robot.n_joints)
+    fitted = fit(stacked, weights=weights, gram=gram)
+    robust = robust_covariance(stacked, fitted.solution, fitted.statistics.longest)
+    return Estimate(columns, fitted.solution, robust, fitted.statistics, stacked)
+
+
+def power_of(logs: Sequence[Iterable[Block]], beta: Array) -> Errors:
+    """How β explains the equations of other logs."""
+    return errors(gather(Stacked(logs)), beta)
+
+
+def by_blocks(equations: Iterable[Block], blocks: int, weights: Array) -> Errors:
+    """Contiguous blocks held out once each: every one explained by parameters that the others gave.
+
+    No sample is read more than once: the statistics of the rest are the sum of the other blocks' statistics.
+    """
+    parts = [gather([part]) for part in _cut(list(equations), blocks)]
+    rss, power, samples = np.zeros(len(weights)), np.zeros(len(weights)), 0
+    for i, part in enumerate(parts):
+        rest = _sum([other for j, other in enumerate(parts) if j != i])
+        rss += part.rss(solve(rest, weights=weights).beta)
+        power += part.power
+        samples += part.samples
+    return Errors(np.sqrt(rss / samples), np.sqrt(power / samples), float(np.sqrt(rss.sum() / power.sum())), samples)
+
+
+def _cut(equations: list[Block], blocks: int) -> list[Block]:
+    """At least `blocks` stretches of about equal length, none across the border of a log."""
+    total = sum(block.samples for block in equations)
+    size = max(1, -(-total // blocks))
+    return [part for block in equations for part in split([block], -(-block.samples // max(1, round(block.samples / size))))]
+
+
+def _sum(parts: Sequence[Gram]) -> Gram:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total

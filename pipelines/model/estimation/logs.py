@@ -1,0 +1,91 @@
+"""Fit several logs together and judge the fit on others: every log reconstructed and conditioned alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.errors import InputRejected
+from pipelines.fit.least_squares import Errors
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.estimation.estimate import Estimate, by_blocks, estimate, power_of
+from pipelines.model.estimation.regression import Columns, Conditioning, LogEquations, condition
+from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
+
+__all__ = ["Fitted", "Judged", "Recipe", "fit_logs", "judge"]
+
+Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What is done to a log before it becomes equations. None: found from the logs that are fitted."""
+
+    how: Reconstruction
+    cutoff_hz: float | None = None
+    decimation: int | None = None
+    min_speed: tuple[float, ...] = (0.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The estimate, and the motions it came from."""
+
+    estimate: Estimate
+    motions: Motions
+    recipe: Recipe  # with the cut-off that was used
+
+    @property
+    def cutoff_hz(self) -> float | None:
+        return self.recipe.cutoff_hz
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """How the estimate does on what it was not fitted to."""
+
+    errors: Errors
+    by: str  # "logs" | "blocks"
+    motions: Motions
+
+
+def fit_logs(logs: Sequence[ExperimentLog], columns: Columns, recipe: Recipe, weighted: bool = True) -> Fitted:
+    """Fit `logs`; the cut-off, where it is not given, is the highest that any of them asks for, and the same for all."""
+    motions = tuple((log, reconstruct(log, recipe.how)) for log in logs)
+    if recipe.cutoff_hz is None:
+        asked = [_condition(log, found, recipe, columns).cutoff_hz for log, found in motions]
+        known = [cutoff for cutoff in asked if cutoff is not None]
+        recipe = replace(recipe, cutoff_hz=max(known) if known else None)
+    equations = [equations_of(log, found, recipe, columns) for log, found in motions]
+    return Fitted(estimate(equations, columns, weighted), motions, recipe)
+
+
+def judge(fitted: Fitted, logs: Sequence[ExperimentLog], blocks: int) -> Judged:
+    """Held-out errors: on `logs`, or on contiguous blocks of the fitted ones where there are none."""
+    found = fitted.estimate
+    if not logs:
+        return Judged(by_blocks(found.equations, blocks, found.solution.weights), "blocks", ())
+    motions = tuple((log, reconstruct(log, fitted.recipe.how)) for log in logs)
+    equations = [equations_of(log, motion, fitted.recipe, found.columns) for log, motion in motions]
+    return Judged(power_of(equations, np.where(found.solution.determined, found.beta, 0.0)), "logs", motions)
+
+
+def _condition(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns) -> Conditioning:
+    slow: Array = np.broadcast_to(np.array(recipe.min_speed, dtype=np.float64), columns.body.robot.n_joints)
+    return condition(found.motion, 1.0 / log.sample_time, recipe.cutoff_hz, recipe.decimation, slow)
+
+
+def equations_of(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns) -> LogEquations:
+    """The equations of one log.
+
+    Raises:
+        InputRejected: T04, every stretch of it is too short for the low-pass.
+    """
+    how = _condition(log, found, recipe, columns)
+    equations = LogEquations(columns, found, how, held=log.torque != "measured")
+    if not equations.runs:
+        raise InputRejected("T04", f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz",
+                            where=log.source or log.name, remedy="filter higher with --filter, or record longer")
+    return equations

@@ -1,0 +1,242 @@
+"""The equations a fit takes from a log: τ = Y β, everything in them averaged, filtered and thinned out alike.
+
+    model = nominal_columns(body, laws)                 which columns: rigid body, friction laws at every joint
+    for block in LogEquations(model, motion, ...):      iterate as often as needed; memory constant in the samples
+
+Kostić et al. 2004, eq. (12)-(14). A held command acts from its sample to the next, so that beside states at t_k it comes
+half a sample late: ½ (τ_k + τ_{k-1}) is centred, and the same average is taken of every column. The low-pass is
+zero-phase, and the same over torque and columns: what it takes from one it takes from the other (Gautier 1997).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.fit.equations import Block
+from pipelines.model.effects.base import ArmModel, Effect
+from pipelines.model.motion import Reconstructed
+from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.rigid.rrr import ACTING, RRR
+from pipelines.signal.filters import LowPass, centre_hold, centre_samples, choose_decimation, design_low_pass, zero_phase
+
+__all__ = ["Column", "Columns", "Conditioning", "LogEquations", "condition"]
+
+_SEED = 20040509
+_BLOCK = 32768  # samples of the log worked on at once
+_SETTLE = 10.0  # periods of the cut-off after which a fourth-order low-pass has forgotten to 1e-10
+_VAGUE = 2.0  # times the usual standard deviation of the acceleration
+_TOUCHED = 1.0  # periods of the cut-off to either side over which one bad sample spreads
+
+
+@dataclass(frozen=True)
+class Column:
+    """One parameter of the equations."""
+
+    name: str  # "p3", or by place and name: "viscous:2:coefficient"
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Which columns the equations have: the rigid body's, or some of them, and every law's amplitudes."""
+
+    body: RigidBody
+    kept: tuple[int, ...]  # of the body's parameters
+    laws: tuple[Effect, ...]
+    arm: ArmModel  # what the laws may ask
+
+    @cached_property
+    def names(self) -> tuple[Column, ...]:
+        rigid = [Column(self.body.parameters[i].name, self.body.parameters[i].unit) for i in self.kept]
+        turning = self.body.robot.revolute
+        more = [Column(f"{law.name}:{law.joint}:{q.name}" if law.joint else f"{law.name}:{q.name}",
+                       q.unit_at(law.joint is None or turning[law.joint - 1]))
+                for law in self.laws for q in law.parameters if not q.shape]
+        return (*rigid, *more)
+
+    @property
+    def rigid(self) -> range:
+        """Places of the rigid columns among all."""
+        return range(len(self.kept))
+
+    def rows(self, motion: Motion) -> tuple[tuple[Array, ...], tuple[npt.NDArray[np.intp], ...]]:
+        """Of each joint: the columns that act on it (columns, samples), and which of all columns they are."""
+        values, places = self._rigid_rows(motion)
+        first = len(self.kept)
+        added: list[list[Array]] = [[] for _ in values]
+        where: list[list[int]] = [[] for _ in values]
+        for law in self.laws:
+            table = law.columns(motion, self.arm)
+            joints = range(table.shape[1]) if law.joint is None else (law.joint - 1,)
+            for j in joints:
+                added[j] += list(table[:, j].T)
+                where[j] += range(first, first + table.shape[2])
+            first += table.shape[2]
+        return (tuple(np.vstack([v, *a]) if a else v for v, a in zip(values, added, strict=True)),
+                tuple(np.append(p, np.array(w, dtype=np.intp)) for p, w in zip(places, where, strict=True)))
+
+    @cached_property
+    def _acting(self) -> npt.NDArray[np.bool_]:
+        """(joints, parameters) which columns of the body act on a joint at all: what is zero at random states is zero."""
+        states = np.random.default_rng(_SEED).uniform(-3.0, 3.0, (3, 16, self.body.robot.n_joints))
+        return np.asarray(self.body.regressor(*states).any(axis=0))
+
+    def _rigid_rows(self, motion: Motion) -> tuple[list[Array], list[npt.NDArray[np.intp]]]:
+        if isinstance(self.body, RRR):
+            rows = self.body.acting_rows(motion.q, motion.dq, motion.ddq, np.empty((28, len(motion.t))))
+            acting = [np.array(columns, dtype=np.intp) for columns in ACTING]
+        else:
+            table = self.body.regressor(motion.q, motion.dq, motion.ddq).transpose(1, 2, 0)
+            acting = [np.flatnonzero(row) for row in self._acting]
+            rows = tuple(table[j, index] for j, index in enumerate(acting))
+        place = np.full(len(self.body.parameters), -1, dtype=np.intp)
+        place[list(self.kept)] = np.arange(len(self.kept))
+        keep = [place[index] >= 0 for index in acting]
+        return ([row[k] for row, k in zip(rows, keep, strict=True)],
+                [place[index[k]] for index, k in zip(acting, keep, strict=True)])
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """What is done alike to torque and columns. See `condition` for the defaults."""
+
+    low_pass: LowPass | None
+    cutoff_hz: float | None
+    decimation: int
+    min_speed: tuple[float, ...]  # [rad/s] slower samples of a joint are left out of its own equations
+
+
+def condition(motion: Motion, rate: float, cutoff_hz: float | None, decimation: int | None, min_speed: Array) -> Conditioning:
+    """The filter for a log, its cut-off from the motion where none is given.
+
+    The motion excites what lies below f, where 99.9 % of the power of its speed is; torque has harmonics of it, and
+    friction that changes sign has many. Five times f keeps them and leaves out what only noise and structure fill.
+    """
+    if cutoff_hz is None:
+        cutoff_hz = 5.0 * _highest_frequency(motion, rate)
+    if cutoff_hz >= 0.4 * rate:
+        return Conditioning(None, None, decimation or 1, tuple(map(float, min_speed)))
+    return Conditioning(design_low_pass(cutoff_hz, rate), cutoff_hz, decimation or choose_decimation(cutoff_hz, rate),
+                        tuple(map(float, min_speed)))
+
+
+def _highest_frequency(motion: Motion, rate: float) -> float:
+    """Below it lies 99.9 % of the power of the speed, joints scaled alike [Hz]."""
+    known = motion.dq[np.isfinite(motion.dq).all(axis=1)]
+    scale = known.std(axis=0)
+    x = (known - known.mean(axis=0))[:, scale > 0.0] / scale[scale > 0.0]
+    power = np.sum(np.abs(np.fft.rfft(x * np.hanning(len(x))[:, None], axis=0)) ** 2, axis=1)
+    total = np.cumsum(power)
+    return float(np.searchsorted(total, 0.999 * total[-1]) + 1) * rate / len(x) if total[-1] > 0.0 else rate
+
+
+@dataclass(frozen=True, eq=False)
+class LogEquations:
+    """The equations of one log. Iterable as often as needed."""
+
+    columns: Columns
+    found: Reconstructed
+    conditioning: Conditioning
+    held: bool  # the torque is a held command: centre it
+    known: Array | None = None  # (samples, joints) [N m] torque that is known beforehand, subtracted: friction of a given model
+
+    def __iter__(self) -> Iterator[Block]:
+        for run in self.runs:
+            yield from self._of_run(run)
+
+    @cached_property
+    def runs(self) -> tuple[slice, ...]:
+        """Stretches without a gap that outlast the low-pass."""
+        shortest = 8 if self.conditioning.low_pass is None else 2 * self.conditioning.low_pass.padding
+        return tuple(run for run in self.found.good.runs if run.stop - run.start > shortest)
+
+    def times(self) -> Array:
+        """The time of every equation [s]."""
+        return np.concatenate([np.concatenate([t for t, _, _ in self._pieces(run)]) for run in self.runs])
+
+    def _of_run(self, run: slice) -> Iterator[Block]:
+        for _, values, y in self._pieces(run):
+            if len(y[0]):
+                yield Block(len(self.columns.names), self._places, values, y)
+
+    @cached_property
+    def _places(self) -> tuple[npt.NDArray[np.intp], ...]:
+        return self.columns.rows(_part(self.found, slice(self.runs[0].start, self.runs[0].start + 8)))[1]
+
+    def _pieces(self, run: slice) -> Iterator[tuple[Array, tuple[Array, ...], tuple[Array, ...]]]:
+        """Time, columns and torque of each stretch of a run, conditioned and thinned out."""
+        how, rate = self.conditioning, 1.0 / self.found.good.log.sample_time
+        margin = 2 if how.cutoff_hz is None else int(np.ceil(_SETTLE * rate / how.cutoff_hz))
+        inner = _BLOCK - _BLOCK % how.decimation
+        length = run.stop - run.start
+        for first in range(0, length, inner):
+            last = min(first + inner, length)
+            if length - last < margin:  # a short rest joins the stretch before it
+                last = length
+            wide = slice(run.start + max(0, first - margin), run.start + min(length, last + margin))
+            yield self._conditioned(wide, run.start + first, run.start + last, -first % how.decimation)
+            if last == length:
+                return
+
+    def _conditioned(self, wide: slice, first: int, last: int, phase: int) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
+        how = self.conditioning
+        motion, tau, bad = self._stretch(wide)
+        rows, _ = self.columns.rows(motion)
+        stacks = [np.vstack([row, u]).T for row, u in zip(rows, tau.T, strict=True)]
+        begin = 0
+        if self.held:  # the first and the last sample have no neighbour to be averaged with
+            stacks = [np.column_stack([centre_samples(s[:, :-1]), centre_hold(s[:, -1])]) for s in stacks]
+            begin = 1
+        if how.low_pass is not None:
+            stacks = [zero_phase(s, how.low_pass) for s in stacks]
+        inside = np.arange(wide.start + begin, wide.start + begin + len(stacks[0]))
+        chosen = np.flatnonzero((inside >= first + phase) & (inside < last) & ((inside - first - phase) % how.decimation == 0))
+        keep = chosen[~bad[chosen + begin]]
+        slow = np.abs(motion.dq[keep + begin]) < np.array(how.min_speed)
+        parts = [np.where(slow[:, j, None], 0.0, s[keep]) for j, s in enumerate(stacks)]
+        return (motion.t[keep + begin], tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts),
+                tuple(np.ascontiguousarray(p[:, -1]) for p in parts))
+
+    @cached_property
+    def _vague(self) -> npt.NDArray[np.bool_]:
+        """Samples near an end or a gap, where the acceleration is known half as well as elsewhere, or worse."""
+        if self.found.std is None:
+            return np.zeros(self.found.motion.q.shape, dtype=bool)
+        std = self.found.std[2]
+        return np.asarray(std > _VAGUE * np.nanmedian(std, axis=0))
+
+    def _stretch(self, wide: slice) -> tuple[Motion, Array, npt.NDArray[np.bool_]]:
+        """Motion and torque with what is spoilt bridged by straight lines, and the samples the filter spreads that over."""
+        good, motion = self.found.good, _part(self.found, wide)
+        tau = good.log.tau[wide] if self.known is None else good.log.tau[wide] - self.known[good.kept[wide]]
+        spoilt = (good.missing | good.spikes | good.saturated)[wide]
+        unknown = ~np.isfinite(motion.q + motion.dq + motion.ddq) | self._vague[good.kept[wide]]
+        touched: npt.NDArray[np.bool_] = np.asarray((spoilt | unknown).any(axis=1))
+        if not touched.any():
+            return motion, tau, touched
+        q, dq, ddq = (_bridged(x, unknown) for x in (motion.q, motion.dq, motion.ddq))
+        cutoff = self.conditioning.cutoff_hz
+        reach = 2 if cutoff is None else int(np.ceil(_TOUCHED / (cutoff * good.log.sample_time)))
+        count = np.cumsum(np.concatenate([np.zeros(reach + 1), touched, np.zeros(reach)]))
+        spread: npt.NDArray[np.bool_] = np.greater(count[2 * reach + 1:], count[:-2 * reach - 1])
+        return Motion(motion.t, q, dq, ddq), _bridged(tau, spoilt), spread
+
+
+def _bridged(x: Array, bad: npt.NDArray[np.bool_]) -> Array:
+    """`x` (samples, joints) with straight lines where it is bad; zero where a joint has nothing good."""
+    out, place = x.copy(), np.arange(len(x))
+    for j in np.flatnonzero(bad.any(axis=0)):
+        ill = bad[:, j]
+        out[ill, j] = 0.0 if ill.all() else np.interp(place[ill], place[~ill], x[~ill, j])
+    return out
+
+
+def _part(found: Reconstructed, stretch: slice) -> Motion:
+    """The motion at the samples of a stretch of the mended log."""
+    rows, motion = found.good.kept[stretch], found.motion
+    return replace(motion, t=motion.t[rows], q=motion.q[rows], dq=motion.dq[rows], ddq=motion.ddq[rows])
