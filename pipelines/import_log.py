@@ -17,11 +17,12 @@ from pipelines.errors import Check, InputRejected, UsageError
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
 from pipelines.log.recording import filenames
+from pipelines.log.recording.examine import examine
 from pipelines.log.recording.joint_side import Converted, joint_side
 from pipelines.log.recording.make_log import SourceFile, make_log
 from pipelines.log.recording.recipe import ResampleSpec
 from pipelines.log.recording.recordings import Map, Material, Source, assemble, collect, parse_map
-from pipelines.log.recording.repair import Limits, Recording, mend, split_at_gaps
+from pipelines.log.recording.repair import Limits, Recording, late_intervals, mend
 from pipelines.log.recording.table_columns import ImportedTable, import_table
 from pipelines.log.results import NOT_STORED
 from pipelines.log.table import write_table
@@ -92,7 +93,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if not settings.recipe:
         raise UsageError("C02", "no recipe", where="rrrid import", remedy="name one, or draft one with --guess FILE")
     material = collect(settings.recipe, settings.source, request.robot, request.tell)
-    material = replace(material, assume_units=request.assume_units)
+    material = replace(material, assume_units=request.assume_units, ending=request.format)
     return Inputs(sources=material.paths, material=material, label=material.folder.absolute().name, robot_name=material.robot.name)
 
 
@@ -103,15 +104,14 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         InputRejected, UsageError: what cannot be mended, by the rows S, T and D of the table of bad inputs.
     """
     material: Material = inputs.material
-    mapped = parse_map(settings.map, material.recipe)
+    mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
     checks: list[Check] = []
     logs: list[ImportedLog] = []
     for source in material.sources:
         logs += _import(source, material, mapped, settings, checks)
     names = filenames.unique(item.name for item in logs)
-    ending = "h5"
     files = filenames.unique(slug(name) for name in names)
-    logs = [replace(item, name=name, file=f"logs/{file}.{ending}", log=replace(item.log, name=name),
+    logs = [replace(item, name=name, file=f"logs/{file}.{material.ending}", log=replace(item.log, name=name),
                     preview=_preview(item.log) if i < _PREVIEWS else None)
             for i, (item, name, file) in enumerate(zip(logs, names, files, strict=True))]
     tables = []
@@ -132,7 +132,7 @@ def _import(source: Source, material: Material, mapped: Map, settings: Settings,
     for recording in assembled.recordings:
         parts, said = mend(recording, limits)
         checks += said
-        mended.append(parts if recipe.resample is None else tuple(s for part in parts for s in split_at_gaps(part, limits)))
+        mended.append(parts)
     if len(mended) > 1 and any(len(parts) > 1 for parts in mended):
         raise InputRejected("T04", "gaps or steps of the clock in files with clocks of their own", where=source.primary,
                             remedy="bring the files on one clock before the import")
@@ -147,7 +147,8 @@ def _import(source: Source, material: Material, mapped: Map, settings: Settings,
     logs = []
     for k, (t, signals, steps, altered) in enumerate(made, start=1):
         altered = (*repairs, *altered)
-        log, files = make_log(source, material, assembled, t, signals, steps, altered, k if len(made) > 1 else None)
+        log, files, altered = make_log(source, material, assembled, t, signals, steps, altered, k if len(made) > 1 else None)
+        checks += examine(log, source.primary, settings.trust_units)
         logs.append(ImportedLog(log.name, "", log.experiment, log.role, log.joint, log.n_samples, log.n_joints, log.sample_time,
                                 float(log.t[-1] - log.t[0]), files, steps, altered, None, log))
     return logs
@@ -171,8 +172,10 @@ def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec
         signals |= {name: replace(s, values=resample(part.t, s.values, at, spec.method)) for name, s in item.signals.items()}
         interval = np.diff(part.t)
         method = "natural cubic spline" if spec.method == "spline" else "straight lines"
+        late = late_intervals(part).size
         words = (f"resampled from {part.t.size} samples {1e3 * interval.min():.4g} to {1e3 * interval.max():.4g} ms apart (median "
-                 f"{1e3 * float(np.median(interval)):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}")
+                 f"{1e3 * float(np.median(interval)):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
+                 + (f"; {late} interval{'s' if late != 1 else ''} of more than 1.5 times the median bridged" if late else ""))
         checks.append(Check.of("T05", "warn", words, where=part.where))
         altered = (*altered, words)
     return at, signals, steps, altered
@@ -192,8 +195,7 @@ def write(result: Result, folder: Path, request: Request) -> None:
     """Write logs and tables into `folder`."""
     for item in result.logs:
         request.tell(f"writing {item.file}")
-        write_log((folder / item.file).with_suffix("." + request.format) if request.format != "h5" else folder / item.file,
-                  item.log)
+        write_log(folder / item.file, item.log)
     for table in result.tables:
         write_table(folder / table.file, table.data, table.units)
 

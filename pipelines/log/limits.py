@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 
-__all__ = ["ABSURD", "FEWEST", "GAP_LIMIT", "GAP_TICKS", "LARGEST_JITTER", "MOST_STEPS", "SHORTEST", "percent", "recorded_span",
-           "sentinels", "shorter_than_period"]
+__all__ = ["ABSURD", "FEWEST", "GAP_LIMIT", "GAP_TICKS", "LARGEST_JITTER", "MOST_STEPS", "SHORTEST", "jitter", "late",
+           "percent", "recorded_span", "sentinels", "shorter_than_period"]
 
 FEWEST = 20  # samples; fewer have no statistics, and show no motion (T08)
 SHORTEST = 100  # samples; a shorter stretch is over before an observer or a filter has settled (T04)
@@ -23,6 +23,7 @@ GAP_TICKS = GAP_LIMIT + 1.5  # sample times; the longest interval with at most s
 
 MOST_STEPS = 5  # a clock that was set back more often than this is not a clock (T01)
 LARGEST_JITTER = 0.05  # of the sample time (T05)
+_WANDERING = 0.15  # the same; intervals of one and a half sample times are then nothing special
 
 ABSURD = 1e9  # no joint is there, in any SI unit (D03)
 _SENTINELS = np.array([999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0, 4294967295.0])
@@ -49,6 +50,22 @@ def recorded_span(t: Array, sample_time: float) -> float:
 def shorter_than_period(t: Array, sample_time: float, period: float) -> bool:
     """T07. N samples of a period of N sample times are a whole period; one sample less is not."""
     return recorded_span(t, sample_time) < period * (1.0 - 1e-6) - 0.5 * sample_time
+
+
+def jitter(ticks: Array) -> tuple[float, float]:
+    """How the regular ones among intervals of `ticks` sample times vary: rms and largest deviation (T05)."""
+    near = ticks[(ticks > 0.0) & (ticks <= GAP_TICKS)]
+    regular = near[np.abs(near - 1.0) < 0.5]
+    regular = regular if regular.size > near.size / 2 else near
+    off = np.abs(regular - np.median(regular)) if regular.size else np.zeros(1)
+    return float(np.sqrt(np.mean(off**2))), float(off.max())
+
+
+def late(ticks: Array, rms: float) -> npt.NDArray[np.intp]:
+    """The intervals of `ticks` sample times in which a few samples were lost (T03). Where the clock itself wanders by half
+    a sample, a long interval says nothing about a lost one."""
+    found = (ticks > 1.5) & (ticks <= GAP_TICKS)
+    return np.flatnonzero(found) if rms < _WANDERING else np.zeros(0, dtype=np.intp)
 
 
 def percent(share: float, digits: int = 3) -> str:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.log import limits
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.limits import ABSURD, GAP_LIMIT, GAP_TICKS, sentinels
 
@@ -74,15 +75,10 @@ def time_base(log: ExperimentLog) -> TimeBase:
     same = np.flatnonzero(interval == 0.0)
     exact = np.array([_repeats(log, k) for k in same.tolist()], dtype=np.bool_)
     gaps = np.flatnonzero(ticks > GAP_TICKS)
-    near = ticks[(ticks > 0.0) & (ticks <= GAP_TICKS)]
-    regular = near[np.abs(near - 1.0) < 0.5]
-    regular = regular if regular.size > near.size / 2 else near
-    off = np.abs(regular - np.median(regular)) if regular.size else np.zeros(1)
-    jitter = float(np.sqrt(np.mean(off**2)))
-    # Where the clock itself wanders by half a sample, a long interval says nothing about a lost one.
-    late = np.flatnonzero((ticks > 1.5) & (ticks <= GAP_TICKS)) if jitter < 0.15 else none
+    rms, worst = limits.jitter(ticks)
+    late = limits.late(ticks, rms)
     return TimeBase(unit, scale, is_rate, median, undefined, np.flatnonzero(interval < 0.0), same[exact], same[~exact],
-                    gaps, interval[gaps] * scale, late, int(np.sum(np.rint(ticks[late]) - 1)), jitter, float(off.max()), True)
+                    gaps, interval[gaps] * scale, late, int(np.sum(np.rint(ticks[late]) - 1)), rms, worst, True)
 
 
 def _time_unit(t: Array, forward: Array, nominal: float) -> tuple[str, float, bool]:

@@ -31,7 +31,8 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     try:
         return re.compile("".join(parts))
     except re.error as problem:
-        raise UsageError("C02", f"pattern '{pattern}': {problem}", remedy="write {name}, or {name:regular expression}") from None
+        raise UsageError("C02", f"pattern '{pattern}': {problem}", where="match",
+                         remedy="write {name}, or {name:regular expression}") from None
 
 
 def _shell(text: str) -> str:
@@ -56,7 +57,7 @@ def fill(template: str, groups: Mapping[str, str], where: object) -> str:
     def value(found: re.Match[str]) -> str:
         if found.group(1) not in groups:
             raise UsageError("C02", f"'{template}' names {{{found.group(1)}}}, but the pattern has {', '.join(groups)}",
-                             where=where)
+                             where=where, remedy="name one of these, or add it to the pattern")
         return groups[found.group(1)]
 
     return re.sub(r"\{(\w+)\}", value, template)

@@ -17,16 +17,17 @@ import numpy as np
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
+from pipelines.log.limits import FEWEST
 from pipelines.log.recording.clock import plausible_units
 from pipelines.log.recording.column_roles import companion_of, named_unit, roles_of
 from pipelines.log.recording.evidence import Guess, motion_of, position_unit, sign_of, torque_unit
 from pipelines.log.recording.raw import RawTable
-from pipelines.log.recording.repair import FEWEST
 from pipelines.log.recording.sources import read_table
 
 __all__ = ["Draft", "guess_recipe"]
 
 _BLANK = "FILL IN"
+_NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def guess_recipe(path: Path) -> Draft:
 
 def _sound(table: RawTable) -> RawTable:
     """The table without what a guess would stumble over: rows with a hole or an absurd number, columns of nothing else."""
-    usable = {name: np.isfinite(values) & (np.abs(values) < 1e18) for name, values in table.columns.items()}
+    usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) for name, values in table.columns.items()}
     columns = {name: values for name, values in table.columns.items() if usable[name].mean() > 0.8}
     keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
     if keep.sum() < FEWEST:

@@ -20,7 +20,7 @@ from pipelines.log.recording.repair import Recording
 from pipelines.log.robot import Drive, RobotDescription
 from pipelines.log.units import UNITS, to_si
 
-__all__ = ["Converted", "drive_of", "joint_side", "unit_declared"]
+__all__ = ["Converted", "drive_of", "joint_side", "si_of", "unit_declared"]
 
 _LINEAR = frozenset({"m", "mm", "um", "m/s", "mm/s", "m/s^2", "mm/s^2", "N", "mN", "kN"})
 _MOTION = ("position", "velocity", "acceleration")
@@ -48,7 +48,8 @@ def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive |
     if spec.transmission is not None:
         rows = spec.transmission
         if len(rows) != n or any(isinstance(row, tuple) and len(row) != n for row in rows):
-            raise UsageError("C02", f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers", where=where)
+            raise UsageError("C02", f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers", where=where,
+                             remedy="write the gear ratio of each joint, or the whole matrix N of q_motor = N q_joint")
         matrix = tuple(row if isinstance(row, tuple) else tuple(float(row) if i == j else 0.0 for j in range(n)) for i,
                        row in enumerate(rows))
         if abs(np.linalg.det(np.array(matrix))) < 1e-12:
@@ -89,6 +90,14 @@ def unit_declared(name: str, spec: SignalSpec, table: RawTable, columns: tuple[s
     return wanted
 
 
+def si_of(unit: str, spec: SignalSpec) -> float:
+    """What one recorded number is in SI, on its side of the drive, at most: enough to tell what is absurd."""
+    scale = float(np.max(np.abs(spec.scale)))
+    if unit in ("counts", "counts/s") and spec.counts_per_rev is not None:
+        return scale * 2.0 * math.pi / float(np.min(spec.counts_per_rev))
+    return scale * UNITS[unit].factor if unit in UNITS else scale
+
+
 def _known(unit: str) -> object:
     return UNITS.get(unit.replace("Nm", "N m"))
 
@@ -108,9 +117,8 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot:
     for name, raw in part.signals.items():
         spec = recipe.signals[name]
         values = _unwrapped(part, name, raw, spec, units[name], altered, checks)
-        values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where) * _per_joint(spec.sign, n,
-                                                                                                        f"signals.{name}.sign",
-                                                                                                        recipe.where)
+        values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where)
+        values = values * _per_joint(spec.sign, n, f"signals.{name}.sign", recipe.where)
         values, current = _in_si(part, name, values, spec, units[name], drive, n, recipe, steps)
         if current is not None and "current" not in recipe.signals:
             signals["current"] = Signal(current, "A", schema.SIGNALS["current"][1])

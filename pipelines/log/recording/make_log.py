@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,8 +14,9 @@ from pipelines.errors import InputRejected, UsageError, clean
 from pipelines.log import schema
 from pipelines.log.derive import created
 from pipelines.log.experiment import Array, Controller, Derived, ExperimentLog, Signal
+from pipelines.log.limits import FEWEST, recorded_span, shorter_than_period
 from pipelines.log.recording import filenames
-from pipelines.log.recording.recipe import LogSpec
+from pipelines.log.recording.recipe import LogSpec, Recipe
 from pipelines.log.recording.recordings import Assembled, Material, Source
 from pipelines.log.robot import format_robot
 
@@ -34,9 +33,9 @@ class SourceFile:
 
 
 def make_log(source: Source, material: Material, assembled: Assembled, t: Array, signals: Mapping[str, Signal],
-             steps: tuple[str, ...],
-             altered: tuple[str, ...], number: int | None) -> tuple[ExperimentLog, tuple[SourceFile, ...]]:
-    """One log of converted signals, and the files it came from.
+             steps: tuple[str, ...], altered: tuple[str, ...], number: int | None) -> tuple[
+                 ExperimentLog, tuple[SourceFile, ...], tuple[str, ...]]:
+    """One log of converted signals, the files it came from, and `altered` with what was done here as well.
 
     Raises:
         InputRejected: T07 shorter than a period, T08 hardly a sample, S01 an frf log without excitation.
@@ -48,25 +47,34 @@ def make_log(source: Source, material: Material, assembled: Assembled, t: Array,
     files = tuple(SourceFile(file, table.sha256,
                              tuple(c for columns in assembled.columns.values() for c in columns if c in table.columns))
                   for file, table in source.tables.items())
-    step = 1.0 / recipe.resample.rate if recipe.resample else float(np.median(np.diff(t))) if recipe.time.column is not None else \
-        recipe.time.sample_time or 1.0 / (recipe.time.rate or 1.0)
-    duration = float(t[-1] - t[0])
-    if t.size < 11:
-        raise InputRejected("T08", f"{t.size} samples at {1 / step:g} Hz", where=source.primary,
+    step = _sample_time(recipe, t)
+    if t.size < FEWEST:
+        raise InputRejected("T08", f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}", where=source.primary,
                             remedy="record longer, or resample faster")
-    if about.period is not None and duration < about.period * (1.0 - 1e-6):
-        raise InputRejected("T07", f"{duration:.4g} s < {about.period:g} s period", where=source.primary,
-                            remedy="record a whole period, or correct period")
+    if about.period is not None and shorter_than_period(t, step, about.period):
+        short = f"{recorded_span(t, step):.4g} s < {about.period:g} s period"
+        if number is None:
+            raise InputRejected("T07", short, where=source.primary, remedy="record a whole period, or correct period")
+        # A part of a log that had to be split need not hold a whole period; it is then a log without one.
+        about, altered = replace(about, period=None), (*altered, f"period left out: {short}")
     if about.experiment == "frf" and "v" not in signals:
         raise InputRejected("S01", "an frf log without its excitation v", where=source.primary, remedy="map signals.v")
     ordered = {"t": Signal(t, "s", schema.SIGNALS["t"][1])} | {key: signals[key] for key in schema.SIGNALS if key in signals}
     log = ExperimentLog(
         name=name, experiment=about.experiment, role=about.role, origin=about.origin, torque=about.torque, robot_name=robot.name,
-        sample_time=step,
-        robot_text=format_robot(robot), signals=ordered, recorded=about.recorded, joint=about.joint, period=about.period,
+        sample_time=step, robot_text=format_robot(robot),
+        signals=ordered, recorded=about.recorded, joint=about.joint, period=about.period,
         posture=None if about.posture is None else np.array(about.posture), controller=_controller(material),
         derived=_derived(files, material, steps, altered, about.recorded) if altered else None)
-    return log, files
+    return log, files, altered
+
+
+def _sample_time(recipe: Recipe, t: Array) -> float:
+    if recipe.resample:
+        return 1.0 / recipe.resample.rate
+    if recipe.time.column is not None:
+        return float(np.median(np.diff(t)))
+    return recipe.time.sample_time or 1.0 / (recipe.time.rate or 1.0)
 
 
 def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
@@ -77,11 +85,12 @@ def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
         if key in groups:
             if groups[key] not in known:
                 raise UsageError("C02", f"'{source.primary}' gives {key} '{groups[key]}', must be one of {', '.join(known)}",
-                                 where=where)
+                                 where=where, remedy=f"rename the file, or write {key} = … in a [[file]] case before it")
             found[key] = groups[key]
     if "joint" in groups:
         if not groups["joint"].isdigit():
-            raise UsageError("C02", f"'{source.primary}' gives joint '{groups['joint']}', must be a number", where=where)
+            raise UsageError("C02", f"'{source.primary}' gives joint '{groups['joint']}', must be a number", where=where,
+                             remedy="rename the file, or take digits alone: {joint:[0-9]+}")
         found["joint"] = int(groups["joint"])
     if source.case is not None:
         keys = ("name", "experiment", "role", "joint", "period", "recorded", "posture")
@@ -106,6 +115,9 @@ def _controller(material: Material) -> Controller | None:
 
 def _derived(files: tuple[SourceFile, ...], material: Material, steps: tuple[str, ...], altered: tuple[str, ...],
              recorded: str | None) -> Derived:
+    # `created` is the time of the recording where the recipe gives it. Where it does not, no honest time is left: the
+    # clock on the wall and the times of files differ from one import to the next, and equal inputs give equal bytes. It is
+    # then SOURCE_DATE_EPOCH, by default 1970-01-01T00:00:00Z: to be read as "not known". provenance.json has the hour.
     record = {"recipe": material.recipe_path.name, "files": {file.name: file.sha256 for file in files}, "converted": list(steps),
               "altered": list(altered)}
     sha256 = files[0].sha256 if len(files) == 1 else hashlib.sha256("\n".join(file.sha256 for file in files).encode()).hexdigest()

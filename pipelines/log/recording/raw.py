@@ -46,7 +46,8 @@ class RawTable:
         if isinstance(column, int):
             ordered = list(self.columns)
             if not 1 <= column <= len(ordered):
-                raise InputRejected("S01", f"no column {column}; the file has {len(ordered)} columns of numbers", where=self.source)
+                raise InputRejected("S01", f"no column {column}; the file has {len(ordered)} columns of numbers", where=self.source,
+                                    remedy="columns count from 1; correct the recipe")
             return ordered[column - 1]
         if column in self.text:
             raise InputRejected("S12", f"column '{column}' holds no numbers but '{self.text[column]}'", where=self.source,

@@ -71,7 +71,7 @@ class LogSpec:
     torque: Literal["held-command", "measured"] = "held-command"
     joint: int | None = None  # 1-based, of friction and frf logs
     period: float | None = None  # [s]
-    recorded: str | None = None  # ISO 8601, UTC
+    recorded: str | None = None  # ISO 8601 with its offset from UTC, or a date and time of TOML with it
     posture: tuple[float, ...] | None = None  # [rad]
 
 
@@ -84,7 +84,7 @@ class TimeSpec:
     unit: str | None = None  # s, ms, us, ns, min, or "sample" (needs rate)
     rate: float | None = None  # [Hz]
     sample_time: float | None = None  # [s]
-    longest_gap: float | None = None  # [s] default 20 samples; a longer one is reported, and never resampled across
+    longest_gap: float | None = None  # [s] default 10 samples; a longer one ends a log. Resampling alone bridges more
 
 
 @dataclass(frozen=True)

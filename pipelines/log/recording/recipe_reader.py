@@ -48,32 +48,56 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     from pydantic import TypeAdapter, ValidationError
 
     try:
-        table = tomllib.loads(text)
+        table = _dated(tomllib.loads(text), where)
     except (tomllib.TOMLDecodeError, RecursionError) as problem:
-        raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where) from None
+        raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where,
+                         remedy="correct that line; strings stand in quotes, tables in [ ]") from None
     if "where" in table:
-        raise UsageError("C01", "'where' is not a key of a recipe", where=where)
+        raise UsageError("C01", "'where' is not a key of a recipe", where=where, remedy="remove it")
     try:
         recipe = TypeAdapter(Recipe).validate_json(json.dumps(_plain(table)), strict=True)
     except ValidationError as problem:
         raise _explain(problem.errors()[0], where) from None
     except RecursionError:
-        raise UsageError("C02", "the recipe is nested too deeply", where=where) from None
+        raise UsageError("C02", "the recipe is nested too deeply", where=where,
+                         remedy="rrrid import --guess FILE drafts a recipe") from None
     _bounds(recipe, where)
     _meaning(recipe, where)
     return recipe
 
 
 def _plain(value: Any) -> Any:
-    """TOML's own dates as text; everything else is JSON already."""
+    """TOML's own dates as text, for the type check to complain of; everything else is JSON already."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_plain(item) for item in value]
-    if isinstance(value, datetime.datetime):
-        utc = value.astimezone(datetime.UTC) if value.tzinfo else value
-        return utc.strftime("%Y-%m-%dT%H:%M:%SZ")
     return str(value) if isinstance(value, datetime.date | datetime.time) else value
+
+
+def _dated(table: dict[str, Any], where: object) -> dict[str, Any]:
+    """The recipe with `recorded` of [log] and of every [[file]] as UTC, in text."""
+    cases = table["file"] if isinstance(table.get("file"), list) else []
+    for place, owner in (("log", table.get("log")), *((f"file[{i}]", case) for i, case in enumerate(cases, start=1))):
+        if isinstance(owner, dict) and "recorded" in owner:
+            owner["recorded"] = _utc(owner["recorded"], f"'{place}.recorded'", where)
+    return table
+
+
+def _utc(value: object, what: str, where: object) -> str:
+    """A time as UTC. One without its offset is another hour in every country: nobody may guess which.
+
+    Raises:
+        UsageError: C02, no time, or no offset.
+    """
+    remedy = "write it with its offset from UTC, 2024-05-17T11:30:00+02:00, or with Z, or leave it out"
+    try:
+        time = value if isinstance(value, datetime.datetime) else datetime.datetime.fromisoformat(str(value))
+    except ValueError:
+        raise UsageError("C02", f"{what} is '{value}', not a date and time of ISO 8601", where=where, remedy=remedy) from None
+    if time.tzinfo is None:
+        raise UsageError("C02", f"{what} is {value}: the offset from UTC is missing", where=where, remedy=remedy)
+    return time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
 
 
 _SECTIONS: Mapping[str, type] = {"log": LogSpec, "file": FileSpec, "time": TimeSpec, "signals": SignalSpec, "drive": DriveSpec,
@@ -92,7 +116,8 @@ def _explain(error: Any, where: object) -> UsageError:
                           remedy=f"known here: {', '.join(known)}")
     if error["type"] in ("missing", "missing_argument"):
         return UsageError("C02", f"'{place}' is missing", where=where, remedy="rrrid import --guess FILE drafts a recipe")
-    return UsageError("C02", f"'{place}': {error['msg']}, not {error['input']!r}", where=where)
+    return UsageError("C02", f"'{place}': {error['msg']}, not {error['input']!r}", where=where,
+                      remedy="correct the value; the keys stand in the module recipe.py")
 
 
 _LARGEST = 1e12
@@ -125,15 +150,17 @@ def _bounds(recipe: Recipe, where: object) -> None:
         if path.startswith(("robot.", "missing.")):
             continue
         if not math.isfinite(number):
-            raise UsageError("C02", f"'{path}' is {number}, must be a finite number", where=where)
+            raise UsageError("C02", f"'{path}' is {number}, must be a finite number", where=where, remedy="correct the number")
         if abs(number) > _LARGEST:
-            raise UsageError("C02", f"'{path}' is {number}, must lie within ±{_LARGEST:g}", where=where)
+            raise UsageError("C02", f"'{path}' is {number}, must lie within ±{_LARGEST:g}", where=where,
+                             remedy="correct the number, or use another unit")
         if key in _POSITIVE and number <= 0.0:
-            raise UsageError("C02", f"'{path}' is {number}, must be above 0", where=where)
+            raise UsageError("C02", f"'{path}' is {number}, must be above 0", where=where, remedy="correct the number")
         if key == "sign" and abs(number) != 1.0:
             raise UsageError("C02", f"'{path}' is {number}, must be 1 or -1", where=where, remedy="use scale for other factors")
         if key in ("joint", "column", "columns") and (number < 1 or number != int(number)):
-            raise UsageError("C02", f"'{path}' is {number}, must be 1 or more: joints and columns count from 1", where=where)
+            raise UsageError("C02", f"'{path}' is {number}, must be 1 or more", where=where,
+                             remedy="joints and columns count from 1")
 
 
 def _meaning(recipe: Recipe, where: object) -> None:
@@ -144,7 +171,8 @@ def _meaning(recipe: Recipe, where: object) -> None:
             raise UsageError("C01", f"'signals.{name}' is not a signal{did_you_mean(name, known)}", where=where,
                              remedy=f"signals: {', '.join(known)}; time has its own table [time]")
         if (spec.columns is None) == (spec.column is None):
-            raise UsageError("C02", f"'signals.{name}' needs columns (a list, a pattern or a name), once", where=where)
+            raise UsageError("C02", f"'signals.{name}' needs columns (a list, a pattern or a name), once", where=where,
+                             remedy='write columns = "q_{j}", or columns = ["a", "b", "c"]')
         if spec.unit == "counts" and spec.counts_per_rev is None:
             raise UsageError("C02", f"'signals.{name}' is in counts: counts_per_rev is missing", where=where,
                              remedy="add counts_per_rev")

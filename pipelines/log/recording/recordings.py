@@ -12,7 +12,7 @@ from pipelines.errors import Check, InputRejected, NothingMatched, UsageError, d
 from pipelines.log.experiment import Array
 from pipelines.log.recording import filenames
 from pipelines.log.recording.clock import time_of
-from pipelines.log.recording.joint_side import drive_of, unit_declared
+from pipelines.log.recording.joint_side import drive_of, si_of, unit_declared
 from pipelines.log.recording.raw import RawTable, expand
 from pipelines.log.recording.recipe import FileSpec, Recipe, TableSpec
 from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
@@ -52,6 +52,7 @@ class Material:
     ignored: tuple[str, ...] = ()
     paths: tuple[Path, ...] = ()
     assume_units: bool = False
+    ending: str = "h5"  # of the logs to be written: "h5" | "parquet"
 
 
 def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tell: Callable[[str], None]) -> Material:
@@ -148,15 +149,16 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
     if gravity is None:
         return robot, files
     if not (isinstance(gravity, list | tuple) and len(gravity) == 3 and all(isinstance(g, int | float) for g in gravity)):
-        raise UsageError("C02", f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]", where=path)
+        raise UsageError("C02", f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]", where=path,
+                         remedy="write gravity = [0.0, 0.0, -9.81]")
     return replace(robot, gravity=(float(gravity[0]), float(gravity[1]), float(gravity[2]))), files
 
 
-def parse_map(entries: tuple[str, ...], recipe: Recipe) -> Map:
+def parse_map(entries: tuple[str, ...], recipe: Recipe, joints: int) -> Map:
     """--map q_1=Joint_1: single columns named differently from the recipe.
 
     Raises:
-        UsageError: C02, not of that form.
+        UsageError: C02, not of that form, or of a joint that the robot does not have.
     """
     found: dict[str, dict[int, str]] = {}
     for entry in entries:
@@ -164,10 +166,15 @@ def parse_map(entries: tuple[str, ...], recipe: Recipe) -> Map:
         signal, _, joint = left.strip().rpartition("_")
         if left.strip() == "t":
             signal, joint = "t", "1"
-        if not equals or not column.strip() or not joint.isdigit() or (signal not in recipe.signals and signal != "t"):
+        elif not joint.isdecimal() or signal not in recipe.signals:
+            signal = ""
+        if not equals or not column.strip() or not signal:
             known = ", ".join([*recipe.signals, "t"])
             raise UsageError("C02", f"'{entry}' is not signal_joint=column", where="--map",
                              remedy=f"write --map q_1=Joint_1; signals: {known}")
+        if not 1 <= int(joint) <= joints:
+            raise UsageError("C02", f"'{entry}' speaks of joint {joint}, the robot has joints 1 to {joints}", where="--map",
+                             remedy="joints count from 1")
         found.setdefault(signal, {})[int(joint)] = column.strip()
     return found
 
@@ -209,7 +216,8 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
         places = table.rows + 1 if table.lines is None else table.lines
         recordings.append(Recording(t, signals, {s: columns[s] for s in here}, places, table.source,
                                     time.column is not None and own_clock,
-                                    "row" if table.lines is None else "line", table.breaks))
+                                    "row" if table.lines is None else "line", table.breaks,
+                                    {s: si_of(units[s], recipe.signals[s]) for s in here}))
     joined = _joined(recordings, list(source.tables.values()), time.column is not None, checks)
     if len(joined) > 1 and recipe.resample is None:
         raise InputRejected("T06", "the files have different time stamps", where=", ".join(source.tables),
@@ -229,6 +237,7 @@ def _joined(recordings: list[Recording], tables: list[RawTable], clocked: bool, 
         common, a, b = np.intersect1d(rows, table.rows, assume_unique=True, return_indices=True)
         breaks = tuple((np.flatnonzero(np.diff(common) > 1) + 1).tolist())
         first = replace(first, t=first.t[a], places=first.places[a], columns={**first.columns, **other.columns}, breaks=breaks,
+                        si={**first.si, **other.si},
                         signals={**{k: v[a] for k, v in first.signals.items()}, **{k: v[b] for k, v in other.signals.items()}})
         rows = common
     kept = [r for r in (first, *apart) if r.signals]

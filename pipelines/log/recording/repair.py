@@ -6,23 +6,21 @@ back ends one log and begins the next.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected
+from pipelines.log import limits as common
 from pipelines.log.experiment import Array
+from pipelines.log.limits import ABSURD, FEWEST, GAP_LIMIT, GAP_TICKS, LARGEST_JITTER, MOST_STEPS, percent, sentinels
 
-__all__ = ["FEWEST", "Limits", "Recording", "mend", "split_at_gaps"]
+__all__ = ["Limits", "Recording", "late_intervals", "mend"]
 
-FEWEST = 11  # samples: with fewer there is no motion to speak of, and no log
-_MOST_STEPS = 3  # of the clock
 _SHORTEST_PART = 0.1  # of all samples
 _MOST_MISSING = 0.2
-_ABSURD = 1e18
-_SENTINELS = (-999.0, -9999.0, -99999.0, 999.0, 9999.0, 99999.0)
 
 Index = npt.NDArray[np.int64]
 
@@ -39,6 +37,7 @@ class Recording:
     clocked: bool = True  # the file has a column of time; else a rate was declared
     word: str = "row"  # what `places` counts: "line" or "row"
     breaks: tuple[int, ...] = ()  # samples before which the file is damaged
+    si: Mapping[str, float] = field(default_factory=dict)  # name -> what one recorded unit is in SI; 1 where it is not said
 
     def take(self, chosen: slice | npt.NDArray[np.bool_]) -> Recording:
         kept = np.flatnonzero(chosen) if isinstance(chosen, np.ndarray) else np.arange(self.t.size)[chosen]
@@ -60,7 +59,7 @@ class Limits:
     """What a recipe says of missing samples and gaps."""
 
     missing: tuple[float, ...] = ()
-    longest_gap: float | None = None  # [s]; default 20 samples
+    longest_gap: float | None = None  # [s]; default what an observer predicts through
     resampled: bool = False
 
 
@@ -77,9 +76,10 @@ def mend(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], t
     recording = _mark_missing(recording, limits.missing, checks)
     recording = _drop_missing(recording, checks)
     recording = _drop_duplicates(recording, checks)
-    parts = _split_at_steps(recording, checks)
-    for part in parts:
-        _report_clock(part, limits, checks)
+    parts = tuple(piece for part in _split_at_steps(recording, checks) for piece in _split_at_gaps(part, limits, checks))
+    if not limits.resampled:  # else what becomes of late samples is part of the record of the resampling
+        for part in parts:
+            _report_clock(part, checks)
     return parts, tuple(checks)
 
 
@@ -101,18 +101,16 @@ def _mark_missing(recording: Recording, missing: tuple[float, ...], checks: list
 
 
 def _refuse_absurd(recording: Recording, name: str, joint: int, values: Array) -> None:
-    bad = np.flatnonzero(np.isinf(values) | (np.abs(values) >= _ABSURD))
+    bad = np.flatnonzero(np.abs(values) * recording.si.get(name, 1.0) >= ABSURD)
     remedy = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
     if bad.size:
         raise InputRejected("D03", f"{values[bad[0]]:g} in {recording.listed(bad)}", where=recording.column(name, joint),
                             remedy=remedy.format(f"{values[bad[0]]:g}"))
-    for sentinel in _SENTINELS:
-        hit = values == sentinel
-        rest = np.abs(values[~hit & np.isfinite(values)])
-        if hit.any() and rest.size and rest.max() < abs(sentinel) / 5.0:
-            raise InputRejected("D03", f"{sentinel:g} in {recording.listed(np.flatnonzero(hit))} looks like 'no sample': "
-                                "nothing else comes near it",
-                                where=recording.column(name, joint), remedy=remedy.format(f"{sentinel:g}"))
+    filler = np.flatnonzero(sentinels(values[:, None])[:, 0])
+    if filler.size:
+        value = f"{values[filler[0]]:.12g}"
+        raise InputRejected("D03", f"{value} in {recording.listed(filler)} looks like 'no sample': nothing else comes near it",
+                            where=recording.column(name, joint), remedy=remedy.format(value))
 
 
 def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
@@ -161,23 +159,27 @@ def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
 def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recording, ...]:
     """T01: where the clock was set back (or, without a clock, lines are lost) one part ends and another begins."""
     back = np.flatnonzero(np.diff(recording.t) < 0.0) + 1
-    if back.size > _MOST_STEPS:
+    if back.size > MOST_STEPS:
         raise InputRejected("T01", f"time runs backwards {back.size} times ({recording.listed(back)})", where=recording.where,
                             remedy="sort the file by time, or choose another column of time")
     cuts = sorted({*map(int, back), *(() if recording.clocked else recording.breaks)})
     if not cuts:
         return (_long_enough(recording),)
-    parts = [recording.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, recording.t.size], strict=True)]
-    kept = tuple(part for part in parts if part.t.size >= max(FEWEST, _SHORTEST_PART * recording.t.size))
-    dropped = recording.t.size - sum(part.t.size for part in kept)
+    kept, into = _cut(recording, cuts)
     code, why = ("T01", "time steps back") if back.size else ("F09", "lines are lost and no clock says how many")
-    checks.append(Check.of(code, "repair",
-                           f"{why} at {recording.listed(np.array(cuts))}: "
-                           f"split into {len(kept)} part{'s' if len(kept) != 1 else ''}"
-                           f"{f', {dropped} samples of short parts left out' if dropped else ''}", where=recording.where))
+    checks.append(Check.of(code, "repair", f"{why} at {recording.listed(np.array(cuts))}: {into}", where=recording.where))
     if not kept:
-        _long_enough(parts[0])
+        _long_enough(recording.take(slice(0, cuts[0])))
     return kept
+
+
+def _cut(recording: Recording, cuts: Sequence[int]) -> tuple[tuple[Recording, ...], str]:
+    """The parts between the samples `cuts` that are long enough for a log, and what was done in words."""
+    parts = [recording.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, recording.t.size], strict=True)]
+    kept = tuple(part for part in parts if part.t.size >= max(FEWEST, _SHORTEST_PART * recording.t.size / len(parts)))
+    dropped = recording.t.size - sum(part.t.size for part in kept)
+    return kept, (f"split into {len(kept)} part{'s' if len(kept) != 1 else ''}"
+                  f"{f', {dropped} samples of short parts left out' if dropped else ''}")
 
 
 def _long_enough(recording: Recording) -> Recording:
@@ -187,41 +189,46 @@ def _long_enough(recording: Recording) -> Recording:
     return recording
 
 
-def _report_clock(part: Recording, limits: Limits, checks: list[Check]) -> None:
-    """T03, T04, T05: lost samples and uneven time are said; they stay as gaps of `t`, for no sample is invented."""
+def _split_at_gaps(part: Recording, limits: Limits, checks: list[Check]) -> tuple[Recording, ...]:
+    """T04: a gap that no observer predicts through ends one log and begins the next; nothing is interpolated across it."""
+    steps = np.diff(part.t)
+    longest = GAP_TICKS * float(np.median(steps))
+    if limits.longest_gap is not None:  # only resampling can bridge more than an observer does
+        longest = limits.longest_gap if limits.resampled else min(longest, limits.longest_gap)
+    wide = np.flatnonzero(steps > longest)
+    if not wide.size:
+        return (part,)
+    kept, into = _cut(part, (wide + 1).tolist())
+    words = (f"{wide.size} gap{'s' if wide.size != 1 else ''} longer than {longest:.4g} s, the longest {steps.max():.4g} s, "
+             f"after {part.listed(wide)}")
+    if steps[wide].sum() > 0.5 * (part.t[-1] - part.t[0]) or not kept:
+        most = "they make more than half of the recording" if kept else f"no stretch between them has {FEWEST} samples"
+        raise InputRejected("T04", f"{words}: {most}", where=part.where, remedy="record again without interruption")
+    checks.append(Check.of("T04", "repair", f"{words}: {into}", where=part.where,
+                           remedy="look why the recorder stopped there"))
+    return kept
+
+
+def late_intervals(part: Recording) -> Index:
+    """The samples after which a few are lost, or come late."""
+    ticks = np.diff(part.t) / float(np.median(np.diff(part.t)))
+    return common.late(ticks, common.jitter(ticks)[0])
+
+
+def _report_clock(part: Recording, checks: list[Check]) -> None:
+    """T03, T05: lost samples and uneven time are said; they stay as gaps of `t`, for no sample is invented."""
     steps = np.diff(part.t)
     median = float(np.median(steps))
-    jitter = float(np.percentile(np.abs(steps - median), 95)) / median
-    gaps = np.flatnonzero(steps > (1.5 if jitter < _MOST_MISSING else 3.0) * median)
-    longest = _longest_gap(part, limits)
+    rms, worst = common.jitter(steps / median)
+    gaps = late_intervals(part)
     lost = int(np.round(steps[gaps] / median - 1.0).sum())
     if lost:
-        share = 100.0 * lost / (lost + part.t.size)
         checks.append(Check.of("T03", "warn",
-                               f"{lost} samples ({share:.2g} %) are lost in {gaps.size} gaps after {part.listed(gaps)}",
-                               where=part.where))
-    wide = gaps[steps[gaps] > longest]
-    if wide.size:
-        if steps[wide].sum() > 0.5 * (part.t[-1] - part.t[0]):
-            raise InputRejected("T04", f"gaps of up to {steps.max():.4g} s make more than half of the recording", where=part.where,
-                                remedy="record again")
-        checks.append(Check.of("T04", "repair" if limits.resampled else "warn",
-                               f"{wide.size} gaps longer than {longest:.4g} s, the longest "
-                               f"{steps.max():.4g} s after {part.listed(wide[:1])}; "
-                               f"{'split there' if limits.resampled else 'kept as gaps of time'}",
-                               where=part.where))
-    if jitter > 0.05 and not limits.resampled:
+                               f"{lost} sample{'s' if lost != 1 else ''} ({100.0 * lost / (lost + part.t.size):.2g} %) lost in "
+                               f"{gaps.size} gap{'s' if gaps.size != 1 else ''} of at most {GAP_LIMIT}, after {part.listed(gaps)}",
+                               where=part.where, remedy="give the recorder more priority, or record fewer signals"))
+    if rms > LARGEST_JITTER:
         checks.append(Check.of("T05", "warn",
-                               f"time is uneven: 95 % of the steps lie within {100 * jitter:.0f} % of {median:.6g} s",
+                               f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms), at most by "
+                               f"{percent(worst)}",
                                where=part.where, remedy="add [resample] rate = … for an even grid"))
-
-
-def _longest_gap(part: Recording, limits: Limits) -> float:
-    return limits.longest_gap if limits.longest_gap is not None else 20.0 * float(np.median(np.diff(part.t)))
-
-
-def split_at_gaps(part: Recording, limits: Limits) -> tuple[Recording, ...]:
-    """The stretches between gaps longer than the limit: nothing is ever interpolated across one (T04)."""
-    cuts = (np.flatnonzero(np.diff(part.t) > _longest_gap(part, limits)) + 1).tolist()
-    stretches = [part.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, part.t.size], strict=True)]
-    return tuple(s for s in stretches if s.t.size >= max(FEWEST, _SHORTEST_PART * part.t.size / (len(cuts) + 1))) or (part,)

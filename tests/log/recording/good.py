@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.import_log import STAGE, Result, Settings
+from pipelines.log.recording.repair import Recording
 from pipelines.stage import Outcome, Request, run_stage
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +43,13 @@ def good() -> dict[str, Array]:
     dq = np.gradient(q, t, axis=0)
     tau = 2.0 * np.gradient(dq, t, axis=0) + 1.5 * np.tanh(20.0 * dq) + 0.3 * dq
     return {"t": t} | {f"q_{j}": q[:, j - 1] for j in joint} | {f"tau_{j}": tau[:, j - 1] for j in joint}
+
+
+def recording() -> Recording:
+    columns = good()
+    signals = {s: np.column_stack([columns[f"{s}_{j}"] for j in (1, 2, 3)]) for s in ("q", "tau")}
+    names = {s: tuple(f"{s}_{j}" for j in (1, 2, 3)) for s in ("q", "tau")}
+    return Recording(columns["t"], signals, names, np.arange(2, 1202), "run.csv", word="line")
 
 
 def text(columns: Mapping[str, Array], delimiter: str = ",") -> str:

@@ -95,6 +95,18 @@ def test_s09_a_rate_that_is_a_period_is_refused(text: str, words: str) -> None:
 def test_dates_may_be_written_as_toml_has_them() -> None:
     recipe = parse_recipe(edited('experiment =', "recorded = 2024-05-17T11:30:00+02:00\nexperiment ="))
     assert recipe.log.recorded == "2024-05-17T09:30:00Z"
+    assert parse_recipe(edited('experiment =', 'recorded = "2024-05-17T09:30:00.25Z"\nexperiment =')).log.recorded == \
+        "2024-05-17T09:30:00.250000Z"
+
+
+@pytest.mark.parametrize("value", ["2024-05-17T11:30:00", "2024-05-17", '"2024-05-17T11:30:00"', '"yesterday"', "5"])
+def test_c02_a_time_without_its_offset_is_refused(value: str) -> None:
+    """11:30 is another hour in every country; stamping it UTC would be a guess."""
+    with pytest.raises(UsageError, match="RRID-C02.*'log.recorded' is .*offset from UTC"):
+        parse_recipe(edited('experiment =', f"recorded = {value}\nexperiment ="))
+    case = f'[[file]]\nmatch = "a.csv"\nrecorded = {value}\n[time]'
+    with pytest.raises(UsageError, match=r"'file\[1\].recorded'"):
+        parse_recipe(edited("[time]", case))
 
 
 @pytest.mark.parametrize(("pattern", "name", "groups"), [

@@ -1,0 +1,30 @@
+"""Let the doctor see a new log before it is written, so that `inspect` passes on every log that `import` makes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pipelines.errors import Check, clean
+from pipelines.log.doctor.checks import check_log
+from pipelines.log.experiment import ExperimentLog
+
+__all__ = ["examine"]
+
+# A glitch was recorded as it stands there: what to make of it is for whoever uses the log to decide.
+_KEPT = "RRID-D06"
+
+
+def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Check, ...]:
+    """What the doctor finds in `log` that the import has not said already: glitches, which stay.
+
+    Raises:
+        InputRejected: what the doctor would reject, or would have to mend before use: the import should have.
+    """
+    found = []
+    for check in check_log(replace(log, source=recording), ("RRID-S07",) if trust_units else ()):
+        if check.level == "reject" or (check.level == "repair" and check.code != _KEPT):
+            raise check.as_error()
+        if check.code == _KEPT and check.level == "repair":
+            words = check.message.removesuffix("; left out") + "; kept in the log, left out of fits"
+            found.append(replace(check, level="warn", message=clean(words)))
+    return tuple(found)
