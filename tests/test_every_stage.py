@@ -12,12 +12,16 @@ from typing import Any
 
 import pytest
 
+from pipelines.errors import Check
 from pipelines.log.files import open_log
 from pipelines.log.results import decode, encode, read_series
 from pipelines.log.table import write_csv
 from pipelines.report.report import Report
 from pipelines.stage import Request, Stage, run_stage
 from rrrid_cli.main import STAGES
+from tests.log.recording.good import RECIPE, good, text, write
+from tests.log.recording.good import run as run_import
+from tests.repairs import REPAIRS, Repair
 
 REPO = Path(__file__).resolve().parents[1]
 MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if path.stem not in ("__init__", "stage", "errors")]
@@ -32,19 +36,7 @@ def _stage(module: str) -> Stage[Any, Any]:
 def _recording(folder: Path, samples: Path) -> tuple[Path, ...]:
     """A CSV recording and its recipe, for the stage that makes logs instead of reading them."""
     write_csv(folder / "run.csv", open_log(samples / "rrr-closed-form/excitation-1.h5").log)
-    (folder / "recipe.toml").write_text("""
-        [robot]
-        use = "rrr"
-        [log]
-        match = "run.csv"
-        experiment = "excitation"
-        [time]
-        column = "t"
-        unit = "s"
-        [signals]
-        q = { columns = "q_{j}", unit = "rad" }
-        tau = { columns = "tau_{j}", unit = "N m" }
-        """)
+    (folder / "recipe.toml").write_text(RECIPE)
     return ()
 
 
@@ -119,12 +111,29 @@ def test_twice_is_the_same(module: str, tmp_path: Path, samples: Path) -> None:
     assert "report.html" in contents[0]
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_every_log_a_stage_writes_is_in_order(module: str, tmp_path: Path, samples: Path) -> None:
-    """`inspect` accepts every log that any stage writes."""
+def _examined(folder: Path, out: Path) -> tuple[int, list[Check]]:
+    """How many logs lie in `folder`, and what the doctor would not have as it is."""
     from pipelines.inspect import STAGE as DOCTOR
 
+    result = run_stage(DOCTOR, Request((folder,), out=out, no_report=True), DOCTOR.settings()).result
+    return len(result.logs), [c for c in result.checks if c.level in ("reject", "repair")]
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m not in ("inspect", "run")])
+def test_every_log_a_stage_writes_is_in_order(module: str, tmp_path: Path, samples: Path) -> None:
+    """`inspect` passes on every log that any stage writes; these stages write some."""
     _, outcome = _run(module, tmp_path, samples)
-    if list(outcome.folder.rglob("logs/*.h5")) + list(outcome.folder.rglob("logs/*.parquet")):
-        examined = run_stage(DOCTOR, Request((outcome.folder,), out=tmp_path / "examined", no_report=True), DOCTOR.settings())
-        assert [c for c in examined.result.checks if c.level == "reject"] == []
+    logs, complaints = _examined(outcome.folder, tmp_path / "examined")
+    assert logs > 0
+    assert complaints == []
+
+
+@pytest.mark.parametrize("repair", REPAIRS, ids=[r.row.replace(" ", "-") for r in REPAIRS])
+def test_what_an_import_has_mended_is_in_order(repair: Repair, tmp_path: Path) -> None:
+    """Import and doctor judge by the same limits: nothing is left to reject or to mend, but glitches, which are recorded."""
+    write(tmp_path / "data", text(good()))
+    repair.spoil(tmp_path / "data")
+    outcome = run_import(tmp_path / "data", repair.recipe)
+    logs, complaints = _examined(outcome.folder, tmp_path / "examined")
+    assert logs == len(outcome.result.logs) > 0
+    assert [c for c in complaints if not (repair.code == c.code[-3:] == "D06")] == []

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import numpy.typing as npt
@@ -82,3 +85,14 @@ def run(folder: Path, recipe: str = RECIPE, *, strict: bool = False, assume_unit
 def codes(outcome: Outcome[Result]) -> dict[str, str]:
     """code -> level of everything that was said."""
     return {check.code.removeprefix("RRID-"): check.level for check in outcome.checks}
+
+
+@lru_cache
+def strict_checker(shared: Path) -> ModuleType:
+    """The strict checker of logs that was written apart from the project."""
+    spec = spec_from_file_location("check_log", shared / "tools" / "check_log.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
