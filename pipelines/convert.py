@@ -13,7 +13,7 @@ from pathlib import Path
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.canonical import digest_of
 from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import ENDINGS, open_log, write_log
+from pipelines.log.files import open_log, write_log
 from pipelines.log.results import NOT_STORED
 from pipelines.log.table import write_csv
 from pipelines.report.report import Report, Section, Table
@@ -62,15 +62,21 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     taken: set[str] = set()
     converted = []
     for opened in inputs.logs:
-        ending = settings.to or _OTHER[ENDINGS.get(opened.path.suffix.lower(), "hdf5")]
-        stem = slug(opened.path.stem)
-        while f"{stem}.{ending}" in taken:
-            stem += "+"
-        taken.add(f"{stem}.{ending}")
+        ending = settings.to or _OTHER[opened.container]
+        stem = _unused(slug(opened.path.stem), ending, taken)
         file = f"{'csv' if ending == 'csv' else 'logs'}/{stem}.{ending}"
         converted.append(Converted(opened.log.name, opened.path.name, file, opened.log.n_samples, opened.log.n_joints,
                                    digest_of(opened.log), opened.log))
     return Result(tuple(converted))
+
+
+def _unused(stem: str, ending: str, taken: set[str]) -> str:
+    """`stem`, or `stem-2` and so on where a file of that name is there already."""
+    number = 1
+    while (name := stem if number == 1 else f"{stem}-{number}") + f".{ending}" in taken:
+        number += 1
+    taken.add(f"{name}.{ending}")
+    return name
 
 
 def write(result: Result, folder: Path, request: Request) -> None:

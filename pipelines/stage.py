@@ -10,28 +10,25 @@ not rrrid's, writing everything into a hidden folder that takes the place of the
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import platform
 import shutil
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from pipelines.errors import Check, RrridError, UsageError
+from pipelines.errors import Check, RrridError
 from pipelines.log.atomic import replace_folder, staging_folder, write_file
-from pipelines.log.files import Opened, find_logs, hash_file, open_log
+from pipelines.log.files import PROVENANCE, Opened, find_logs, hash_file, open_log
+from pipelines.log.places import given_names, keep_apart, refuse_foreign, renamed, short_names, slug, tilde
 from pipelines.log.results import encode, json_text, write_series
 from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot
+from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.report.report import Report
 
-__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "read_logs", "run_stage", "slug", "tilde"]
-
-VERSION = "0.1.0"
-PROVENANCE = "provenance.json"
+__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "read_logs", "refuse_foreign", "run_stage", "slug", "tilde"]
 
 S = TypeVar("S")
 R = TypeVar("R")
@@ -46,11 +43,12 @@ class Request:
     robot: str | None = None  # description to use instead of the one inside the logs
     strict: bool = False  # a repair is an error
     check: bool = False  # a gate that failed, or something found, ends in exit 1
-    force: bool = False  # replace a folder of rrrid's whose files were changed since
+    force: bool = False  # replace a folder of rrrid's where files were added or changed since
     no_report: bool = False
     assume_units: bool = False
     format: str = "h5"  # of derived logs
     tell: Callable[[str], None] = field(default=lambda words: None, compare=False)  # progress, in words
+    joints: tuple[int, ...] = ()  # 1-based: the joints to take of every log, in this order; none: all
 
 
 @dataclass(frozen=True)
@@ -69,6 +67,8 @@ class Inputs:
     rejected: tuple[Rejected, ...] = ()
     checks: tuple[Check, ...] = ()
     sources: tuple[Path, ...] = ()  # every file read, for provenance and for the check that none changed meanwhile
+    hashes: Mapping[Path, str] = field(default_factory=dict)  # SHA-256 of what was read of them, where the reader knows
+    folders: tuple[Path, ...] = ()  # folders of inputs that were named beside the request's paths: no output goes there
     robot: RobotDescription | None = None  # --robot
     material: Any = None
     label: str = ""  # folder name for the default --out
@@ -110,19 +110,20 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     """
     del settings
     paths, checks = find_logs(request.paths)
+    robot = load_robot(request.robot) if request.robot else None
     opened: list[Opened] = []
     rejected: list[Rejected] = []
     for index, path in enumerate(paths):
         request.tell(f"reading {path.name} ({index + 1} of {len(paths)})")
         try:
-            opened.append(open_log(path, assume_units=request.assume_units))
+            opened.append(open_log(path, assume_units=request.assume_units, joints=request.joints, robot=robot))
         except RrridError as problem:
             if not keep_rejected or problem.exit_code != 3:
                 raise
             rejected.append(Rejected(path, problem))
-    robot = load_robot(request.robot) if request.robot else None
     names = sorted({opened_log.log.robot_name for opened_log in opened})
-    return Inputs(tuple(opened), tuple(rejected), checks, paths, robot, label=_label(request.paths),
+    return Inputs(tuple(opened), tuple(rejected), checks, paths, {o.path: o.sha256 for o in opened}, robot=robot,
+                  label=_label(request.paths),
                   robot_name=names[0] if len(names) == 1 else "several" if names else "unknown")
 
 
@@ -137,14 +138,28 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     Raises:
         RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed.
     """
+    given = given_names(request.paths)
+    try:
+        return _run(stage, dataclasses.replace(request, paths=tuple(path.absolute() for path in request.paths)), settings)
+    except RrridError as problem:
+        problem.where, problem.message = renamed(problem.where, given), renamed(problem.message, given)
+        raise
+
+
+def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     started = time.time()
     if request.out is not None:
-        refuse_foreign(request.out, request.paths, request.force)
+        keep_apart(request.out, (), request.paths)
+        refuse_foreign(request.out, request.force)
+    described = _hashes(robot_sources(request.robot), {}) if request.robot else {}
     inputs = stage.read(request, settings)
     out = request.out or Path("runs") / slug(inputs.robot_name) / slug(inputs.label) / stage.name
-    refuse_foreign(out, request.paths, request.force)
-    hashes = {path: hash_file(path) for path in inputs.sources if _readable(path)}
-    result = stage.compute(inputs, settings)
+    keep_apart(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))
+    if request.out is None:
+        refuse_foreign(out, request.force)
+    hashes = _hashes(inputs.sources, inputs.hashes) | described
+    # Equal inputs give equal bytes, wherever they lie: no path of this machine goes into a result.
+    result = renamed(stage.compute(inputs, settings), short_names(request.paths))
     checks = (*inputs.checks, *(c for opened in inputs.logs for c in opened.checks), *stage.checks(result))
     if request.strict and (repair := next((c for c in checks if c.level == "repair"), None)):
         raise repair.as_error()
@@ -173,7 +188,7 @@ def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: 
     if not request.no_report:
         from pipelines.report.render import write_report
 
-        footer = {"command": f"rrrid {stage.name}", "version": VERSION}
+        footer = {"command": f"rrrid {stage.name}", "version": _version()}
         footer |= {f"input {path.name}": value[:16] for path, value in list(hashes.items())[:40]}
         write_report(tilde(report), folder, footer)
 
@@ -182,8 +197,10 @@ def _text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def _readable(path: Path) -> bool:
-    return path.is_file() and os.access(path, os.R_OK)
+def _hashes(sources: Iterable[Path], known: Mapping[Path, str]) -> dict[Path, str]:
+    """The hash of every readable source: of the very bytes that were read, where the reader took it."""
+    readable = [path for path in sources if path in known or (path.is_file() and os.access(path, os.R_OK))]
+    return {path: known[path] if path in known else hash_file(path) for path in readable}
 
 
 def _unchanged(hashes: dict[Path, str]) -> None:
@@ -196,10 +213,11 @@ def _unchanged(hashes: dict[Path, str]) -> None:
 def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request, hashes: dict[Path, str], started: float) -> None:
     outputs = {path.relative_to(folder).as_posix(): hash_file(path) for path in sorted(folder.rglob("*")) if path.is_file()}
     about = {
-        "tool": "rrrid", "version": VERSION, "command": stage.name,
+        "tool": "rrrid", "version": _version(), "command": stage.name,
         "settings": encode(settings)[0] if dataclasses.is_dataclass(settings) else {},
+        "seed": getattr(settings, "seed", None),
         "options": {"strict": request.strict, "assume_units": request.assume_units, "robot": request.robot,
-                    "format": request.format},
+                    "format": request.format, "joints": list(request.joints)},
         "inputs": {str(path): value for path, value in hashes.items()}, "outputs": outputs,
         "python": platform.python_version(), "libraries": _libraries(),
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(started)), "duration": time.time() - started,
@@ -207,59 +225,16 @@ def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request,
     write_file(folder / PROVENANCE, lambda draft: _text(draft, json_text(tilde(about))))
 
 
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("rrrid")
+    except PackageNotFoundError:  # run from a folder, without an installation
+        return "not installed"
+
+
 def _libraries() -> dict[str, str]:
     from importlib.metadata import version
 
     return {name: version(name) for name in ("numpy", "h5py", "pyarrow", "scipy", "matplotlib")}
-
-
-def refuse_foreign(out: Path, inputs: Iterable[Path], force: bool = False) -> None:
-    """C05: an output folder may be new, empty, or rrrid's own earlier output, and never lies inside an input.
-
-    Raises:
-        UsageError: it is anything else.
-    """
-    for path in inputs:
-        if os.path.isdir(path) and out.resolve().is_relative_to(path.resolve()):
-            raise UsageError("C05", f"lies inside the input {path}", where=out, remedy="choose another folder with --out")
-    if out.is_symlink() or (out.exists() and not out.is_dir()):
-        raise UsageError("C05", "is not a folder", where=out, remedy="choose another folder with --out")
-    if not out.exists() or not any(out.iterdir()):
-        return
-    try:
-        about = json.loads((out / PROVENANCE).read_text(encoding="utf-8"))
-        ours = set(about["outputs"]) | {PROVENANCE} if about.get("tool") == "rrrid" else set()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        ours = set()
-    there = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
-    foreign = sorted(there - ours)
-    if foreign and not (force and ours):
-        raise UsageError("C05", f"holds files that rrrid did not write there: {', '.join(foreign[:3])}", where=out,
-                         remedy="choose another folder with --out, or move them")
-
-
-def slug(text: str) -> str:
-    """`text` as a file name: [A-Za-z0-9._-], at most 80 characters, with a hash where something had to go (X11)."""
-    import hashlib
-    import re
-
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:69]
-    reserved = plain.split(".")[0].upper() in {"CON", "PRN", "AUX", "NUL",
-                                               *(f"{p}{i}" for p in ("COM", "LPT") for i in range(1, 10))}
-    if plain == text and plain and not reserved:
-        return plain
-    return f"{'x-' if reserved else ''}{plain or 'x'}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
-
-
-def tilde(value: Any) -> Any:
-    """`value` with the home folder written as ~ in every text, so that no report names its user (X14)."""
-    home = os.path.expanduser("~")
-    if isinstance(value, str):
-        return value.replace(home, "~") if len(home) > 1 else value
-    if isinstance(value, dict):
-        return {tilde(key): tilde(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return type(value)(tilde(item) for item in value)
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return dataclasses.replace(value, **{f.name: tilde(getattr(value, f.name)) for f in dataclasses.fields(value)})
-    return value

@@ -76,13 +76,13 @@ def test_own_output_is_replaced_and_foreign_files_are_refused(logs: Path) -> Non
 def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> None:
     """C05: not even with --force; an empty folder is fine."""
     (tmp_path / "out").mkdir()
-    refuse_foreign(tmp_path / "out", ())
+    refuse_foreign(tmp_path / "out")
     (tmp_path / "out/x").write_text("")
     with pytest.raises(UsageError, match="RRID-C05"):
-        refuse_foreign(tmp_path / "out", (), force=True)
+        refuse_foreign(tmp_path / "out", force=True)
     (tmp_path / "link").symlink_to(tmp_path / "out")
     with pytest.raises(UsageError, match="RRID-C05"):
-        refuse_foreign(tmp_path / "link", ())
+        refuse_foreign(tmp_path / "link")
 
 
 @dataclass(frozen=True)

@@ -11,99 +11,34 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from pipelines.errors import InputRejected, did_you_mean
-from pipelines.log import schema
+from pipelines.log import kinds, schema
 from pipelines.log.experiment import Array, Controller, Derived, ExperimentLog, Signal
+from pipelines.log.kinds import Kind, WrongKind, among, printable, reals, seconds, words
 
-__all__ = ["attributes_of", "digest_of", "from_parts", "log_text", "parse_log_text"]
-
-Kind = Callable[[object], Any]
-
-_SPECIAL = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
-
-
-class _WrongKind(ValueError):
-    pass
-
-
-def _text(value: object) -> str:
-    if not isinstance(value, str):
-        raise _WrongKind("a text")
-    return value
-
-
-def _words(value: object) -> str:
-    if not _text(value).strip():
-        raise _WrongKind("a text that is not empty")
-    return str(value)
-
-
-def _among(*choices: str) -> Kind:
-    def kind(value: object) -> str:
-        if value not in choices:
-            raise _WrongKind(f"one of {', '.join(choices)}")
-        return str(value)
-
-    return kind
-
-
-def _integer(value: object) -> int:
-    # Programs that know only doubles (MATLAB) write 2.0 where 2 is meant.
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value != int(value):
-        raise _WrongKind("an integer")
-    return int(value)
-
-
-def _real(value: object) -> float:
-    if isinstance(value, str) and value in _SPECIAL:
-        return _SPECIAL[value]
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _WrongKind("a real number")
-    return float(value)
-
-
-def _positive(value: object) -> float:
-    number = _real(value)
-    if not (math.isfinite(number) and number > 0.0):
-        raise _WrongKind("a positive number of seconds")
-    return number
-
-
-def _reals(value: object) -> Array:
-    if not isinstance(value, list):
-        raise _WrongKind("a list of real numbers")
-    rows = [[_real(x) for x in row] if isinstance(row, list) else _real(row) for row in value]
-    if len({len(row) if isinstance(row, list) else -1 for row in rows}) > 1:
-        raise _WrongKind("a list of real numbers, its rows of one length")
-    return np.array(rows, dtype=np.float64)
-
-
-def _texts(value: object) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise _WrongKind("a list of texts")
-    return tuple(_among(*schema.FEEDFORWARD)(item) for item in value)
-
+__all__ = ["attributes_of", "digest_of", "from_parts", "log_text", "parse_log_text", "refuse_wrong_kinds"]
 
 # name -> (kind, required)
 _ATTRIBUTES: dict[str, tuple[Kind, bool]] = {
-    "name": (_words, True), "experiment": (_among(*schema.EXPERIMENTS), True), "role": (_among(*schema.ROLES), True),
-    "origin": (_among(*schema.ORIGINS), True), "robot_name": (_words, True), "sample_time": (_positive, True),
-    "torque": (_among(*schema.TORQUE_KINDS), False), "recorded": (_text, False), "joint": (_integer, False),
-    "posture": (_reals, False), "period": (_positive, False),
+    "name": (words, True), "experiment": (among(*schema.EXPERIMENTS), True), "role": (among(*schema.ROLES), True),
+    "origin": (among(*schema.ORIGINS), True), "robot_name": (words, True), "sample_time": (seconds, True),
+    "torque": (among(*schema.TORQUE_KINDS), False), "recorded": (kinds.instant, False), "joint": (kinds.integer, False),
+    "posture": (reals, False), "period": (seconds, False),
 }
 _CONTROLLER: dict[str, tuple[Kind, bool]] = {
-    "law": (_among(*schema.LAWS), True), "kp": (_reals, False), "kd": (_reals, False), "ki": (_reals, False),
-    "feedforward": (_texts, False), "velocity": (_among(*schema.VELOCITIES), False), "observer_gain": (_reals, False),
-    "output_limit": (_reals, False), "torque_resolution": (_reals, False), "delay": (_integer, False),
-    "model": (_text, False),
+    "law": (among(*schema.LAWS), True), "kp": (reals, False), "kd": (reals, False), "ki": (reals, False),
+    "feedforward": (kinds.texts(*schema.FEEDFORWARD), False), "velocity": (among(*schema.VELOCITIES), False),
+    "observer_gain": (reals, False), "output_limit": (kinds.limits, False), "torque_resolution": (reals, False),
+    "delay": (among(0, 1), False), "model": (kinds.text, False),
 }
 _DERIVED: dict[str, tuple[Kind, bool]] = {
-    "command": (_text, True), "settings": (_text, True), "source_sha256": (_text, True), "created": (_text, True),
+    "command": (words, True), "settings": (kinds.json_words, True), "source_sha256": (words, True),
+    "created": (kinds.instant, True),
 }
 
 
@@ -115,6 +50,23 @@ def attributes_of(log: ExperimentLog) -> dict[str, dict[str, object]]:
     if log.derived is not None:
         groups["derived"] = _present(log.derived, _DERIVED)
     return groups
+
+
+def refuse_wrong_kinds(log: ExperimentLog) -> None:
+    """Raise InputRejected (S20) where an attribute or a text of `log` is not of the kind the format says."""
+    where = log.source or log.name
+    known = {"attributes": _ATTRIBUTES, "controller": _CONTROLLER, "derived": _DERIVED}
+    for group, attributes in attributes_of(log).items():
+        place = where if group == "attributes" else f"{where}, {group}"
+        _checked({name: _listed(value) for name, value in attributes.items()}, known[group], place)
+    texts = [("robot", log.robot_text), *((f"signal {name}, long_name", s.long_name) for name, s in log.signals.items())]
+    for name, text in texts:
+        if not isinstance(text, str) or not printable(text):
+            raise InputRejected("S20", "not a text in UTF-8 without NUL", where=f"{where}, {name}", remedy="write it as plain text")
+
+
+def _listed(value: object) -> object:
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _present(owner: object, names: Mapping[str, object]) -> dict[str, object]:
@@ -168,7 +120,8 @@ def parse_log_text(text: str, arrays: Mapping[str, Array], *, where: str) -> Exp
     signals = {}
     for name, described in words.items():
         if not isinstance(described, dict) or set(described) != {"long_name", "units"}:
-            raise InputRejected("S20", "units and long_name are what describes a signal", where=f"{where}, signal {name}")
+            raise InputRejected("S20", "units and long_name are what describes a signal", where=f"{where}, signal {name}",
+                                remedy="copy the file again")
         signals[name] = Signal(arrays[name], str(described["units"]), str(described["long_name"]))
     return from_parts(whole, signals, where=where)
 
@@ -181,7 +134,8 @@ def from_parts(groups: Mapping[str, object], signals: Mapping[str, Signal], *, w
     """
     for key in groups:
         if key not in ("attributes", "controller", "derived", "robot"):
-            raise InputRejected("S19", f"'{key}' is not in format version {schema.FORMAT_VERSION}", where=where)
+            raise InputRejected("S19", f"'{key}' is not in format version {schema.FORMAT_VERSION}", where=where,
+                                remedy="rename or remove it")
     robot = groups.get("robot")
     if not isinstance(robot, str):
         raise InputRejected("S01", "the robot description is missing", where=where, remedy="a log explains itself: write /robot")
@@ -194,7 +148,7 @@ def from_parts(groups: Mapping[str, object], signals: Mapping[str, Signal], *, w
 
 def _checked(found: object, known: Mapping[str, tuple[Kind, bool]], where: str) -> dict[str, Any]:
     if not isinstance(found, Mapping):
-        raise InputRejected("S01", "the attributes are missing", where=where)
+        raise InputRejected("S01", "the attributes are missing", where=where, remedy="write them, or import the recording again")
     for name in found:
         if name not in known:
             raise InputRejected("S19", f"attribute '{name}' is not in format version {schema.FORMAT_VERSION}"
@@ -208,7 +162,15 @@ def _checked(found: object, known: Mapping[str, tuple[Kind, bool]], where: str) 
             continue
         try:
             values[name] = kind(found[name])
-        except _WrongKind as wanted:
-            raise InputRejected("S20", f"attribute '{name}' is {found[name]!r}, not {wanted}", where=where,
+        except WrongKind as wanted:
+            raise InputRejected("S20", f"attribute '{name}' is {_short(found[name])}, not {wanted}", where=where,
                                 remedy="correct it") from None
     return values
+
+
+def _short(value: object) -> str:
+    """`value` in a message; Python refuses to spell out integers of thousands of digits."""
+    try:
+        return repr(value)[:60]
+    except ValueError:
+        return "a number of thousands of digits"

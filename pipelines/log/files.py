@@ -21,15 +21,17 @@ from pipelines.log import canonical
 from pipelines.log.atomic import fault_of, write_file
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.guard import Answer, guarded
+from pipelines.log.joints import chosen
+from pipelines.log.robot import RobotDescription
 from pipelines.log.structure import conform, refuse_unlike_format
 
-__all__ = ["ENDINGS", "Opened", "find_logs", "hash_file", "open_log", "regular_file", "write_log"]
+__all__ = ["ENDINGS", "PROVENANCE", "Opened", "find_logs", "hash_file", "open_log", "regular_file", "write_log"]
 
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _PARQUET_MAGIC = b"PAR1"
-_PROVENANCE = "provenance.json"
+PROVENANCE = "provenance.json"
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class Opened:
     sha256: str
     log: ExperimentLog
     checks: tuple[Check, ...]
+    container: str = "hdf5"  # or "parquet": what the content is, whatever the file's name says
 
 
 def write_log(path: Path, log: ExperimentLog) -> None:
@@ -61,13 +64,16 @@ def write_log(path: Path, log: ExperimentLog) -> None:
     write_file(path, lambda draft: write(draft, log))
 
 
-def open_log(path: Path, *, assume_units: bool = False, only: Collection[str] | None = None) -> Opened:
+def open_log(path: Path, *, assume_units: bool = False, only: Collection[str] | None = None, joints: tuple[int, ...] = (),
+             robot: RobotDescription | None = None) -> Opened:
     """Read the log in `path`, in a guarded child, and hold it against its digest, its manifest and the format.
 
     Args:
         assume_units: take signals without units as SI (S04).
         only: the signals to read, t, q and tau always among them; default all. A part cannot be held against the
             digest of the whole: what vouches for it then are the checksums of its own chunks and pages.
+        joints: the joints to take, 1-based, in this order; default all (S02).
+        robot: the description to use instead of the log's own.
 
     Raises:
         InputRejected: the file is damaged, hostile or not a log.
@@ -91,8 +97,9 @@ def open_log(path: Path, *, assume_units: bool = False, only: Collection[str] | 
     if digest is None:
         checks.append(Check.of("F05", "warn", "no integrity data: nothing would notice a flipped bit", where=path,
                                remedy="'rrrid convert' writes a copy that has them"))
+    log, choice = chosen(log, joints, robot)
     conformed, changes = conform(log, assume_units=assume_units)
-    return Opened(path, sha256, conformed, (*checks, *changes))
+    return Opened(path, sha256, conformed, (*checks, *choice, *changes), container)
 
 
 def _read(path: Path, container: str, only: Collection[str] | None) -> Answer:
@@ -104,8 +111,8 @@ def _read(path: Path, container: str, only: Collection[str] | None) -> Answer:
     return Answer({"text": canonical.log_text(log), "digest": digest}, {name: s.values for name, s in log.signals.items()})
 
 
-def regular_file(path: Path) -> os.stat_result:
-    """The status of `path`, which must be a regular file with something in it (F01, F12, F13)."""
+def regular_file(path: Path, *, what: str = "a log, or a folder of logs", empty: bool = False) -> os.stat_result:
+    """The status of `path`, which must be a regular file (F12, F13) and hold something unless `empty` (F01)."""
     try:
         status = path.stat()
     except FileNotFoundError:
@@ -115,10 +122,10 @@ def regular_file(path: Path) -> os.stat_result:
             raise UsageError("C07", "not a path of this system", where=path, remedy="check the path") from None
         raise fault_of(problem, path) from None
     if not stat.S_ISREG(status.st_mode):
-        raise InputRejected("F12", "not a regular file", where=path, remedy="give a log, or a folder of logs")
+        raise InputRejected("F12", "not a regular file", where=path, remedy=f"give {what}")
     if not os.access(path, os.R_OK):
         raise EnvironmentFault("F13", "permission denied", where=path, remedy="change its permissions")
-    if status.st_size == 0:
+    if status.st_size == 0 and not empty:
         raise InputRejected("F01", "empty file", where=path, remedy="copy it again, or record again")
     return status
 
@@ -193,7 +200,7 @@ def _against_manifest(path: Path, sha256: str) -> None:
 def _listed(folder: Path, path: Path) -> str | None:
     name = path.relative_to(folder).as_posix()
     try:
-        outputs = json.loads((folder / _PROVENANCE).read_text(encoding="utf-8"))["outputs"]
+        outputs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["outputs"]
         if isinstance(outputs.get(name), str):
             return str(outputs[name])
     except (OSError, ValueError, KeyError, AttributeError, TypeError):
@@ -223,7 +230,7 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
             regular_file(path)
             found.append(path)
             continue
-        root = path / "logs" if (path / _PROVENANCE).is_file() else path
+        root = path / "logs" if (path / PROVENANCE).is_file() else path
         found += sorted(_below(root, root.resolve(), checks))
     if not found:
         raise NothingMatched("C06", "no log there", where=", ".join(map(str, inputs)), remedy="logs end in .h5 or .parquet")
@@ -245,7 +252,7 @@ def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
         if linked and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
             checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry))
         elif entry.is_dir():
-            if not (entry / _PROVENANCE).is_file():
+            if not (entry / PROVENANCE).is_file():
                 found += _below(entry, root, checks)
         elif entry.suffix.lower() in ENDINGS and entry.exists():
             found.append(entry)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -79,28 +80,34 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[Experim
 
 
 def _read_file(file: Any, where: str, only: Collection[str] | None) -> tuple[ExperimentLog, str | None]:
-    _refuse_links(file, ("robot", "signals", *_GROUPS), where)
+    # First what could lead elsewhere, then what the file says it is; only a log of this version is judged by its names.
+    _refuse_links(file, where)
+    _version(file, where)
+    _only(file, ("robot", "signals", *_GROUPS), where)
     attributes = _attributes(file, where)
-    _version(attributes, where)
     digest = attributes.pop("digest", None)
     if digest is not None and not isinstance(digest, str):
-        raise InputRejected("S20", "attribute 'digest' is not a text", where=where)
+        raise InputRejected("S20", "attribute 'digest' is not a text", where=where, remedy="write it as a text, or leave it out")
     groups: dict[str, object] = {"attributes": attributes}
     for name in _GROUPS:
         if name in file:
-            _refuse_links(_group(file, name, where), (), f"{where}, /{name}")
+            _refuse_links(_group(file, name, where), f"{where}, /{name}")
+            _only(file[name], (), f"{where}, /{name}")
             groups[name] = _attributes(file[name], f"{where}, /{name}")
     groups["robot"] = _robot_text(file, where)
     signals = _group(file, "signals", where)
-    _refuse_links(signals, tuple(signals), f"{where}, /signals")
+    _refuse_links(signals, f"{where}, /signals")
+    _few(signals, f"{where}, /signals")
     _within_budget(signals, Path(where).stat().st_size, where)
     read = {name: _signal(signals[name], f"{where}, /signals/{name}") for name in signals
             if only is None or name in only}
+    attributes.pop("format"), attributes.pop("format_version")
     return canonical.from_parts(groups, read, where=where), digest
 
 
-def _version(attributes: dict[str, object], where: str) -> None:
-    form, version = attributes.pop("format", None), attributes.pop("format_version", None)
+def _version(file: Any, where: str) -> None:
+    form, version = (_attribute(file, name, f"{where}, attribute {name}") if name in file.attrs else None
+                     for name in ("format", "format_version"))
     if form != schema.FORMAT:
         raise InputRejected("F06", f"an HDF5 file, but not an experiment log: its format is {form!r}", where=where,
                             remedy="use 'rrrid import' with a recipe to make a log of a recording")
@@ -110,20 +117,30 @@ def _version(attributes: dict[str, object], where: str) -> None:
                             remedy="update rrrid, or write the log in that version")
 
 
-def _refuse_links(group: Any, known: tuple[str, ...], where: str) -> None:
-    """X01, X04: only hard links to what the format names; a link elsewhere is refused before it is followed."""
+def _refuse_links(group: Any, where: str) -> None:
+    """X01, X04: only hard links; a link elsewhere is refused before it is followed."""
     import h5py
 
-    for count, name in enumerate(group):
-        if count > _MANY_ATTRIBUTES:
-            raise InputRejected("X04", f"more than {_MANY_ATTRIBUTES} members", where=where,
-                                remedy="a log holds robot, controller and signals")
+    for name in islice(group, _MANY_ATTRIBUTES + 1):
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
             raise InputRejected("X01", f"external link '{name}' to another file refused", where=where,
                                 remedy="store the data in the log itself")
         if isinstance(link, h5py.SoftLink):
             raise InputRejected("X04", f"soft link '{name}' refused", where=where, remedy="store the data in the log itself")
+
+
+def _few(group: Any, where: str) -> None:
+    """X04: no more members than were looked at."""
+    if len(group) > _MANY_ATTRIBUTES:
+        raise InputRejected("X04", f"more than {_MANY_ATTRIBUTES} members", where=where,
+                            remedy="a log holds robot, controller and signals")
+
+
+def _only(group: Any, known: tuple[str, ...], where: str) -> None:
+    """S19: nothing but what the format names."""
+    _few(group, where)
+    for name in group:
         if name not in known:
             raise InputRejected("S19", f"'{name}' is not in format version {schema.FORMAT_VERSION}", where=where,
                                 remedy="remove it")
@@ -152,10 +169,11 @@ def _attribute(owner: Any, name: str, where: str) -> object:
         raise InputRejected("X05", f"declares {declared} bytes", where=where, remedy="an attribute is a few words or numbers")
     kind = info.dtype
     if h5py.check_string_dtype(kind) is None and kind.kind not in "SUfiu":
-        raise InputRejected("S12", f"of type {kind}, neither text nor number", where=where)
+        raise InputRejected("S12", f"of type {kind}, neither text nor number", where=where,
+                            remedy="write it as a text or a number")
     value = owner.attrs[name]
     if isinstance(value, h5py.Empty):
-        raise InputRejected("S20", "empty", where=where)
+        raise InputRejected("S20", "empty", where=where, remedy="write its value, or leave it out")
     if isinstance(value, np.ndarray):
         value = value.tolist()
         return [_as_text(v) for v in value] if value and not isinstance(value[0], float | int | list) else value
@@ -174,7 +192,7 @@ def _robot_text(file: Any, where: str) -> str:
                             remedy="a log explains itself: write /robot")
     dataset = file["robot"]
     if dataset.shape != () or h5py.check_string_dtype(dataset.dtype) is None or _foreign_storage(dataset):
-        raise InputRejected("S20", "/robot is not a scalar text", where=where)
+        raise InputRejected("S20", "/robot is not a scalar text", where=where, remedy="write the robot's TOML as one text")
     return str(dataset.asstr()[()])
 
 
@@ -194,7 +212,7 @@ def _within_budget(signals: Any, file_size: int, where: str) -> None:
     for name in signals:
         place = f"{where}, /signals/{name}"
         if signals.get(name, getclass=True) is not h5py.Dataset:
-            raise InputRejected("S19", "not a data set", where=place)
+            raise InputRejected("S19", "not a data set", where=place, remedy="a signal is one data set")
         dataset = signals[name]
         if foreign := _foreign_storage(dataset):
             raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=place,

@@ -108,7 +108,7 @@ class _Reader:
             self.wrong(path or "the robot description", "must be a table")
         self.table: Mapping[str, object] = table  # type: ignore[assignment]
 
-    def wrong(self, key: str, what: str, code: str = "C02", remedy: str = "") -> None:
+    def wrong(self, key: str, what: str, code: str = "C02", remedy: str = "correct the robot description") -> None:
         place = f"{self.path}.{key}" if self.path and key != self.path else key
         raise self.fail(code, f"robot description, {place}: {what}", where=self.where, remedy=remedy)
 
@@ -121,6 +121,8 @@ class _Reader:
         value = self.table.get(key, default)
         if not isinstance(value, str) or not value.strip():
             self.wrong(key, "must be a text that is not empty" if key in self.table else "is missing")
+        if "\0" in str(value):
+            self.wrong(key, "holds a NUL character")
         if among is not None and value not in among:
             self.wrong(key, f"is '{value}', must be one of {', '.join(among)}")
         return str(value)
@@ -131,7 +133,11 @@ class _Reader:
         value = self.table.get(key)
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.wrong(key, "must be a number" if key in self.table else "is missing")
-        number = float(value)  # type: ignore[arg-type]
+        try:
+            number = float(value)  # type: ignore[arg-type]
+        except OverflowError:  # an integer of hundreds of digits
+            number = math.inf
+            infinite = False
         if math.isnan(number) or (math.isinf(number) and not infinite) or number < low:
             self.wrong(key, f"is {number}, must be {'' if infinite else 'finite and '}at least {low}")
         return number
@@ -156,7 +162,8 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     try:
         table = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as problem:
-        raise fail("C01", f"the robot description is not valid TOML: {problem}", where=where) from None
+        raise fail("C01", f"the robot description is not valid TOML: {problem}", where=where,
+                   remedy="correct it at that place") from None
     top = _Reader(table, "", fail, str(where))
     top.only(_ROBOT_KEYS)
     kinematics = _Reader(table.get("kinematics"), "kinematics", fail, str(where))

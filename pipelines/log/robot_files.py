@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from pipelines.errors import UsageError
 from pipelines.log.robot import Joint, RobotDescription, parse_robot
 from pipelines.log.shipped import shipped
+from pipelines.log.text import read_small_text
 from pipelines.log.urdf import import_urdf
 
-__all__ = ["load_robot"]
+__all__ = ["load_robot", "robot_sources"]
+
+_URDF = (".urdf", ".xacro")
 
 
 def load_robot(source: str | Path) -> RobotDescription:
@@ -20,34 +25,56 @@ def load_robot(source: str | Path) -> RobotDescription:
     Raises:
         UsageError: no such robot, or the file is not a robot description.
     """
-    path = Path(source)
-    if not path.exists():
-        path = shipped("robots", str(source))
-    if path.suffix.lower() in (".urdf", ".xacro"):
+    path = _file_of(source)
+    if path.suffix.lower() in _URDF:
         return import_urdf(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        raise UsageError("C04", f"cannot be read: {problem}", where=path) from None
+    text = read_small_text(path, what="a robot description (TOML) or a URDF")
     return _embed_urdf(text, path) or parse_robot(text, where=path)
+
+
+def robot_sources(source: str | Path) -> tuple[Path, ...]:
+    """The files that `load_robot(source)` reads: the description, and the URDF it names."""
+    path = _file_of(source)
+    if path.suffix.lower() in _URDF:
+        return (path,)
+    urdf = _urdf_named(_table_of(read_small_text(path)))
+    return (path,) if urdf is None else (path, path.parent / urdf)
+
+
+def _file_of(source: str | Path) -> Path:
+    path = Path(source)
+    return path if os.path.lexists(path) else shipped("robots", str(source))
+
+
+def _table_of(text: str) -> dict[str, Any]:
+    """The table of a TOML text; empty where it is none, which `parse_robot` says better."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return {}
+
+
+def _urdf_named(table: dict[str, Any]) -> str | None:
+    kinematics = table.get("kinematics")
+    named = kinematics.get("urdf") if isinstance(kinematics, dict) else None
+    return named if isinstance(named, str) else None
 
 
 def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
     """`urdf = "arm.urdf"` names a file beside the description: its kinematics become `urdf_text`."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return None
-    kinematics = table.get("kinematics")
-    if not isinstance(kinematics, dict) or not isinstance(kinematics.get("urdf"), str):
+    table = _table_of(text)
+    named, kinematics = _urdf_named(table), table.get("kinematics")
+    if named is None or not isinstance(kinematics, dict):
         return None
     tip = kinematics.get("tip_link")
-    arm = import_urdf(path.parent / str(kinematics.pop("urdf")), tip_link=tip if isinstance(tip, str) else None)
+    arm = import_urdf(path.parent / named, tip_link=tip if isinstance(tip, str) else None)
+    kinematics.pop("urdf")
     kinematics["urdf_text"] = arm.urdf_text
     given = table.setdefault("joint", [{"name": j.name, "type": j.type} for j in arm.joints])
     described = _parse_table(table, path)
     if len(given) != arm.n_joints:
-        raise UsageError("S02", f"{len(given)} [[joint]] tables, but the URDF has {arm.n_joints} moving joints", where=path)
+        raise UsageError("S02", f"{len(given)} [[joint]] tables, but the URDF has {arm.n_joints} moving joints", where=path,
+                         remedy="describe each moving joint once, or none")
     merged = tuple(_fill(mine, urdf) for mine, urdf in zip(described.joints, arm.joints, strict=True))
     return replace(described, joints=merged, tip_link=arm.tip_link)
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, did_you_mean
 from pipelines.log import schema
+from pipelines.log.canonical import refuse_wrong_kinds
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.units import to_si
 
 __all__ = ["conform", "refuse_unlike_format"]
-
-_RECORDED = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|\+00:00)")
 
 
 def conform(log: ExperimentLog, *, assume_units: bool = False) -> tuple[ExperimentLog, tuple[Check, ...]]:
@@ -31,31 +29,32 @@ def conform(log: ExperimentLog, *, assume_units: bool = False) -> tuple[Experime
     for name, signal in log.signals.items():
         turned = _orient(log, name, signal, checks)
         signals[name] = _in_si(log, name, turned, law, assume_units, checks)
-    done = replace(log, signals=signals) if checks else log
+    done = replace(log, signals=signals) if any(signals[name] is not log.signals[name] for name in signals) else log
     refuse_unlike_format(done)
     return done, tuple(checks)
 
 
 def refuse_unlike_format(log: ExperimentLog) -> None:
     """Raise InputRejected unless `log` is exactly what `log-format.md` says: what a writer may put on disk."""
+    refuse_wrong_kinds(log)
     _required_signals(log)
+    _units(log)
     n, where, samples = log.n_joints, log.source or log.name, log.signals["t"].values.shape
     if len(samples) != 1:
-        raise InputRejected("S20", f"t has shape {samples}, not (samples,)", where=where)
+        raise InputRejected("S20", f"t has shape {samples}, not (samples,)", where=where, remedy="store t as a vector")
     for name, signal in log.signals.items():
         shape = samples if name == "t" else (samples[0], n)
         if signal.values.shape != shape:
             _wrong_shape(name, signal.values.shape, samples[0], n, where)
     if (log.joint is not None) != (log.experiment in schema.ONE_JOINT):
         says = "needs" if log.joint is None else "does not have"
-        raise InputRejected("S20", f"a {log.experiment} log {says} the attribute joint", where=where)
+        raise InputRejected("S20", f"a {log.experiment} log {says} the attribute joint", where=where,
+                            remedy=f"joint belongs to the experiments {', '.join(schema.ONE_JOINT)}")
     if log.joint is not None and not 1 <= log.joint <= n:
-        raise InputRejected("S20", f"joint is {log.joint}, outside 1 … {n}", where=where)
-    if log.recorded is not None and not _RECORDED.fullmatch(log.recorded):
-        raise InputRejected("S20", f"recorded is '{log.recorded}', not ISO 8601 in UTC", where=where,
-                            remedy="write it like 2004-05-17T09:30:00Z")
+        raise InputRejected("S20", f"joint is {log.joint}, outside 1 … {n}", where=where, remedy="joints count from 1")
     if log.posture is not None and log.posture.shape != (n,):
-        raise InputRejected("S20", f"posture has {log.posture.size} values for {n} joints", where=where)
+        raise InputRejected("S20", f"posture has {log.posture.size} values for {n} joints", where=where,
+                            remedy="give one angle a joint")
     _controller_shapes(log, n, where)
 
 
@@ -66,11 +65,20 @@ def _controller_shapes(log: ExperimentLog, n: int, where: str) -> None:
     for key, shape in shapes.items():
         value = getattr(log.controller, key)
         if value is not None and value.shape != shape:
-            raise InputRejected("S20", f"controller: {key} has shape {value.shape}, not {shape}", where=where)
+            raise InputRejected("S20", f"controller: {key} has shape {value.shape}, not {shape}", where=where,
+                                remedy="give one value a joint")
     if log.controller.law in ("pd", "pd+feedforward",
                               "computed-torque") and (log.controller.kp is None or log.controller.kd is None):
         raise InputRejected("S20", f"controller: law {log.controller.law} without kp and kd", where=where,
                             remedy="write the gains, or law 'unknown'")
+
+
+def _units(log: ExperimentLog) -> None:
+    law = log.controller.law if log.controller else None
+    for name, signal in log.signals.items():
+        if signal.units != (wanted := schema.unit_of(name, law)):
+            raise InputRejected("S05", f"units are '{signal.units}', the format wants '{wanted}'",
+                                where=f"{log.source or log.name}, signal {name}", remedy="convert the samples to SI")
 
 
 def _required_signals(log: ExperimentLog) -> None:
@@ -83,6 +91,9 @@ def _required_signals(log: ExperimentLog) -> None:
         raise InputRejected("S01",
                             f"signal {', '.join(missing)} missing{hints}; there are {', '.join(sorted(log.signals)) or 'none'}",
                             where=where, remedy="rename it, or import the recording with --map")
+    if log.origin == "planned" and (measured := [name for name in ("q", "tau") if name in log.signals]):
+        raise InputRejected("S20", f"a planned log has references only, but there is {', '.join(measured)}", where=where,
+                            remedy="remove them, or say where they come from: origin 'measured' or 'simulated'")
     for name in log.signals:
         if name not in known:
             more = " without a /derived group" if name in schema.DERIVED else did_you_mean(name, known)

@@ -1,0 +1,141 @@
+"""Where results may lie, and how a place is named in them: never over another's files, never with this machine's paths."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from pipelines.errors import UsageError, clean
+from pipelines.log.files import PROVENANCE, hash_file
+
+__all__ = ["given_names", "keep_apart", "refuse_foreign", "renamed", "short_names", "slug", "tilde"]
+
+_ELSEWHERE = "choose another folder with --out"
+
+
+def keep_apart(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> None:
+    """C05: no file that was read lies inside `out`, which is replaced as a whole, and `out` inside no folder of inputs.
+
+    Raises:
+        UsageError: one does.
+    """
+    target = out.resolve()
+    for source in sources:
+        # A link in `out` would be deleted as well, wherever it leads.
+        if source.resolve().is_relative_to(target) or Path(os.path.abspath(source)).is_relative_to(os.path.abspath(out)):
+            raise UsageError("C05", f"holds the input {source}, and would be replaced with it", where=out, remedy=_ELSEWHERE)
+    for folder in folders:
+        if os.path.isdir(folder) and target.is_relative_to(folder.resolve()):
+            raise UsageError("C05", f"lies inside the input {folder}", where=out, remedy=_ELSEWHERE)
+
+
+def refuse_foreign(out: Path, force: bool = False) -> None:
+    """C05: an output folder may be new, empty, or rrrid's own earlier output as it was left.
+
+    Args:
+        force: rrrid's output may be replaced even where files were added to it or changed since.
+
+    Raises:
+        UsageError: it is anything else.
+    """
+    if out.is_symlink() or (out.exists() and not out.is_dir()):
+        raise UsageError("C05", "is not a folder", where=out, remedy=_ELSEWHERE)
+    if not out.exists() or not any(out.iterdir()):
+        return
+    try:
+        about = json.loads((out / PROVENANCE).read_text(encoding="utf-8"))
+        ours: dict[str, object] = dict(about["outputs"]) if about.get("tool") == "rrrid" else {}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        ours = {}
+    if ours and force:
+        return
+    there = {path.relative_to(out).as_posix(): path for path in out.rglob("*") if path.is_symlink() or not path.is_dir()}
+    foreign = sorted(set(there) - set(ours) - ({PROVENANCE} if ours else set()))
+    if foreign:
+        raise UsageError("C05", f"holds files that rrrid did not write there: {', '.join(foreign[:3])}", where=out,
+                         remedy=f"{_ELSEWHERE}, or move them")
+    if edited := sorted(name for name, path in there.items() if name in ours and hash_file(path) != ours[name]):
+        raise UsageError("C05", f"holds files that were changed since rrrid wrote them: {', '.join(edited[:3])}", where=out,
+                         remedy=f"{_ELSEWHERE}, or replace them with --force")
+
+
+def slug(text: str) -> str:
+    """`text` as a file name: [A-Za-z0-9._-], at most 80 characters, with a hash where something had to go (X11)."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:69]
+    reserved = plain.split(".")[0].upper() in {"CON", "PRN", "AUX", "NUL",
+                                               *(f"{p}{i}" for p in ("COM", "LPT") for i in range(1, 10))}
+    if plain == text and plain and not reserved:
+        return plain
+    return f"{'x-' if reserved else ''}{plain or 'x'}-{hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
+
+
+def short_names(paths: Iterable[Path]) -> dict[str, str]:
+    """Every folder of inputs -> what stands for it in a result: nothing for a single one, its name where there are more.
+
+    A result then does not depend on where its inputs lie: equal inputs give equal bytes.
+    """
+    roots = list(dict.fromkeys(path if os.path.isdir(path) else path.parent for path in paths))
+    names: dict[str, str] = {}
+    for root in roots:
+        name, number = root.name if len(roots) > 1 else "", 1
+        while name and (name if number == 1 else f"{name}-{number}") in names.values():
+            number += 1
+        names[str(root)] = name if number == 1 else f"{name}-{number}"
+    return names
+
+
+def given_names(paths: Iterable[Path]) -> dict[str, str]:
+    """Every absolute input -> the way it was written on the command line, for errors on the terminal."""
+    return {str(path.absolute()): str(path) for path in paths if not path.is_absolute()}
+
+
+def renamed(value: Any, names: Mapping[str, str]) -> Any:
+    """`value` with every path that begins with one of `names` written by what stands for it."""
+    rules = []
+    for root in sorted((root for root in names if root != os.sep), key=len, reverse=True):
+        # Messages hold the path as `clean` leaves it, on one line.
+        for text in dict.fromkeys((root, clean(root))):
+            rules.append((re.compile(rf"(?<![^\s,:;(\['\"]){re.escape(text)}(?:(/)|(?![^\s,:;)\]'\"]))"), names[root]))
+
+    def rename(text: str) -> str:
+        for rule, name in rules:
+            below, itself = (f"{name}/", name) if name else ("", ".")
+            text = rule.sub(partial(_replacement, below, itself), text)
+        return text
+
+    return _texts(value, rename) if rules else value
+
+
+def _replacement(below: str, itself: str, found: re.Match[str]) -> str:
+    return below if found[1] else itself
+
+
+def tilde(value: Any) -> Any:
+    """`value` with the home folder written as ~ in every text, so that no report names its user (X14)."""
+    home = os.path.expanduser("~")
+    return _texts(value, lambda text: text.replace(home, "~")) if len(home) > 1 else value
+
+
+def _texts(value: Any, change: Callable[[str], str]) -> Any:
+    """`value` with `change` done to every text in it; the very same object where nothing changed."""
+    if isinstance(value, str | Path):
+        text = change(str(value))
+        return value if text == str(value) else type(value)(text)
+    if isinstance(value, Mapping):
+        return {_texts(key, change): _texts(item, change) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        items = [_texts(item, change) for item in value]
+        same = all(new is old for new, old in zip(items, value, strict=True))
+        return value if same else type(value)(items)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        changes = {field.name: new for field in dataclasses.fields(value) if field.init and field.metadata.get("stored", True)
+                   and (new := _texts(old := getattr(value, field.name), change)) is not old}
+        return dataclasses.replace(value, **changes) if changes else value
+    return value
