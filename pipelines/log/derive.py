@@ -25,6 +25,7 @@ __all__ = ["created", "derive", "derived_by", "recording"]
 
 _STEPS = "steps"  # every command that derived something, first to last, with its settings
 _BEFORE = "recording"  # what /derived held before rrrid derived anything from the recording
+_OWN = "own"  # derived signals that the recording had already; a log without it had none
 _DERIVING = ("reconstruct", "estimate-bps", "validate-writing", "diagnose")
 
 
@@ -39,8 +40,10 @@ def created(recorded: str | None = None) -> str:
 def derive(log: ExperimentLog, command: str, settings: Mapping[str, Any], signals: Mapping[str, Array]) -> ExperimentLog:
     """`log` with further `signals` (names of `schema.DERIVED`) that `command` derived with `settings`."""
     bare = recording(log)
+    bare = replace(bare, signals={name: signal for name, signal in bare.signals.items() if name not in signals})
+    own = [name for name in bare.signals if name in schema.DERIVED]
     steps = {name: done for name, done in _steps(log).items() if name != command} | {command: dict(settings)}
-    record: dict[str, Any] = {_STEPS: steps, _BEFORE: asdict(bare.derived) if bare.derived else None}
+    record: dict[str, Any] = {_STEPS: steps, _BEFORE: asdict(bare.derived) if bare.derived else None, _OWN: own}
     new = {name: Signal(values, schema.unit_of(name), schema.DERIVED[name][1]) for name, values in signals.items()}
     about = Derived(command, json.dumps(record, sort_keys=True), digest_of(bare), created(log.recorded))
     return replace(log, signals={**log.signals, **new}, derived=about)
@@ -57,8 +60,9 @@ def recording(log: ExperimentLog) -> ExperimentLog:
     """`log` without what rrrid derived from it."""
     if log.derived is None or log.derived.command not in _DERIVING:
         return log
-    before = _record(log).get(_BEFORE)
-    kept = {name: signal for name, signal in log.signals.items() if name not in schema.DERIVED}
+    before, own = (_record(log).get(key) for key in (_BEFORE, _OWN))
+    names = own if isinstance(own, list) else []
+    kept = {name: signal for name, signal in log.signals.items() if name not in schema.DERIVED or name in names}
     return replace(log, signals=kept, derived=Derived(**before) if isinstance(before, dict) else None)
 
 

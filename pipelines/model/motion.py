@@ -214,7 +214,11 @@ def _completed(seen: Measured, y: Array) -> Array:
     """Missing samples as the smoother predicts them."""
     how = Reconstruction()
     states, _ = _filter(tuned_observers(seen.good, seen.y, seen.longest, seen.step, how), how)(y)
-    return np.where(np.isfinite(y), y, states[0])
+    whole, at = np.where(np.isfinite(y), y, states[0]), np.arange(len(y))
+    for column in whole.T:  # before the first sample, or a joint without any
+        known = np.isfinite(column)
+        column[~known] = np.interp(at[~known], at[known], column[known]) if known.any() else 0.0
+    return whole
 
 
 def _known_at_all(seen: Measured, states: Array, std: Array, tuned: Observers | None) -> Array:

@@ -100,7 +100,8 @@ def _tuned(laid: Array, step: float, resolution: Array, how: Reconstruction) -> 
     if how.method == "observer" or how.jerk_std is not None or how.bandwidth is not None:
         return Observers(observer, observer)
     both = tune_smoother(laid, step, resolution, how.order)
-    return Observers(observer, design(step, both.jerk_std, both.noise_variance, how.order))
+    # noise with a pattern passes for motion in cross-validation: never more jerk than looking ahead asks for
+    return Observers(observer, design(step, np.minimum(both.jerk_std, sigma), both.noise_variance, how.order))
 
 
 def _bridged(laid: Array, step: float, resolution: Array, order: int) -> Array:

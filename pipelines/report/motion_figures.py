@@ -37,16 +37,21 @@ def draw_bode(axes: Sequence[Sequence[Axes]], frequency: Array, response: Sequen
     for (magnitude, phase), values, name, exact in zip(axes, response, names, ideal, strict=True):
         for j in range(values.shape[1]):
             look = {"color": colour(j), "linestyle": _STYLES[j % 3], "label": f"joint {j + 1}"}
-            magnitude.loglog(frequency, np.abs(values[:, j]), **look)
+            magnitude.semilogx(frequency, np.abs(values[:, j]), **look)
             phase.semilogx(frequency, np.rad2deg(np.unwrap(np.angle(values[:, j]))), **look)
-        magnitude.loglog(frequency, np.abs(exact), color=style.GREY, linestyle=":", linewidth=1.0)
+        magnitude.semilogx(frequency, np.abs(exact), color=style.GREY, linestyle=":", linewidth=1.0)
         phase.semilogx(frequency, np.rad2deg(np.angle(exact)), color=style.GREY, linestyle=":", linewidth=1.0)
         largest = np.abs(values).max()
-        magnitude.set_ylim(max(np.abs(values).min() * 0.5, 1e-3 * largest), 2.0 * largest)
+        if np.abs(values).min() > 0.01 * largest:
+            magnitude.set_ylim(0.0, 1.15 * largest)
+        else:
+            magnitude.set_yscale("log")
+            magnitude.set_ylim(max(np.abs(values).min() * 0.5, 1e-3 * largest), 2.0 * largest)
+            style.log_ticks(magnitude.yaxis)
         magnitude.set_title(f"{name}: magnitude", pad=3.0)
         phase.set_title("phase [°]", pad=3.0)
-        for axis in (magnitude.xaxis, magnitude.yaxis, phase.xaxis):
-            style.log_ticks(axis)
+        style.log_ticks(magnitude.xaxis)
+        style.log_ticks(phase.xaxis)
     for axis in axes[-1]:
         axis.set_xlabel("frequency [Hz]")
     axes[0][1].legend(loc="lower left", fontsize="small")

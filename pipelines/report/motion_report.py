@@ -88,7 +88,8 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
                 "whiteness": log.innovation_whiteness.tolist()}
     known: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
     if log.smoother is not None:
-        known |= {"smoother's σ [rad/s^" + f"{o.order}]": log.smoother.jerk_std.tolist(), "its bandwidth [Hz]": log.smoother.bandwidth_hz.tolist()}
+        known |= {f"smoother's σ [rad/s^{o.order}]": log.smoother.jerk_std.tolist(),
+                  "its bandwidth [Hz]": log.smoother.bandwidth_hz.tolist()}
     known |= {"error, largest [rad]": log.reconstruction_error_max.tolist(), "rms [rad]": log.reconstruction_error_rms.tolist(),
               "std q [rad]": log.position_std.tolist(), "std dq [rad/s]": log.speed_std.tolist(),
               "std ddq [rad/s^2]": log.acceleration_std.tolist()}

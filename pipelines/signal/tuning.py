@@ -224,9 +224,9 @@ def _window(y: Array, step: float) -> tuple[Array, npt.NDArray[np.bool_]]:
     valid = np.isfinite(y)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], valid.view(np.int8), [0]])))
     lengths = edges[1::2] - edges[::2]
-    if not lengths.size or lengths.max() < 4 * BLOCK:
+    if not lengths.size or lengths.max() < 3 * BLOCK:
         raise InputRejected("T04", "no stretch without gaps is long enough to tune an observer on",
-                            remedy=f"record {4 * BLOCK} samples without a gap, or give the bandwidth")
+                            remedy=f"record {3 * BLOCK} samples without a gap, or give the bandwidth")
     first = int(edges[2 * int(np.argmax(lengths))])
     run = y[first:first + int(lengths.max())]
     if len(run) > _WINDOW:

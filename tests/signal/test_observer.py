@@ -10,7 +10,6 @@ from scipy.linalg import solve_discrete_are
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.chain import held_input, stationary, transition
-from pipelines.signal.gaps import even_stretches, lay
 from pipelines.signal.kalman import Textbook
 from pipelines.signal.observer import Start, design, observe
 from tests.signal.chains import assert_near, exact_smoother, swing, with_gaps
@@ -145,25 +144,3 @@ def test_bad_settings_are_refused(bad: dict[str, Any]) -> None:
     """No observer comes of numbers out of range."""
     with pytest.raises(UsageError):
         design(**({"sample_time": T, "jerk_std": 500.0, "noise_variance": R} | bad))
-
-
-def test_stamps_with_jitter_and_holes_lie_on_a_grid() -> None:
-    """Jitter below 5 % is even; lost samples leave holes; a step of half a sample starts a new stretch; drift is followed."""
-    t = np.arange(3000) * 1.0001e-3 + np.random.default_rng(2).uniform(-2e-5, 2e-5, 3000)
-    t[2000:] += 0.5e-3
-    keep = np.delete(np.arange(3000), [10, 11, 500])
-    first, second = even_stretches(t[keep], T)
-    assert (first.last, second.first, second.last) == (1997, 1997, 2997)
-    laid = lay(keep.astype(float), first)
-    assert np.flatnonzero(np.isnan(laid)).tolist() == [10, 11, 500]
-    assert np.nanmax(np.abs(laid - np.arange(2000))) == 0.0
-
-
-@pytest.mark.parametrize(("t", "code"), [
-    (np.array([0.0]), "T08"), (np.array([0.0, 2.0, 1.0]), "T01"), (np.cumsum(np.tile([1.0, 1.3], 50)), "T05"),
-])
-def test_stamps_that_fit_no_grid_are_refused(t: np.ndarray, code: str) -> None:
-    """One sample, time that steps back, uneven time."""
-    with pytest.raises(InputRejected) as caught:
-        even_stretches(t)
-    assert caught.value.code == f"RRID-{code}"
