@@ -8,7 +8,7 @@ Source   cli-contract.md; the order is the way of the data: what a stage finds, 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
@@ -31,7 +31,9 @@ _WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
 
 @dataclass(frozen=True)
 class Settings:
-    """Every stage runs with its own defaults."""
+    """`stages`: settings of single stages by their names; the others run with their own defaults."""
+
+    stages: Mapping[str, Any] = field(default_factory=dict, metadata={"option": False})  # filled by --set and --config
 
 
 @dataclass(frozen=True)
@@ -67,13 +69,13 @@ class Result:
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
     """Run every stage on every group of logs."""
-    groups = tuple(Group(name, tuple(_step(module, part) for module in STEPS)) for name, part in _apart(inputs))
+    groups = tuple(Group(name, tuple(_step(module, part, settings) for module in STEPS)) for name, part in _apart(inputs))
     return Result((), groups) if len(groups) > 1 else Result(groups[0].stages)
 
 
-def _step(module: str, inputs: Inputs) -> Step:
+def _step(module: str, inputs: Inputs, settings: Settings) -> Step:
     stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
-    result = stage.compute(inputs, stage.settings())
+    result = stage.compute(inputs, settings.stages.get(stage.name) or stage.settings())
     return Step(stage.name, stage.exit_code(result, True), result, stage.report(result), stage.checks(result))
 
 

@@ -159,12 +159,13 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         refuse_foreign(out, request.force)
     hashes = _hashes(inputs.sources, inputs.hashes) | described
     # Equal inputs give equal bytes, wherever they lie: no path of this machine goes into a result.
-    result = renamed(stage.compute(inputs, settings), short_names(request.paths))
+    names = short_names(request.paths)
+    result = renamed(stage.compute(inputs, settings), names)
     checks = (*inputs.checks, *(c for opened in inputs.logs for c in opened.checks), *stage.checks(result))
     if request.strict and (repair := next((c for c in checks if c.level == "repair"), None)):
         raise repair.as_error()
     request.tell("writing the report")
-    report = stage.report(result)
+    report = renamed(stage.report(result), names)
     object_, series = encode(result)
     object_ = tilde({"command": stage.name, **object_})
     staging = staging_folder(out)
@@ -175,7 +176,7 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         replace_folder(staging, out)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-    return Outcome(result, object_, report, out, stage.exit_code(result, request.check), checks)
+    return Outcome(result, object_, report, out, stage.exit_code(result, request.check), renamed(checks, names))
 
 
 def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: dict[str, Any], series: dict[str, Any],

@@ -81,7 +81,7 @@ def convert(
     """Convert logs from HDF5 to Parquet and back, or to flat CSV."""
     from pipelines.convert import STAGE
 
-    _go(STAGE, tuple(logs), common, {"to": to})
+    _go(STAGE, tuple(logs), common, {"to": to}, {"to": common.format})
 
 
 @app.command()
@@ -146,17 +146,18 @@ def _guess(path: Path, common: Common) -> None:
         sys.stdout.write(drafted.text)
 
 
-def _go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any]) -> None:
+def _go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],
+        fallback: dict[str, Any] | None = None) -> None:
     """Run one stage as the options say, print its outcome, and end with its exit code."""
     from pipelines.stage import Request, run_stage
     from rrrid_cli.settings import make_settings
 
-    if common.format not in ("h5", "parquet"):
+    if common.format not in (None, "h5", "parquet"):
         raise UsageError("C02", f"'{common.format}' is no container", where="--format", remedy="h5 or parquet")
-    settings = make_settings(stage.settings, stage.name, STAGES, common.config, common.set, given)
+    settings = make_settings(stage.settings, stage.name, STAGES, common.config, common.set, given, fallback)
     teller = Teller(common.quiet or common.json, common.verbose)
     request = Request(paths, common.out, common.robot, common.strict, common.check, common.force, common.no_report,
-                      common.assume_units, common.format, teller)
+                      common.assume_units, common.format or "h5", teller, common.joints)
     try:
         outcome = run_stage(stage, request, settings)
     finally:

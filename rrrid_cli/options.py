@@ -28,7 +28,7 @@ class Common:
     check: bool
     robot: str | None
     assume_units: bool
-    format: str
+    format: str | None
     config: Path | None
     set: list[str]
     no_report: bool
@@ -36,6 +36,15 @@ class Common:
     quiet: bool
     verbose: bool
     debug: bool
+    joints: tuple[int, ...] = ()
+
+
+def _joints(text: str | None) -> tuple[int, ...]:
+    """"1,3" as joints, counted from 1."""
+    parts = text.split(",") if text is not None else []
+    if not all(part.strip().isascii() and part.strip().isdigit() and len(part.strip()) < 5 for part in parts):
+        raise UsageError("C02", f"'{text}' is no list of joints", where="--joints", remedy="write for example 1,3")
+    return tuple(int(part) for part in parts)
 
 
 def numbers(texts: list[str] | None, where: str) -> tuple[float, ...] | None:
@@ -60,29 +69,34 @@ _SHARED: tuple[tuple[str, Any, Any], ...] = (
     ("check", Annotated[bool, _flag("Exit 1 where a gate failed or something was found.", "--check")], False),
     ("robot", Annotated[str | None, _flag("Robot description to use instead of the logs' own.", "--robot")], None),
     ("assume_units", Annotated[bool, _flag("Take signals without units as SI.", "--assume-units")], False),
-    ("format", Annotated[str, _flag("Container of the logs that are written: h5 or parquet.", "--format")], "h5"),
+    ("format", Annotated[str | None, _flag("Container of the logs that are written: h5 or parquet. [h5]", "--format")], None),
     ("config", Annotated[Path | None, _flag("TOML file of settings, one table a stage.", "--config")], None),
     ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable.", "--set")], []),
     ("no_report", Annotated[bool, _flag("Leave report and figures out.", "--no-report")], False),
-    ("force", Annotated[bool, _flag("Replace rrrid's own earlier output even where files were added to it.", "--force")], False),
+    ("force", Annotated[bool, _flag("Replace rrrid's own earlier output even where files were changed.", "--force")], False),
     ("quiet", Annotated[bool, _flag("Print nothing but errors.", "-q", "--quiet")], False),
     ("verbose", Annotated[bool, _flag("Say every step.", "-v", "--verbose")], False),
     ("debug", Annotated[bool, _flag("Show the traceback of an internal error.", "--debug")], False),
 )
 
 
+# Of the commands that read logs.
+_JOINTS = ("joints", Annotated[str | None, _flag("Joints to take of every log: 1,3. With --robot, where it is another arm.",
+                                                  "--joints")], None)
+
+
 def with_common(command: Callable[..., None]) -> Callable[..., None]:
     """`command(own options…, common)` as a command that takes the shared options as well."""
     own = inspect.signature(command, eval_str=True)
-    names = [name for name, _, _ in _SHARED]
+    options = (*_SHARED, _JOINTS) if "logs" in own.parameters else _SHARED
     shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
-              for name, kind, default in _SHARED]
+              for name, kind, default in options]
     kept = [p for p in own.parameters.values() if p.name != "common"]
 
     @functools.wraps(command)
     def run(**given: Any) -> None:
-        common = Common(**{name: given.pop(name) for name in names})
-        command(**given, common=common)
+        said = {name: given.pop(name) for name, _, _ in options}
+        command(**given, common=Common(**(said | {"joints": _joints(said.get("joints"))})))
 
     parameters = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in kept] + shared
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]

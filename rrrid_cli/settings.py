@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+import sys
 import tomllib
 import types
 import typing
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pipelines.errors import UsageError, did_you_mean
+from pipelines.log.text import read_small_text
 
 __all__ = ["make_settings"]
 
@@ -19,18 +21,20 @@ S = TypeVar("S")
 
 
 def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path | None, sets: Iterable[str],
-                  given: Mapping[str, Any]) -> S:
+                  given: Mapping[str, Any], fallback: Mapping[str, Any] | None = None) -> S:
     """`kind` filled in; the last word has what was given on the command line.
 
     Args:
-        stage: the command's name; only its table of the configuration is used.
+        stage: the command's name. Its table of the configuration is used; the others are checked all the same, and
+            `run` hands them to its stages.
         stages: every known name, for a hint where one is misspelt.
         given: the command's own options; None means: not given.
+        fallback: what holds where nothing else was said; None means: nothing.
 
     Raises:
         UsageError: C01, an unknown stage or option; C02, a value of the wrong kind or range; C04, no such file.
     """
-    chosen: dict[str, Any] = {}
+    chosen: dict[str, dict[str, Any]] = {}
     for where, table in (*_from_file(config), *_from_sets(sets)):
         for name, options in table.items():
             if name not in stages:
@@ -39,19 +43,33 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
             if not isinstance(options, Mapping):
                 raise UsageError("C01", f"'{name}' is a stage, not an option", where=where,
                                  remedy=f"write [{name}] and its options below")
-            if name == stage:
-                chosen |= {key: _value(kind, key, value, f"{where}, {name}.{key}") for key, value in options.items()}
-    return kind(**(chosen | {key: value for key, value in given.items() if value is not None}))
+            owner = kind if name == stage else _settings_of(name)
+            chosen.setdefault(name, {}).update(
+                {key: _value(owner, key, value, f"{where}, {name}.{key}") for key, value in options.items()})
+    own = _said(fallback or {}) | chosen.pop(stage, {}) | _said(given)
+    if stage == "run":
+        own["stages"] = {name: _settings_of(name)(**options) for name, options in chosen.items()}
+    return kind(**own)
+
+
+def _said(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in options.items() if value is not None}
+
+
+def _settings_of(stage: str) -> type[Any]:
+    """The settings of a stage by its command's name."""
+    module = "import_log" if stage == "import" else stage.replace("-", "_")  # `import` is a word of the language
+    kind: type[Any] = import_module(f"pipelines.{module}").STAGE.settings
+    return kind
 
 
 def _from_file(path: Path | None) -> list[tuple[str, dict[str, Any]]]:
     if path is None:
         return []
+    text = read_small_text(path, what="a TOML file of settings")
     try:
-        return [(str(path), tomllib.loads(path.read_text(encoding="utf-8")))]
-    except OSError as problem:
-        raise UsageError("C04", f"cannot be read: {problem.strerror}", where=path, remedy="check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
+        return [(str(path), tomllib.loads(text))]
+    except (tomllib.TOMLDecodeError, RecursionError) as problem:
         raise UsageError("C03", f"not valid TOML: {problem}", where=path, remedy="settings are TOML; YAML is not read") from None
 
 
@@ -72,8 +90,8 @@ def _from_sets(sets: Iterable[str]) -> list[tuple[str, dict[str, Any]]]:
 
 def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
     hints = typing.get_type_hints(kind)
-    if name not in hints:
-        known = [field.name for field in dataclasses.fields(kind)]
+    known = [field.name for field in dataclasses.fields(kind) if field.metadata.get("option", True)]
+    if name not in known:
         raise UsageError("C01", f"no such option{did_you_mean(name, known)}", where=where,
                          remedy=f"there are: {', '.join(known) or 'none'}")
     wanted = hints[name]
@@ -90,7 +108,8 @@ def _as_kind(kind: Any, value: Any) -> tuple[bool, Any]:
     if kind is bool or isinstance(value, bool):
         return kind is bool and isinstance(value, bool), value
     if kind is float:
-        fits = isinstance(value, int | float) and math.isfinite(value)
+        # Integers have no bound in TOML, floats do.
+        fits = isinstance(value, int | float) and -sys.float_info.max <= value <= sys.float_info.max
         return fits, float(value) if fits else value
     if kind in (int, str):
         return isinstance(value, kind), value
