@@ -176,12 +176,12 @@ def tune_smoother(y: Array, sample_time: float, resolution: Array | float, order
         d = np.diff(values, n=order)
         taper = np.sin(np.pi * (np.arange(len(d)) + 0.5) / len(d)) ** 2
         power = np.abs(np.fft.rfft(d * taper)) ** 2 / (taper**2).sum()
-        w = 4.0 * np.sin(np.pi * np.fft.rfftfreq(len(d))) ** 2
-        numerator = stationary(order, np.ones(1)).numerator(w)
-        grid = np.geomspace(min((8.0 * 37.0 / len(values)) ** order, 1e-2), 1e4, 60)
-        for _ in range(2):
-            left = w**order + grid[:, None] ** 2 * numerator
-            rest, free = (w**order / left**2 * power).mean(axis=1), (w**order / left).mean(axis=1)
+        w = 4.0 * np.sin(np.pi * np.fft.rfftfreq(len(d))[1:]) ** 2  # at zero frequency the smoother leaves nothing
+        passed, weight = stationary(order, np.ones(1)).numerator(w) / w**order, power[1:] / w**order
+        grid = np.geomspace(min((8.0 * 37.0 / len(values)) ** order, 1e-2), 1e4, 30)
+        for _ in range(3):
+            left = 1.0 / (1.0 + np.multiply.outer(grid**2, passed))  # 1 - G
+            free, rest = left.sum(axis=1) / len(power), np.square(left, out=left) @ weight / len(power)
             best = int(np.argmin(rest / free**2))
             index, ratio = float(grid[best]), grid[1] / grid[0]
             grid = np.geomspace(index / ratio, index * ratio, 13)
