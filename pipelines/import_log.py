@@ -3,6 +3,10 @@
 Reads    a recipe (TOML, `pipelines.log.recording.recipe`) and the recorded files its patterns match
 Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet for maps without a clock, result.json, report.html
 Source   log-format.md; transmission and torque constants as `pipelines.log.recording.joint_side` says
+
+A log whose samples were altered (repaired, unwrapped, resampled) is a derived log. Its attribute `created` is the time of the
+recording where the recipe says it; otherwise 1970-01-01T00:00:00Z, which means "not known": the hour of the import would make
+equal inputs unequal. provenance.json has that hour.
 """
 
 from __future__ import annotations
@@ -94,7 +98,8 @@ def read(request: Request, settings: Settings) -> Inputs:
         raise UsageError("C02", "no recipe", where="rrrid import", remedy="name one, or draft one with --guess FILE")
     material = collect(settings.recipe, settings.source, request.robot, request.tell)
     material = replace(material, assume_units=request.assume_units, ending=request.format)
-    return Inputs(sources=material.paths, material=material, label=material.folder.absolute().name, robot_name=material.robot.name)
+    return Inputs(sources=material.paths, hashes=material.hashes, material=material,
+                  folders=(settings.source,) if settings.source else (), label=material.folder.absolute().name, robot_name=material.robot.name)
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:

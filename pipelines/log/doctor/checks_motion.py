@@ -32,8 +32,8 @@ def degrees(s: Subject) -> list[Check]:
         fits = reach * _DEGREE <= 1.1 * bounds and speed[j] * _DEGREE <= 1.1 * joint.velocity
         if reach > 4.0 * np.pi and beyond and fits:
             found.append(s.say("S07", "reject",
-                               f"q of joint {j + 1} is declared in rad, but looks like degrees: it reaches {reach:.4g} at "
-                               f"up to {speed[j]:.4g} a second, beyond the limits in rad and within them in deg",
+                               f"q of joint {j + 1} is declared in rad, but looks like degrees: it reaches {reach:.4g} "
+                               f"at up to {speed[j]:.4g} a second, beyond the limits in rad and within them in deg",
                                signal="q", joint=j,
                                remedy="declare the unit deg, or pass --trust-units"))
     travel = ", ".join(f"{v:.3g}" for v in s.travel)
@@ -69,8 +69,8 @@ def limits(s: Subject) -> list[Check]:
                                    f"the {what} reaches {value:.4g} {unit}, {value / limit:.3g} times its limit",
                                    signal="q", joint=j, gate=value > 1.5 * limit,
                                    remedy="move slower, or correct the limit"))
-    return found or s.ok("D12", "within the limits; speed at most " + ", ".join(f"{v:.3g}" for v in speed) + " rad/s, acceleration "
-                         + ", ".join(f"{v:.3g}" for v in acceleration) + " rad/s^2", signal="q")
+    fastest, hardest = (", ".join(f"{v:.3g}" for v in values) for values in (speed, acceleration))
+    return found or s.ok("D12", f"within the limits; speed at most {fastest} rad/s, acceleration {hardest} rad/s^2", signal="q")
 
 
 def _peak_acceleration(s: Subject) -> Array:
@@ -101,8 +101,8 @@ def held_joints(s: Subject) -> list[Check]:
                    signal="q", joint=j, gate=True,
                    remedy="hold it stiffer, or call the experiment 'free'")
              for j in range(log.n_joints) if j != mover and s.travel[j] > allowed]
-    return found or s.ok("D16", "held joints move by at most " + format(max(
-        (float(s.travel[j]) for j in range(log.n_joints) if j != mover), default=0.0), ".3g") + " rad", signal="q")
+    most = max((float(s.travel[j]) for j in range(log.n_joints) if j != mover), default=0.0)
+    return found or s.ok("D16", f"held joints move by at most {most:.3g} rad", signal="q")
 
 
 def follows_reference(s: Subject) -> list[Check]:
@@ -123,8 +123,8 @@ def follows_reference(s: Subject) -> list[Check]:
         if share > 0.5:
             found.append(s.say("S16", "reject" if share > 0.8 else "warn",
                                f"position and reference differ by {100 * share:.0f} % of the motion "
-                               f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): they are not of the same run, or not "
-                               "of the same joint",
+                               f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): "
+                               "they are not of the same run, or not of the same joint",
                                signal="q_ref", joint=int(j), gate=True,
                                remedy="log both in one recorder, or leave the reference out"))
     within = f" within {', '.join(seen)} of the motion" if seen else ""

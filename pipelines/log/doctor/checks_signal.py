@@ -9,7 +9,7 @@ from pipelines.log import schema
 from pipelines.log.doctor.checks_subject import Subject, many, spread
 from pipelines.log.doctor.faults import torque_limit
 from pipelines.log.doctor.segments import long_blocks
-from pipelines.log.limits import ABSURD, GAP_LIMIT, sentinels
+from pipelines.log.limits import ABSURD, GAP_LIMIT, percent, sentinels
 
 __all__ = ["SIGNAL_CHECKS"]
 
@@ -38,8 +38,8 @@ def missing_samples(s: Subject) -> list[Check]:
                                    remedy="look at this channel's cable and its place in the recorder, and record again"))
             elif blocks:
                 found.append(s.say("D02", "repair",
-                                   f"{total} samples of {name} are missing, {len(blocks)} times more than {GAP_LIMIT} in a "
-                                   "row; the log is split there",
+                                   f"{total} samples of {name} are missing, {len(blocks)} times more than "
+                                   f"{GAP_LIMIT} in a row; the log is split there",
                                    signal=name, joint=j, sample=first,
                                    remedy="look at this channel's cable, and record again"))
             else:
@@ -125,8 +125,8 @@ def saturation(s: Subject) -> list[Check]:
         described = torque_limit(s.log)[j]
         limit = f"the described limit of {described:.4g}" if level >= 0.99 * described else f"a flat top at {level:.4g}"
         found.append(s.say("D05", "warn",
-                           f"{100 * share:.2g} % of the torque samples lie at {limit} {s.unit('tau', j)}; they are left out "
-                           "of fits",
+                           f"{percent(share, 2)} of the torque samples lie at {limit} {s.unit('tau', j)}; "
+                           "they are left out of fits",
                            signal="tau", joint=j, sample=int(s.good.kept[np.argmax(flags[:, j])]), gate=share > 0.05,
                            remedy="move slower or with less acceleration; a saturated drive hides what the arm needs"))
     if found:
@@ -161,8 +161,8 @@ def wraps(s: Subject) -> list[Check]:
         if (at := np.flatnonzero(jumped[:, j])).size:
             by = s.good.log.q[at[0], j] - s.good.log.q[at[0] - 1, j]
             found.append(s.say("D07", "warn",
-                               f"the position jumps {many(at.size, 'time')}, first by {by:.4g} {unit}, which is no turn and "
-                               "no counter's range; the log is split there",
+                               f"the position jumps {many(at.size, 'time')}, first by {by:.4g} {unit}, "
+                               "which is no turn and no counter's range; the log is split there",
                                signal="q", joint=j, sample=int(s.good.kept[at[0]]), gate=True,
                                remedy="look at the encoder: it loses counts"))
     return found or s.ok("D07", "the position neither wraps nor jumps", signal="q")
@@ -182,8 +182,8 @@ def resolution(s: Subject) -> list[Check]:
         if too_coarse and np.unique(s.good.log.q[np.isfinite(s.good.log.q[:, j]), j]).size >= 50:
             said = f"the description says {declared:.3g}" if declared else f"only {s.travel[j] / step:.0f} steps in all"
             found.append(s.say("D08", "warn",
-                               f"the encoder counts in steps of {step:.3g} {s.unit('q', j)}, {said}; noise is set to R = "
-                               f"δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}^2 from the data",
+                               f"the encoder counts in steps of {step:.3g} {s.unit('q', j)}, {said}; "
+                               f"noise is set to R = δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}^2 from the data",
                                signal="q", joint=j,
                                remedy="correct encoder_resolution, or look for bits lost on the way"))
     return found or s.ok("D08", f"encoder steps: {', '.join(seen)}", signal="q")

@@ -51,22 +51,22 @@ def unit_of_time(s: Subject) -> list[Check]:
     time, nominal = s.good.time, s.log.sample_time
     if time.is_rate:
         return [s.say("S09", "reject",
-                      f"sample_time is {nominal:.6g}, the steps of t are {time.median:.6g} s: it holds the rate in Hz, not "
-                      "the period",
+                      f"sample_time is {nominal:.6g}, the steps of t are {time.median:.6g} s: "
+                      "it holds the rate in Hz, not the period",
                       signal="t",
                       remedy=f"write sample_time = {1.0 / nominal:.6g}")]
     if not time.unit:
         return [s.say("S08", "reject",
-                      f"t steps by {time.median:.6g}, sample_time is {nominal:.6g} s, and no unit of time makes them the "
-                      "same",
+                      f"t steps by {time.median:.6g}, sample_time is {nominal:.6g} s, "
+                      "and no unit of time makes them the same",
                       signal="t",
                       remedy="correct sample_time, or import the recording with the unit of its time column")]
     if time.unit == "s":
         return s.ok("S08", f"t steps by {time.median:.6g} s, as sample_time says", signal="t")
     what = "sample numbers" if time.unit == "samples" else f"in {time.unit}"
     return [s.say("S08", "repair",
-                  f"t is declared in s, but is {what}: it steps by {time.median / time.scale:.6g} where sample_time is "
-                  f"{nominal:.6g} s; read as that",
+                  f"t is declared in s, but is {what}: it steps by {time.median / time.scale:.6g} "
+                  f"where sample_time is {nominal:.6g} s; read as that",
                   signal="t",
                   remedy="import the recording with the unit of its time column")]
 
@@ -76,8 +76,8 @@ def order(s: Subject) -> list[Check]:
     time, found = s.good.time, []
     if time.undefined.size:
         found.append(s.say("D01", "repair" if time.undefined.size <= 0.01 * s.log.n_samples else "reject",
-                           f"{many(time.undefined.size, 'stamp')} in t without a time, the first is sample "
-                           f"{time.undefined[0]}; left out",
+                           f"{many(time.undefined.size, 'stamp')} in t without a time, "
+                           f"the first is sample {time.undefined[0]}; left out",
                            signal="t",
                            remedy="look why the recorder lost its clock there"))
     if time.steps.size:
@@ -143,11 +143,11 @@ def gaps(s: Subject) -> list[Check]:
 def jitter(s: Subject) -> list[Check]:
     """T05: samples come at even intervals."""
     time = s.good.time
-    words = f"the interval varies by {percent(time.jitter)} of the sample time (rms), at most by {percent(time.worst)}"
+    words = f"the interval varies: rms {percent(time.jitter)}, at most {percent(time.worst)} of the sample time"
     if time.jitter <= LARGEST_JITTER:
         return s.ok("T05", words, signal="t")
     return [s.say("T05", "warn",
-                  f"{words}, more than {percent(LARGEST_JITTER)}",
+                  f"{words}; more than {percent(LARGEST_JITTER)} rms",
                   signal="t",
                   remedy="sample by a timer; a frequency response needs even sampling")]
 
@@ -162,8 +162,8 @@ def band(s: Subject) -> list[Check]:
     rate = 1.0 / s.log.sample_time
     if slow and s.log.experiment != "frf":
         return [s.say("T09", "reject",
-                      f"a rate of {rate:.4g} Hz is too low for this motion: fewer than ten samples in its period, the speed "
-                      "between them is lost",
+                      f"a rate of {rate:.4g} Hz is too low for this motion: fewer than ten samples in its period, "
+                      "the speed between them is lost",
                       signal="q", joint=j,
                       remedy="record faster; ten times the highest frequency at least")
                 for j in slow]
