@@ -49,7 +49,7 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
 
     try:
         table = _dated(tomllib.loads(text), where)
-    except (tomllib.TOMLDecodeError, RecursionError) as problem:
+    except (ValueError, RecursionError) as problem:
         raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where,
                          remedy="correct that line; strings stand in quotes, tables in [ ]") from None
     if "where" in table:
@@ -62,6 +62,7 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
         raise UsageError("C02", "the recipe is nested too deeply", where=where,
                          remedy="rrrid import --guess FILE drafts a recipe") from None
     _bounds(recipe, where)
+    _format(recipe.format, where)
     _meaning(recipe, where)
     return recipe
 
@@ -141,7 +142,10 @@ def _below(value: object, path: str, key: str) -> Iterator[tuple[str, str, float
     elif is_dataclass(value):
         yield from _numbers(value, path)
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield path, key, float(value)
+        try:
+            yield path, key, float(value)
+        except OverflowError:  # an integer of hundreds of digits
+            yield path, key, math.inf
 
 
 def _bounds(recipe: Recipe, where: object) -> None:
@@ -161,6 +165,32 @@ def _bounds(recipe: Recipe, where: object) -> None:
         if key in ("joint", "column", "columns") and (number < 1 or number != int(number)):
             raise UsageError("C02", f"'{path}' is {number}, must be 1 or more", where=where,
                              remedy="joints and columns count from 1")
+
+
+def _format(form: TextFormat | None, where: object) -> None:
+    """C02: delimiter, decimal sign, encoding and comment are such that a text can have."""
+    if form is None:
+        return
+    wrong = {
+        "delimiter": bool(form.delimiter) and (len(str(form.delimiter)) != 1 or str(form.delimiter) in "\0\r\n.\"'"
+                                               or str(form.delimiter).isalnum()),
+        "decimal": form.decimal not in (None, ".", ","),
+        "encoding": form.encoding is not None and not _known_encoding(form.encoding),
+        "comment": form.comment is not None and (not form.comment or any(c in form.comment for c in "\0\r\n")),
+    }
+    remedies = {"delimiter": "one character: , ; tab or blank", "decimal": "'.' or ','", "encoding": "for example utf-8 or latin-1",
+                "comment": "the characters that begin a comment"}
+    for key, bad in wrong.items():
+        if bad:
+            raise UsageError("C02", f"'format.{key}' is {getattr(form, key)!r}", where=where, remedy=f"give {remedies[key]}")
+
+
+def _known_encoding(name: str) -> bool:
+    try:
+        "0".encode(name)
+    except (LookupError, ValueError, TypeError):
+        return False
+    return True
 
 
 def _meaning(recipe: Recipe, where: object) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from pipelines.log.recording.repair import Recording
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Drive, RobotDescription, parse_robot
 from pipelines.log.robot_files import load_robot
+from pipelines.log.text import read_small_text
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 
@@ -53,6 +54,7 @@ class Material:
     paths: tuple[Path, ...] = ()
     assume_units: bool = False
     ending: str = "h5"  # of the logs to be written: "h5" | "parquet"
+    hashes: Mapping[Path, str] = field(default_factory=dict)  # SHA-256 of the bytes that were read
 
 
 def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tell: Callable[[str], None]) -> Material:
@@ -62,10 +64,7 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
         NothingMatched: C06, no file fits. UsageError, InputRejected, EnvironmentFault: as the readers say.
     """
     path = find_recipe(recipe_name)
-    try:
-        recipe = replace(parse_recipe(path.read_text(encoding="utf-8"), path), where=str(path))
-    except (OSError, UnicodeDecodeError) as problem:
-        raise UsageError("C04", f"cannot be read: {problem}", where=path, remedy="give a recipe, a TOML file") from None
+    recipe = replace(parse_recipe(read_small_text(path, what="a recipe, a TOML file"), path), where=str(path))
     folder = source if source else path.parent
     arm, described = _robot(recipe, folder, path, robot)
     drive = drive_of(recipe.drive, arm, path)
@@ -91,7 +90,8 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
                              remedy="give the folder of the recordings with --source")
     return Material(recipe, path, folder, replace(arm, drive=drive), drive, tuple(sources), tuple(tables),
                     tuple(name for name in names if name not in read and Path(name).suffix.lower() in _RECORDINGS),
-                    (path, *described, *(folder / name for name in read)))
+                    (path, *described, *(folder / name for name in read)),
+                    hashes={folder / name: table.sha256 for name, table in read.items()})
 
 
 def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] | None:
