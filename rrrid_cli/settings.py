@@ -69,7 +69,7 @@ def _from_file(path: Path | None) -> list[tuple[str, dict[str, Any]]]:
     text = read_small_text(path, what="a TOML file of settings")
     try:
         return [(str(path), tomllib.loads(text))]
-    except (tomllib.TOMLDecodeError, RecursionError) as problem:
+    except (ValueError, RecursionError) as problem:
         raise UsageError("C03", f"not valid TOML: {problem}", where=path, remedy="settings are TOML; YAML is not read") from None
 
 
@@ -82,7 +82,7 @@ def _from_sets(sets: Iterable[str]) -> list[tuple[str, dict[str, Any]]]:
             raise UsageError("C01", f"'{text}' is not STAGE.OPTION=VALUE", where="--set", remedy="write for example convert.to=csv")
         try:
             parsed: Any = tomllib.loads(f"x = {value}")["x"]
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):
             parsed = value.strip()  # a bare word is a text
         found.append(("--set", {stage: {option: parsed}}))
     return found

@@ -161,7 +161,7 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     fail: type[RrridError] = InputRejected if inside_log else UsageError
     try:
         table = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as problem:
+    except (ValueError, RecursionError) as problem:
         raise fail("C01", f"the robot description is not valid TOML: {problem}", where=where,
                    remedy="correct it at that place") from None
     top = _Reader(table, "", fail, str(where))

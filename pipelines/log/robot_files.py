@@ -50,7 +50,7 @@ def _table_of(text: str) -> dict[str, Any]:
     """The table of a TOML text; empty where it is none, which `parse_robot` says better."""
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return {}
 
 
