@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import Check, Level
+from pipelines.log.codes import title_of
 from pipelines.report import figures
 from pipelines.report.report import Figure, Table, Tone
 
@@ -34,7 +35,7 @@ def checks_table(checks: Iterable[Check], caption: str = "") -> Table:
     """What was checked and found, the worst first."""
     ordered = sorted(checks, key=lambda check: _ORDER.index(check.level))
     return Table(columns=("result", "what was found", "where", "what to do", "code"),
-                 rows=tuple((_RESULTS[check.level], check.message, check.where, check.remedy, check.code)
+                 rows=tuple((_RESULTS[check.level], check.message, check.where, check.remedy, f"{check.code} {title_of(check.code)}".strip())
                             for check in ordered),
                  caption=caption, tones=tuple(_TONES[check.level] for check in ordered))
 
