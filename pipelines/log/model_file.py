@@ -146,11 +146,12 @@ def read_model(source: str | Path) -> ModelFile:
     if not path.exists():
         path = shipped("models", str(source))
     if (size := regular_file(path).st_size) > _LARGEST:
-        raise InputRejected("S18", f"{size} bytes are too many for a model file", where=path)
+        raise InputRejected("S18", f"{size} bytes are too many for a model file", where=path,
+                            remedy="give a model.json")
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
-        raise InputRejected("S18", f"the model file cannot be read: {problem}", where=path) from None
+        raise InputRejected("S18", f"the model file cannot be read: {problem}", where=path, remedy="give a model.json") from None
     return parse_model(text, where=path)
 
 
@@ -163,7 +164,8 @@ def parse_model(text: str, where: object = "") -> ModelFile:
     from pydantic import ValidationError
 
     def wrong(what: str) -> NoReturn:
-        raise InputRejected("S18", f"not a model file: {what}", where=where)
+        raise InputRejected("S18", f"not a model file: {what}", where=where,
+                            remedy="write the model again, or correct it by the schema: rrrid schema model")
 
     def once(pairs: list[tuple[str, object]]) -> dict[str, object]:
         keys = [key for key, _ in pairs]

@@ -190,7 +190,8 @@ def _stored(acting: Acting) -> StoredEffect:
 def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: object) -> Acting:
     if stored.effect not in effect_names():
         raise InputRejected("S18", f"{kind}: '{stored.effect}' is not an effect that this version knows"
-                            f"{did_you_mean(stored.effect, effect_names())}", where=where)
+                            f"{did_you_mean(stored.effect, effect_names())}", where=where,
+                            remedy="update rrrid, or correct the name")
     effect = find_effect(stored.effect)
     if stored.joint not in (range(1, len(revolute) + 1) if effect.scope == "joint" else (None,)):
         raise InputRejected("S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where,
@@ -200,7 +201,8 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
     given = [(q, q.unit_at(kind_of_joint), stored.parameters[q.name]) for q in effect.parameters]
     parameters = tuple(Parameter(q.name, v.value, v.std, v.unit, (q.low, q.high), v.origin) for q, _, v in given)
     if wrong := [f"{q.name} in {v.unit}, not {unit}" for q, unit, v in given if v.unit != unit]:
-        raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(wrong)}", where=where)
+        raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(wrong)}", where=where,
+                            remedy="write the values in those units")
     return Acting(effect(joint=stored.joint).at({p.name: p.value for p in parameters}), parameters)
 
 
@@ -209,6 +211,6 @@ def _same_names(given: Iterable[str], wanted: list[str], what: str, where: objec
     for name in names:
         if name not in wanted:
             raise InputRejected("S18", f"{what}: no parameter is called '{name}'{did_you_mean(name, wanted)}",
-                                where=where)
+                                where=where, remedy="rename or remove it")
     if missing := [name for name in wanted if name not in names]:
-        raise InputRejected("S18", f"{what}: {', '.join(missing)} missing", where=where)
+        raise InputRejected("S18", f"{what}: {', '.join(missing)} missing", where=where, remedy="write them")

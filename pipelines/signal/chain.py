@@ -91,7 +91,7 @@ def stationary(order: int, tracking_index: Array) -> Stationary:
         raise UsageError("C02", f"an observer of order {order} is not known", remedy="choose order 2, 3 or 4")
     index = np.atleast_1d(np.asarray(tracking_index, dtype=np.float64))
     if not (np.all(np.isfinite(index)) and np.all(index > 0.0)):
-        raise UsageError("C02", "jerk level, noise and sample time of an observer must be positive numbers")
+        raise UsageError("C02", "jerk level, noise and sample time of an observer must be positive numbers", remedy="correct them")
     delta = _inside(_spectral_roots(order, index))
     step = np.minimum(1.0, index ** (1.0 / order))
     unit = transition(order, np.ones(1))[0]

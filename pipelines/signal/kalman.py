@@ -53,9 +53,10 @@ class Textbook:
 
     def _check(self, t: Array, y: Array) -> None:
         if len(t) != len(y) or y.ndim != 1:
-            raise UsageError("C02", f"one channel at a time: {t.shape} times, measurement of shape {y.shape}")
+            raise UsageError("C02", f"one channel at a time: {t.shape} times, measurement of shape {y.shape}",
+                             remedy="give one column at a time")
         if len(y) < 2:
-            raise InputRejected("T08", f"{len(y)} samples: nothing can be reconstructed")
+            raise InputRejected("T08", f"{len(y)} samples: nothing can be reconstructed", remedy="record at least two samples")
         if not (np.isfinite(t).all() and np.all(np.diff(t) > 0.0)):
             raise InputRejected("T01", "time does not increase", remedy="split the log at the step of its clock")
         if np.isinf(y).any():

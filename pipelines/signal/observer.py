@@ -155,7 +155,8 @@ def design(sample_time: float, jerk_std: Array | float, noise_variance: Array | 
     sigma, variance = np.broadcast_arrays(np.atleast_1d(np.asarray(jerk_std, dtype=np.float64)),
                                           np.asarray(noise_variance, dtype=np.float64))
     if not (sample_time > 0.0 and np.all(sigma > 0.0) and np.all(variance > 0.0)):
-        raise UsageError("C02", "sample time, jerk level and measurement noise of an observer must be positive numbers")
+        raise UsageError("C02", "sample time, jerk level and measurement noise of an observer must be positive numbers",
+                         remedy="correct them")
     index = sigma * sample_time**order / np.sqrt(variance)
     return Observer(sample_time, sigma.copy(), variance.copy(), stationary(order, index))
 
@@ -180,7 +181,8 @@ def observe(y: Array, observer: Observer, start: Start | None = None, out: Array
 
 def checked(y: Array, observer: Observer) -> tuple[int, int]:
     if y.ndim != 2 or y.shape[1] != len(observer.jerk_std):
-        raise UsageError("C02", f"the observer has {len(observer.jerk_std)} channels, the measurement has shape {y.shape}")
+        raise UsageError("C02", f"the observer has {len(observer.jerk_std)} channels, the measurement has shape {y.shape}",
+                         remedy="tune the observer on the same joints")
     if len(y) < 2:
         raise InputRejected("T08", f"{len(y)} samples: nothing can be reconstructed", remedy="record at least two samples")
     return y.shape

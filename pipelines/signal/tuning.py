@@ -53,7 +53,8 @@ class Tuned:
 def paper_rule(reference: Array, sample_time: float, order: int = 3) -> Array:
     """σ = largest highest derivative of the reference (samples, channels). Kostić et al. 2004, sec. IV-C.2, after its [34]."""
     if len(reference) <= order:
-        raise InputRejected("T08", f"{len(reference)} samples of a reference have no derivative of order {order}")
+        raise InputRejected("T08", f"{len(reference)} samples of a reference have no derivative of order {order}",
+                            remedy="give a longer reference")
     return np.asarray(np.nanmax(np.abs(np.diff(reference, n=order, axis=0)), axis=0) / sample_time**order)
 
 

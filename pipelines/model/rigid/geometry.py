@@ -114,7 +114,7 @@ def _urdf(robot: RobotDescription) -> tuple[tuple[Placement, ...], tuple[Placeme
     arm = chain_from_urdf(robot.urdf_text or "", robot.tip_link)
     if len(arm.joints) != robot.n_joints:
         raise InputRejected("S02", f"the robot description lists {robot.n_joints} joints, its URDF moves "
-                                   f"{len(arm.joints)}", where=robot.name)
+                                   f"{len(arm.joints)}", where=robot.name, remedy="describe each moving joint once")
     before, after = [], []
     for mine, joint in zip(robot.joints, arm.joints, strict=True):
         if mine.revolute == joint.prismatic:
