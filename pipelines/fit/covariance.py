@@ -126,6 +126,7 @@ def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
 def _noise(equations: Iterable[Block], solution: Solution, length: int) -> tuple[_Noise, _Transformed | None]:
     """The residual's cross-spectrum; also the transformed block where there is only one."""
     channels, samples, blocks = len(solution.sigma), 0, 0
+    counts = np.zeros(channels)
     cross = np.zeros((channels, channels, length // 2 + 1), dtype=np.complex128)
     leverage = np.zeros((channels, length // 2 + 1))
     for block in equations:
@@ -133,14 +134,15 @@ def _noise(equations: Iterable[Block], solution: Solution, length: int) -> tuple
         cross += spectrum[:, None] * np.conj(spectrum)
         transformed = _transform(block, length)
         leverage += _leverage(transformed, solution)
-        samples, blocks = samples + block.samples, blocks + 1
-    cross /= samples
+        samples, blocks, counts = samples + block.samples, blocks + 1, counts + block.counts
+    counts = np.maximum(counts, 1.0)
+    cross /= np.sqrt(counts[:, None] * counts)[:, :, None]  # equations left out have no noise
     gamma = np.fft.irfft(cross[np.arange(channels), np.arange(channels)], length, axis=1)
     fits = [_autoregression(g, samples, min(_ORDER, samples // 20)) for g in gamma]
     shape = np.array([1.0 / np.fft.rfft(a, length) for a in fits])
     orders = tuple(len(a) - 1 for a in fits)
     edges = _edges(cross.shape[2], max(1, _BINS * length // max(samples, length)))
-    left = np.sqrt(1.0 - np.minimum(_mean(leverage / samples, edges), _MOST_TAKEN))
+    left = np.sqrt(1.0 - np.minimum(_mean(leverage / counts[:, None], edges), _MOST_TAKEN))
     flat = cross / (shape[:, None] * np.conj(shape))
     mean = _mean(flat, edges) / (left[:, None] * left)
     together = _correlated(flat, mean, length, samples)

@@ -19,6 +19,7 @@ __all__ = ["Array", "Block", "Chosen", "Indices", "rows_of", "split"]
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
+Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class Block:
     columns: tuple[Indices, ...]  # of each channel, (k_j,): the parameters that act on it, increasing or not
     values: tuple[Array, ...]  # of each channel, (k_j, samples): their columns, samples fastest
     y: tuple[Array, ...]  # of each channel, (samples,)
+    used: tuple[Flags, ...] | None = None  # of each channel (samples,): equations left out are zero throughout; None: all count
 
     @property
     def channels(self) -> int:
@@ -37,6 +39,13 @@ class Block:
     @property
     def samples(self) -> int:
         return len(self.y[0])
+
+    @property
+    def counts(self) -> Indices:
+        """(channels,) equations that count."""
+        if self.used is None:
+            return np.full(self.channels, self.samples)
+        return np.array([np.count_nonzero(used) for used in self.used])
 
     @classmethod
     def of(cls, Y: Array, y: Array, acting: npt.NDArray[np.bool_] | None = None) -> Block:
@@ -69,7 +78,7 @@ class Chosen:
             place[list(self.columns)] = np.arange(len(self.columns))
             kept = [place[index] >= 0 for index in block.columns]
             yield Block(len(self.columns), tuple(place[index][k] for index, k in zip(block.columns, kept, strict=True)),
-                        tuple(v if k.all() else v[k] for v, k in zip(block.values, kept, strict=True)), block.y)
+                        tuple(v if k.all() else v[k] for v, k in zip(block.values, kept, strict=True)), block.y, block.used)
 
 
 def rows_of(table: Array, index: Indices) -> Array:
@@ -85,4 +94,4 @@ def split(equations: Iterable[Block], samples: int) -> Iterator[Block]:
         for first in range(0, block.samples, samples):
             part = slice(first, first + samples)
             yield Block(block.width, block.columns, tuple(v[:, part] for v in block.values),
-                        tuple(y[part] for y in block.y))
+                        tuple(y[part] for y in block.y), block.used and tuple(used[part] for used in block.used))

@@ -82,7 +82,7 @@ def _resolved(solution: Solution, inflation: float) -> npt.NDArray[np.bool_]:
     `inflation` is how much the residual's memory adds.
     """
     e = solution.errors
-    signal = np.sqrt(np.sum(solution.weights * np.square(e.signal_rms)) * e.samples)
+    signal = np.sqrt(np.sum(solution.weights * np.square(e.signal_rms) * e.counts))
     unit = np.sqrt(np.mean(solution.weights * np.square(solution.sigma)))
     ok: npt.NDArray[np.bool_] = solution.singular_values * signal > _WHOLE * unit * inflation
     return ok & (np.arange(len(ok)) < solution.rank)

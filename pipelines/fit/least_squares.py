@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.fit.equations import Array, Block
+from pipelines.fit.equations import Array, Block, Indices
 from pipelines.fit.statistics import Gram, Statistics, gather, triangulate
 
 __all__ = ["Errors", "Fit", "Solution", "errors", "fit", "solve"]
@@ -36,6 +36,7 @@ class Errors:
     rms: Array  # (channels,) root mean square of y - A β
     signal_rms: Array  # (channels,) of y
     relative_error: float  # ‖y - A β‖ / ‖y‖ over all channels
+    counts: Indices  # (channels,) equations
     samples: int
 
 
@@ -99,13 +100,13 @@ def solve(statistics: Statistics, *, weights: Array | None = None) -> Solution:
     estimate where channels have independent white noise of unknown strength. No sample is read.
     """
     information, rounds = statistics.information(), 0
-    w = _weights(statistics, np.sqrt(statistics.power / statistics.samples)) if weights is None else weights
+    w = _weights(statistics, np.sqrt(statistics.power / _some(statistics.counts))) if weights is None else weights
     while True:
         seen = statistics.spectrum(w)
         keep = seen.singular_values > statistics.floor * np.sqrt(len(seen.scale))
         inverse = seen.directions[keep] / seen.singular_values[keep, None] / seen.scale
         beta, bread = seen.projections[keep] @ inverse, inverse.T @ inverse
-        freedom = np.maximum(statistics.samples - w * np.einsum("jab,ab->j", information, bread), 1.0)
+        freedom = np.maximum(statistics.counts - w * np.einsum("jab,ab->j", information, bread), 1.0)
         sigma = np.sqrt(statistics.rss(beta) / freedom)
         better = _weights(statistics, sigma)
         rounds += 1
@@ -122,14 +123,19 @@ def solve(statistics: Statistics, *, weights: Array | None = None) -> Solution:
 
 def errors(statistics: Statistics, beta: Array) -> Errors:
     """How well β explains the samples behind `statistics`, which need not be those that it was fitted to."""
-    rss, power, samples = statistics.rss(beta), statistics.power, statistics.samples
+    rss, power, counts = statistics.rss(beta), statistics.power, _some(statistics.counts)
     total = float(power.sum())
-    return Errors(np.sqrt(rss / samples), np.sqrt(power / samples), float(np.sqrt(rss.sum() / total)) if total > 0.0 else 0.0,
-                  samples)
+    return Errors(np.sqrt(rss / counts), np.sqrt(power / counts), float(np.sqrt(rss.sum() / total)) if total > 0.0 else 0.0,
+                  statistics.counts, statistics.samples)
+
+
+def _some(counts: Indices) -> Indices:
+    """A channel without equations has no power either: 0 / 1."""
+    return np.maximum(counts, 1)
 
 
 def _weights(statistics: Statistics, sigma: Array) -> Array:
     """1/σ², but no channel better than rounding."""
-    least = _LEAST_SIGMA * np.sqrt(statistics.power / statistics.samples)
+    least = _LEAST_SIGMA * np.sqrt(statistics.power / _some(statistics.counts))
     known = np.maximum(sigma, least)
     return 1.0 / np.square(np.where(known > 0.0, known, 1.0))

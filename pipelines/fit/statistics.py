@@ -35,6 +35,7 @@ class Gram:
     """Sums of products. The last row and column are those of y."""
 
     gram: Array  # (channels, k + 1, k + 1)
+    counts: Indices  # (channels,) equations
     samples: int
     longest: int  # samples of the longest block
     floor: float = 3e-8  # singular values below this, of unit columns, are rounding
@@ -49,7 +50,8 @@ class Gram:
         return self.gram[:, -1, -1]
 
     def __add__(self, other: Gram) -> Gram:
-        return Gram(self.gram + other.gram, self.samples + other.samples, max(self.longest, other.longest), self.floor)
+        return Gram(self.gram + other.gram, self.counts + other.counts, self.samples + other.samples,
+                    max(self.longest, other.longest), self.floor)
 
     def information(self) -> Array:
         """AᵀA of each channel (channels, k, k)."""
@@ -86,6 +88,7 @@ class Triangles:
     """Triangular factors. The last column is that of y."""
 
     factor: Array  # (channels, k + 1, k + 1)
+    counts: Indices  # (channels,) equations
     samples: int
     longest: int
     floor: float = 1e-13
@@ -100,7 +103,8 @@ class Triangles:
 
     def __add__(self, other: Triangles) -> Triangles:
         both = np.concatenate([self.factor, other.factor], axis=1)
-        return Triangles(np.asarray(np.linalg.qr(both, mode="r")), self.samples + other.samples, max(self.longest, other.longest))
+        return Triangles(np.asarray(np.linalg.qr(both, mode="r")), self.counts + other.counts, self.samples + other.samples,
+                         max(self.longest, other.longest))
 
     def information(self) -> Array:
         a = self.factor[:, :, :-1]
@@ -174,6 +178,7 @@ class _Adder:
 
     def __init__(self, channels: int, width: int) -> None:
         self.total = np.zeros((channels, width + 1, width + 1))
+        self.counts = np.zeros(channels, dtype=np.intp)
         self.samples = self.longest = 0
         self.columns: tuple[Indices, ...] = ()
         self.places: list[tuple[Indices, Indices]] = []
@@ -186,20 +191,23 @@ class _Adder:
             total[down, across] += a @ a.T
             total[across, -1] += a @ y
             total[-1, -1] += y @ y
+        self.counts += block.counts
         self.samples += block.samples
         self.longest = max(self.longest, block.samples)
 
     def gram(self) -> Gram:
         self.total[:, -1, :-1] = self.total[:, :-1, -1]
-        return Gram(self.total, self.samples, self.longest)
+        return Gram(self.total, self.counts, self.samples, self.longest)
 
 
 def triangulate(equations: Iterable[Block]) -> Triangles:
     """The triangular factors of all blocks, in one pass, memory constant in their number."""
     factor: Array | None = None
     samples = longest = 0
+    counts = np.zeros(0, dtype=np.intp)
     for block in equations:
         if factor is None:
+            counts = np.zeros(block.channels, dtype=np.intp)
             factor = np.zeros((block.channels, block.width + 1, block.width + 1))
         for r, index, a, y in zip(factor, block.columns, block.values, block.y, strict=True):
             used = np.append(np.union1d(np.flatnonzero(r[:, :-1].any(axis=0)), index), block.width)
@@ -210,8 +218,9 @@ def triangulate(equations: Iterable[Block]) -> Triangles:
             small = np.linalg.qr(stack, mode="r")
             r[:] = 0.0
             r[np.ix_(np.arange(len(small)), used)] = small
+        counts += block.counts
         samples += block.samples
         longest = max(longest, block.samples)
     if factor is None:
         raise ValueError("no equations")
-    return Triangles(factor, samples, longest)
+    return Triangles(factor, counts, samples, longest)

@@ -114,13 +114,13 @@ def by_blocks(equations: Iterable[Block], blocks: int, weights: Array) -> Errors
     No sample is read more than once: the statistics of the rest are the sum of the other blocks' statistics.
     """
     parts = [gather([part]) for part in _cut(list(equations), blocks)]
-    rss, power, samples = np.zeros(len(weights)), np.zeros(len(weights)), 0
+    rss, total = np.zeros(len(weights)), _sum(parts)
     for i, part in enumerate(parts):
         rest = _sum([other for j, other in enumerate(parts) if j != i])
         rss += part.rss(solve(rest, weights=weights).beta)
-        power += part.power
-        samples += part.samples
-    return Errors(np.sqrt(rss / samples), np.sqrt(power / samples), float(np.sqrt(rss.sum() / power.sum())), samples)
+    counts = np.maximum(total.counts, 1)
+    return Errors(np.sqrt(rss / counts), np.sqrt(total.power / counts), float(np.sqrt(rss.sum() / total.power.sum())),
+                  total.counts, total.samples)
 
 
 def _cut(equations: list[Block], blocks: int) -> list[Block]:

@@ -26,6 +26,9 @@ from pipelines.signal.filters import LowPass, centre_hold, centre_samples, choos
 
 __all__ = ["Column", "Columns", "Conditioning", "LogEquations", "condition"]
 
+# time, and of each joint: columns, torque, and which of its equations count (None: all)
+_Piece = tuple[Array, tuple[Array, ...], tuple[Array, ...], tuple[npt.NDArray[np.bool_], ...] | None]
+
 _SEED = 20040509
 _BLOCK = 32768  # samples of the log worked on at once
 _SETTLE = 10.0  # periods of the cut-off after which a fourth-order low-pass has forgotten to 1e-10
@@ -157,19 +160,19 @@ class LogEquations:
 
     def times(self) -> Array:
         """The time of every equation [s]."""
-        return np.concatenate([np.concatenate([t for t, _, _ in self._pieces(run)]) for run in self.runs])
+        return np.concatenate([np.concatenate([t for t, *_ in self._pieces(run)]) for run in self.runs])
 
     def _of_run(self, run: slice) -> Iterator[Block]:
-        for _, values, y in self._pieces(run):
+        for _, values, y, used in self._pieces(run):
             if len(y[0]):
-                yield Block(len(self.columns.names), self._places, values, y)
+                yield Block(len(self.columns.names), self._places, values, y, used)
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.intp], ...]:
         return self.columns.rows(_part(self.found, slice(self.runs[0].start, self.runs[0].start + 8)))[1]
 
-    def _pieces(self, run: slice) -> Iterator[tuple[Array, tuple[Array, ...], tuple[Array, ...]]]:
-        """Time, columns and torque of each stretch of a run, conditioned and thinned out."""
+    def _pieces(self, run: slice) -> Iterator[_Piece]:
+        """Each stretch of a run, conditioned and thinned out."""
         how, rate = self.conditioning, 1.0 / self.found.good.log.sample_time
         margin = 2 if how.cutoff_hz is None else int(np.ceil(_SETTLE * rate / how.cutoff_hz))
         inner = _BLOCK - _BLOCK % how.decimation
@@ -183,7 +186,7 @@ class LogEquations:
             if last == length:
                 return
 
-    def _conditioned(self, wide: slice, first: int, last: int, phase: int) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
+    def _conditioned(self, wide: slice, first: int, last: int, phase: int) -> _Piece:
         how = self.conditioning
         motion, tau, bad = self._stretch(wide)
         rows, _ = self.columns.rows(motion)
@@ -200,7 +203,7 @@ class LogEquations:
         slow = np.abs(motion.dq[keep + begin]) < np.array(how.min_speed)
         parts = [np.where(slow[:, j, None], 0.0, s[keep]) for j, s in enumerate(stacks)]
         return (motion.t[keep + begin], tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts),
-                tuple(np.ascontiguousarray(p[:, -1]) for p in parts))
+                tuple(np.ascontiguousarray(p[:, -1]) for p in parts), tuple(~slow.T) if slow.any() else None)
 
     @cached_property
     def _vague(self) -> npt.NDArray[np.bool_]:
