@@ -89,8 +89,8 @@ def convert(
 def reconstruct(
     logs: LogPaths, common: Common,
     method: Annotated[str | None, typer.Option(help="smoother, observer, zero-phase or central-differences. [smoother]")] = None,
-    order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 or 4. [3]")] = None,
-    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^3]: one, or one a joint. [data's]")] = None,
+    order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
+    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint. [data's]")] = None,
     bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
 ) -> None:
     """Reconstruct position, speed and acceleration from the encoders: Kalman observer and smoother."""

@@ -26,10 +26,16 @@ _BRIDGE_HZ = 100.0  # of the observer that bridges missing samples before anythi
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """How motion is reconstructed. What is None is found from the data, joint by joint."""
+    """How motion is reconstructed. What is None is found from the data, joint by joint.
+
+    The paper's chain has order 3: a jerk held over each sample. Beside a smooth motion its acceleration comes out too large
+    by (ωT)²/12, 1 part in 150,000 at 1.4 Hz and 1 kHz, which is a third of the standard deviation of an inertia from 10 s; a
+    held snap, order 4, errs by the fourth power of ωT. Over 100 simulated experiments the worst bias that reconstruction adds
+    to a parameter is 0.27 standard deviations with order 3 and 0.17 with order 4.
+    """
 
     method: str = "smoother"
-    order: int = 3  # of the chain of integrators: 3 is the paper's
+    order: int = 4  # of the chain of integrators; 3 is the paper's
     jerk_std: tuple[float, ...] | None = None  # σ [rad/s^order], one a joint or one for all
     bandwidth: tuple[float, ...] | None = None  # [Hz] -3 dB of the observer's position, instead of jerk_std
 
