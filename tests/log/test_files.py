@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,9 +14,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
-from pipelines.log.experiment import Signal
+from pipelines.log.experiment import Controller, Derived, Signal
 from pipelines.log.files import find_logs, open_log, write_log
-from tests.log.logs import random_log, small_log
+from tests.log.logs import ROBOT_TEXT, random_log, small_log
 
 BOTH = pytest.mark.parametrize("ending", [".h5", ".parquet"])
 
@@ -102,7 +103,6 @@ def test_matlab_style_attributes_are_understood(tmp_path: Path) -> None:
         del file.attrs["digest"]
         file.attrs["joint"] = 2.0
         file.attrs["role"] = np.bytes_("identify")
-        file.attrs["controller"] if False else None
         file["controller"].attrs["delay"] = np.float32(1.0)
     assert open_log(path).log == log
 
@@ -114,12 +114,65 @@ def test_matlab_style_attributes_are_understood(tmp_path: Path) -> None:
     ({"experiment": "friction"}, "S20", "needs"),
     ({"recorded": "yesterday"}, "S20", "ISO 8601"),
     ({"posture": np.zeros(2)}, "S20", "posture has 2"),
+    ({"role": "bogus"}, "S20", "identify, validate, reference"),
+    ({"name": " "}, "S20", "not empty"),
+    ({"name": "a\0b"}, "S20", "without NUL"),
+    ({"robot_name": "\ud800"}, "S20", "UTF-8"),
+    ({"robot_text": ROBOT_TEXT + "# \0"}, "S20", "UTF-8 without NUL"),
+    ({"sample_time": float("nan")}, "S20", "positive number of seconds"),
+    ({"sample_time": -1e-3}, "S20", "positive number of seconds"),
+    ({"sample_time": 5e-324}, "S20", "positive number of seconds"),
+    ({"sample_time": 10**400}, "S20", "real number that a float can hold"),
+    ({"posture": np.array([0.0, np.nan, 0.0])}, "S20", "finite"),
+    ({"recorded": "2024-99-99T99:99:99Z"}, "S20", "ISO 8601"),
+    ({"controller": Controller("bogus")}, "S20", "law"),
+    ({"controller": Controller("pd", kp=[1, np.nan, 1], kd=[1, 1, 1])}, "S20", "kp.*finite"),
+    ({"controller": Controller("unknown", delay=2)}, "S20", "delay.*one of 0, 1"),
+    ({"controller": Controller("unknown", output_limit=[1, -1, 1])}, "S20", "output_limit"),
+    ({"derived": Derived("import", "no json", "0", "2024-01-01T00:00:00Z")}, "S20", "settings.*JSON"),
+    ({"derived": Derived("import", "{}", "0", "soon")}, "S20", "created.*ISO 8601"),
+    ({"origin": "planned"}, "S20", "references only, but there is q, tau"),
 ])
 def test_a_writer_refuses_what_is_not_a_log(tmp_path: Path, ending: str, change: dict[str, object], code: str, words: str) -> None:
     """Nothing reaches the disk that a reader would have to refuse."""
     with pytest.raises(InputRejected, match=f"RRID-{code} .*{words}"):
         write_log(tmp_path / f"a{ending}", small_log(**change))
     assert list(tmp_path.iterdir()) == []
+
+
+@BOTH
+@pytest.mark.parametrize(("signal", "code", "words"), [
+    (Signal(small_log().tau, "furlong", "x"), "S05", "'furlong', the format wants 'N m'"),
+    (Signal(small_log().tau, "", "x"), "S05", "the format wants 'N m'"),
+    (Signal(small_log().tau, "N m", "\ud800"), "S20", "UTF-8"),
+])
+def test_a_writer_refuses_other_units(tmp_path: Path, ending: str, signal: Signal, code: str, words: str) -> None:
+    """Everything inside a log is SI: a writer converts nothing, and writes nothing else."""
+    log = small_log()
+    with pytest.raises(InputRejected, match=f"RRID-{code} .*{words}"):
+        write_log(tmp_path / f"a{ending}", replace(log, signals={**log.signals, "tau": signal}))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_spelling_of_si_is_read_as_si(tmp_path: Path) -> None:
+    """"Nm" is "N m": the log that comes of it can be written again."""
+    write_log(tmp_path / "a.h5", small_log())
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        del file.attrs["digest"]
+        file["signals/tau"].attrs["units"] = "Nm"
+    assert open_log(tmp_path / "a.h5").log == small_log()
+
+
+@pytest.mark.parametrize(("key", "value"), [("sample_time", 10**400), ("joint", 10**400), ("period", 5e-324), ("name", "\ud800"),
+                                            ("posture", [10**400] * 3)])
+def test_numbers_and_texts_beyond_all_bounds_in_parquet(tmp_path: Path, key: str, value: object) -> None:
+    """S20, not a traceback: JSON holds integers and texts that nothing else can."""
+    write_log(tmp_path / "a.parquet", small_log())
+    table = pq.read_table(tmp_path / "a.parquet")
+    about = json.loads(table.schema.metadata[b"rrrid"]) | {key: value}
+    pq.write_table(table.replace_schema_metadata({b"rrrid": json.dumps(about).encode()}), tmp_path / "a.parquet")
+    with pytest.raises(InputRejected, match=f"RRID-S20 .*{key}"):
+        open_log(tmp_path / "a.parquet")
 
 
 def test_unknown_ending_is_a_usage_error(tmp_path: Path) -> None:

@@ -170,6 +170,19 @@ def test_other_hdf5_and_parquet_files_are_not_logs(tmp_path: Path) -> None:
     _refused(tmp_path / "b.h5", "F06", "neither HDF5 nor Parquet")
 
 
+def test_what_a_file_is_is_said_before_what_is_in_it(tmp_path: Path) -> None:
+    """Links first, then format and version, then names: a recording is F06 however it looks, a newer log F11."""
+    with h5py.File(tmp_path / "recording.h5", "w") as file:
+        for i in range(100):
+            file[f"channel {i}"] = np.zeros(3)
+        file.attrs["rig"] = np.zeros(3, "f4,f4")
+    _refused(tmp_path / "recording.h5", "F06", "its format is None.*import")
+    _refused(_edited(tmp_path, lambda f: (f.attrs.__setitem__("format_version", 2), f.create_group("events"))), "F11",
+             "understands version 1")
+    _refused(_edited(tmp_path, lambda f: (f.attrs.__setitem__("format_version", 2), f.__setitem__("q", h5py.ExternalLink("b", "q")))),
+             "X01", "external link 'q'")
+
+
 def test_a_log_under_a_wrong_name_is_read_by_its_content(tmp_path: Path) -> None:
     """F06: Parquet called .h5 is read, with a word."""
     write_log(tmp_path / "a.parquet", small_log())
