@@ -73,6 +73,7 @@ FAULTS = (
           "reject", "19 times", "sample 300"),
     Fault("T01 throughout", lambda g: retimed(g, lambda t: t[::-1].copy()), "reject", "back 5999 times", "sample 1"),
     Fault("T02 still", lambda g: retimed(g, np.zeros_like), "reject", "stands still at 0", "sample 1"),
+    Fault("T02 still, periodic", lambda g: retimed(replace(g, period=5.0), np.zeros_like), "reject", "stands still", "sample 1"),
     Fault("T02", repeated, "repair", "1 sample twice", "sample 3001"),
     Fault("T02 conflict", lambda g: changed(repeated(g), "q", (3001, 1), 0.3), "reject", "different values", "sample 3001"),
     Fault("T03", lambda g: dropped(g, lambda k: k[~np.isin(k % 600, (500, 501))]),

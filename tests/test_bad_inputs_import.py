@@ -105,7 +105,7 @@ REFUSED: dict[str, tuple[str, Callable[[Path], object], str, str]] = {
     "filler of 16 bits": ("D03", lambda f: spoiled(f, "q_3", 5, 32767.0), RECIPE, r"\[missing\] values = \[32767\]"),
     "dead torque": ("D04", lambda f: spoiled(f, "tau_3", slice(None), 0.25), RECIPE, "run.csv, signal tau, joint 3.*constant"),
     "19 samples": ("T08", lambda f: write(f, "\n".join(lines()[:20]) + "\n"), RECIPE, "19 samples left; a log needs 20"),
-    "gaps everywhere": ("T04", lambda f: lossy(f, *((k, k + 60) for k in range(15, 1200, 75))), RECIPE, "more than half"),
+    "gaps everywhere": ("T04", lambda f: lossy(f, *((k, k + 60) for k in range(15, 1200, 75))), RECIPE, "no stretch"),
     "undeclared sentinel": ("D03", lambda f: spoiled(f, "q_3", 5, -999.0), RECIPE, r"\[missing\] values = \[-999\]"),
     "spreadsheet error": ("F16", lambda f: rows_changed(f, lambda r: [*r[:9], "#REF!," + r[9].split(",", 1)[1], *r[10:]]), RECIPE,
                           "line 10"),

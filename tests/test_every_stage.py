@@ -33,19 +33,21 @@ def _stage(module: str) -> Stage[Any, Any]:
     return stage
 
 
-def _recording(folder: Path, samples: Path) -> tuple[Path, ...]:
+def _recording(folder: Path, samples: Path) -> Path:
     """A CSV recording and its recipe, for the stage that makes logs instead of reading them."""
+    folder.mkdir(exist_ok=True)
     write_csv(folder / "run.csv", open_log(samples / "rrr-closed-form/excitation-1.h5").log)
-    (folder / "recipe.toml").write_text(RECIPE)
-    return ()
+    recipe = folder / "recipe.toml"
+    recipe.write_text(RECIPE)
+    return recipe
 
 
 def _run(module: str, tmp_path: Path, samples: Path) -> tuple[Any, Any]:
     stage = _stage(module)
     settings, paths = stage.settings(), (samples / "rrr-closed-form",)
     if module == "import_log":
-        paths = _recording(tmp_path, samples)
-        settings = dataclasses.replace(settings, recipe=str(tmp_path / "recipe.toml"), source=tmp_path)
+        recipe = _recording(tmp_path / "data", samples)
+        settings, paths = dataclasses.replace(settings, recipe=str(recipe), source=recipe.parent), ()
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out"), settings)
 
 
