@@ -114,3 +114,10 @@ def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
     odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "torque #1": columns["tau_1"]}
     draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
     assert parse_recipe(draft.text).signals["q"].column
+
+
+def test_nanoseconds_since_1970_are_a_time(tmp_path: Path) -> None:
+    """Such stamps lie beyond 1e18; they are neither absurd nor a hole."""
+    stamps = 1.7e18 + 1024000.0 * np.arange(1200)
+    recipe = parse_recipe(drafted(tmp_path / "data", text({"time_ns": stamps} | {k: v for k, v in good().items() if k != "t"})))
+    assert (recipe.time.column, recipe.time.unit) == ("time_ns", "ns")
