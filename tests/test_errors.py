@@ -11,7 +11,8 @@ from pipelines.errors import InputRejected, clean
 
 REPO = Path(__file__).resolve().parents[1]
 KINDS = {"InputRejected", "UsageError", "EnvironmentFault", "NothingMatched"}
-MODULES = [path.relative_to(REPO).as_posix() for folder in ("pipelines", "rrrid_cli") for path in sorted((REPO / folder).rglob("*.py"))]
+MODULES = [path.relative_to(REPO).as_posix() for folder in ("pipelines", "rrrid_cli")
+           for path in sorted((REPO / folder).rglob("*.py"))]
 
 
 def _silent(text: str) -> list[int]:

@@ -7,18 +7,22 @@ import json
 import os
 import signal
 import time
+import tomllib
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
-from pipelines import convert
+from pipelines import convert, inspect, run
 from pipelines.errors import Check, InputRejected, UsageError
 from pipelines.log.files import write_log
+from pipelines.log.places import renamed, short_names
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, refuse_foreign, run_stage, slug, tilde
-from tests.log.logs import small_log
+from tests.log.logs import ROBOT_TEXT, small_log
+
+REPO = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture
@@ -73,6 +77,91 @@ def test_own_output_is_replaced_and_foreign_files_are_refused(logs: Path) -> Non
             run_stage(convert.STAGE, Request((logs,), out=out), convert.Settings())
 
 
+def _mine(folder: Path) -> dict[str, str]:
+    return {name: value for name, value in _contents(folder).items() if name != "provenance.json"}
+
+
+@pytest.mark.parametrize("given", ["logs/a.parquet", "logs", "link.parquet"])
+def test_an_output_never_replaces_its_own_input(logs: Path, given: str) -> None:
+    """C05: --out names the folder the input lies in, rrrid's own output at that; neither it nor anything else is lost."""
+    out = run_stage(convert.STAGE, _request(logs), convert.Settings()).folder
+    before = _contents(out)
+    (logs.parent / "link.parquet").symlink_to(out / "logs/a.parquet")
+    path = logs.parent / given if given.startswith("link") else out / given
+    with pytest.raises(UsageError, match=r"RRID-C05 .*(would be replaced with it|holds the input)"):
+        run_stage(convert.STAGE, Request((path,), out=out, force=True), convert.Settings("csv"))
+    assert _contents(out) == before
+
+
+def test_a_source_folder_is_an_input_as_well(logs: Path) -> None:
+    """C05: what a stage's own reader was pointed at counts like the request's paths."""
+    def read(request: Request, settings: object) -> Inputs:
+        return replace(read_logs(request, settings), folders=(logs.parent / "recordings",))
+
+    (logs.parent / "recordings").mkdir()
+    stage = replace(_stage(lambda inputs, settings: _Nothing()), read=read)
+    with pytest.raises(UsageError, match="RRID-C05 .*inside the input .*recordings"):
+        run_stage(stage, Request((logs,), out=logs.parent / "recordings/out"), _Nothing())
+
+
+def test_an_edited_output_wants_force(logs: Path) -> None:
+    """C05: a result that somebody worked on since is not rrrid's any more; --force says that it may go."""
+    out = run_stage(convert.STAGE, _request(logs), convert.Settings()).folder
+    before = _mine(out)
+    (out / "result.json").write_text("my notes")
+    with pytest.raises(UsageError, match=r"RRID-C05 .*changed since rrrid wrote them: result\.json.*--force"):
+        run_stage(convert.STAGE, _request(logs), convert.Settings())
+    assert (out / "result.json").read_text() == "my notes"
+    (out / "added.txt").write_text("more")
+    run_stage(convert.STAGE, _request(logs, force=True), convert.Settings())
+    assert _mine(out) == before
+
+
+def test_provenance_knows_robot_seed_and_version(logs: Path) -> None:
+    """The description given with --robot is an input like any other; the seed is said, null where nothing is drawn."""
+    robot = logs.parent / "arm.toml"
+    robot.write_text(ROBOT_TEXT)
+    about = json.loads((run_stage(convert.STAGE, _request(logs, robot=str(robot)), convert.Settings()).folder
+                        / "provenance.json").read_text())
+    assert about["inputs"][tilde(str(robot))] == hashlib.sha256(robot.read_bytes()).hexdigest()
+    assert about["seed"] is None
+    assert about["version"] == tomllib.loads((REPO / "pyproject.toml").read_text())["project"]["version"]
+
+
+def test_a_result_does_not_depend_on_where_its_inputs_lie(tmp_path: Path) -> None:
+    """The same folder at two places, one broken log in it: the same bytes of result and report, of every stage that reads logs."""
+    contents = []
+    for place in ("here", "over there/deep"):
+        folder = tmp_path / place / "logs"
+        write_log(folder / "a.h5", small_log())
+        (folder / "b.parquet").write_bytes(b"PAR1 broken")
+        for stage, settings in ((inspect.STAGE, inspect.Settings()), (run.STAGE, run.Settings())):
+            out = run_stage(stage, Request((folder,), out=tmp_path / place / stage.name), settings).folder  # type: ignore[arg-type]
+            assert str(tmp_path) not in (out / "result.json").read_text() + (out / "report.html").read_text()
+            assert "b.parquet" in (out / "result.json").read_text()
+        contents.append({p.parent.name + p.name: p.read_bytes() for p in (tmp_path / place).rglob("*.*")
+                         if p.is_file() and p.name != "provenance.json"})
+    assert contents[0] == contents[1]
+
+
+def test_places_are_told_apart_by_the_shortest_names() -> None:
+    """One folder needs no name; two of one name get numbers; only whole paths are renamed."""
+    names = short_names([Path("/x/A/logs/a.h5"), Path("/x/B/logs/a.h5"), Path("/x/A/logs/b.h5")])
+    assert names == {"/x/A/logs": "logs", "/x/B/logs": "logs-2"}
+    assert renamed(("/x/A/logs/a.h5, signal q", "in /x/B/logs: no", "/x/A/logs2/a.h5", "/mnt/x/A/logs/a.h5"), names) == (
+        "logs/a.h5, signal q", "in logs-2: no", "/x/A/logs2/a.h5", "/mnt/x/A/logs/a.h5")
+    assert renamed("/x/A/a.h5", short_names([Path("/x/A/a.h5")])) == "a.h5"
+
+
+def test_an_error_names_the_path_as_it_was_given(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inside, paths are absolute; on the terminal they are what the user typed."""
+    monkeypatch.chdir(logs.parent)
+    (logs / "b.h5").write_text("no log")
+    with pytest.raises(InputRejected) as caught:
+        run_stage(convert.STAGE, Request((Path("logs"),)), convert.Settings())
+    assert caught.value.where == "logs/b.h5"
+
+
 def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> None:
     """C05: not even with --force; an empty folder is fine."""
     (tmp_path / "out").mkdir()
@@ -105,6 +194,18 @@ def test_an_input_that_changes_meanwhile_is_refused(logs: Path) -> None:
     with pytest.raises(InputRejected, match=r"RRID-F14 .*a\.h5: was modified while it was processed"):
         run_stage(_stage(meddle), _request(logs), _Nothing())
     assert [p.name for p in logs.parent.iterdir()] == ["logs"]
+
+
+def test_an_input_that_changes_after_it_was_read_is_refused(logs: Path) -> None:
+    """F14: the hash that is kept is that of the bytes that were read, not of what lies there afterwards."""
+
+    def read(request: Request, settings: object) -> Inputs:
+        inputs = read_logs(request, settings)
+        write_log(logs / "a.h5", small_log(name="other"))
+        return inputs
+
+    with pytest.raises(InputRejected, match="RRID-F14"):
+        run_stage(replace(_stage(lambda inputs, settings: _Nothing()), read=read), _request(logs), _Nothing())
 
 
 def test_strict_turns_a_repair_into_an_error(logs: Path) -> None:

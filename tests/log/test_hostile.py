@@ -179,8 +179,8 @@ def test_what_a_file_is_is_said_before_what_is_in_it(tmp_path: Path) -> None:
     _refused(tmp_path / "recording.h5", "F06", "its format is None.*import")
     _refused(_edited(tmp_path, lambda f: (f.attrs.__setitem__("format_version", 2), f.create_group("events"))), "F11",
              "understands version 1")
-    _refused(_edited(tmp_path, lambda f: (f.attrs.__setitem__("format_version", 2), f.__setitem__("q", h5py.ExternalLink("b", "q")))),
-             "X01", "external link 'q'")
+    path = _edited(tmp_path, lambda f: (f.attrs.__setitem__("format_version", 2), f.__setitem__("q", h5py.ExternalLink("b", "q"))))
+    _refused(path, "X01", "external link 'q'")
 
 
 def test_a_log_under_a_wrong_name_is_read_by_its_content(tmp_path: Path) -> None:
