@@ -99,7 +99,8 @@ def read(request: Request, settings: Settings) -> Inputs:
     material = collect(settings.recipe, settings.source, request.robot, request.tell)
     material = replace(material, assume_units=request.assume_units, ending=request.format)
     return Inputs(sources=material.paths, hashes=material.hashes, material=material,
-                  folders=(settings.source,) if settings.source else (), label=material.folder.absolute().name, robot_name=material.robot.name)
+                  folders=(settings.source,) if settings.source else (),
+                  label=material.folder.absolute().name, robot_name=material.robot.name)
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
