@@ -21,6 +21,7 @@ from rrrid_cli.options import Common, LogPaths, numbers, with_common
 __all__ = ["app", "entry"]
 
 TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
+AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
 STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps")
 
@@ -42,7 +43,7 @@ def run(logs: LogPaths, common: Common) -> None:
 @with_common
 def inspect(
     logs: LogPaths, common: Common, trust_units: TrustUnits = None,
-    allow_same: Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")] = None,
+    allow_same: AllowSame = None,
 ) -> None:
     """The log doctor: check container, units, time and signals; nothing is changed."""
     from pipelines.inspect import STAGE
@@ -90,7 +91,7 @@ def reconstruct(
     logs: LogPaths, common: Common,
     method: Annotated[str | None, typer.Option(help="smoother, observer, zero-phase or central-differences. [smoother]")] = None,
     order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
-    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint. [data's]")] = None,
+    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint.")] = None,
     bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
 ) -> None:
     """Reconstruct position, speed and acceleration from the encoders: Kalman observer and smoother."""
@@ -111,13 +112,16 @@ def estimate_bps(
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn, without validate logs. [10]")] = None,
     symmetric: Annotated[bool | None, typer.Option("--symmetric", help="Mirror-symmetric links: p4 = p15 = 0.")] = None,
     unweighted: Annotated[bool, typer.Option("--unweighted", help="All joints alike, as eq. (15).")] = False,
+    model: Annotated[str | None, typer.Option(help="Model whose friction is subtracted instead of fitted.")] = None,
+    allow_same: AllowSame = None,
 ) -> None:
     """Estimate base parameters and friction by least squares, with their uncertainty."""
     from pipelines.estimate_bps import STAGE
 
     _go(STAGE, tuple(logs), common, {
         "method": method, "filter": filter, "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "blocks": blocks,
-        "symmetric": symmetric, "weighted": False if unweighted else None, "compare": False if common.no_report else None})
+        "symmetric": symmetric, "weighted": False if unweighted else None, "model": model, "allow_same": allow_same,
+        "compare": False if common.no_report else None})
 
 
 @app.command()

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.fit.consistency import physical_consistency
-from pipelines.fit.equations import Block, Indices
+from pipelines.fit.equations import Block
 from pipelines.fit.least_squares import solve
 from pipelines.fit.statistics import gather
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.logs import Fitted
+from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.rigid.body import Motion, RigidBody
 from pipelines.model.rigid.energy import energy, work
 from pipelines.model.rigid.rrr import RRR
 from pipelines.model.rigid.rrr_consistency import rrr_combine, rrr_inequalities
@@ -55,11 +56,16 @@ class Balance:
     agree: bool
 
 
-def consistency(found: Estimate, body: RigidBody) -> Consistent:
-    """Pseudo-inertias that are positive definite (Wensing et al. 2018), and for the RRR arm what (A4) demands."""
+def consistency(found: Estimate, body: RigidBody) -> Consistent | None:
+    """Pseudo-inertias that are positive definite (Wensing et al. 2018), and for the RRR arm what (A4) demands.
+
+    None where a parameter is not determined: nothing can be said of links then.
+    """
+    if not found.trusted[list(found.columns.rigid)].all():
+        return None
     count, kept = len(body.parameters), list(found.columns.kept)
     beta, covariance = np.zeros(count), np.zeros((count, count))
-    beta[kept] = np.where(found.solution.determined, found.beta, 0.0)[:len(kept)]
+    beta[kept] = found.beta[:len(kept)]
     covariance[np.ix_(kept, kept)] = found.robust.covariance[:len(kept), :len(kept)]
     combine = rrr_combine(body) if isinstance(body, RRR) else body.base.combine if isinstance(body, BaseArm) else None
     if combine is None:
@@ -80,11 +86,11 @@ def power_balance(fitted: Fitted) -> Balance | None:
     """
     found = fitted.estimate
     blocks = [block for log, motion in fitted.motions for run in motion.good.runs
-              if (block := _balances(found, motion.motion, motion.good.log.tau, motion.good.kept, run, log.torque != "measured"))]
+              if (block := _balances(fitted, motion, run, log.torque != "measured"))]
     if not blocks:
         return None
     solution = solve(gather(blocks))
-    rigid = [k for k in found.columns.rigid if solution.determined[k] and found.solution.determined[k]]
+    rigid = [k for k in found.columns.rigid if solution.determined[k] and found.trusted[k]]
     if not rigid:
         return None
     std, names = solution.std, [column.name for column in found.columns.names]
@@ -93,20 +99,21 @@ def power_balance(fitted: Fitted) -> Balance | None:
                    tuple(map(float, apart)), bool(np.all(apart < _APART)))
 
 
-def _balances(found: Estimate, motion: Motion, torque: Array, kept: Indices, run: slice, held: bool) -> Block | None:
+def _balances(fitted: Fitted, found: Reconstructed, run: slice, held: bool) -> Block | None:
     """One equation a window: energy gained and work of friction by parameter, against work of the drives."""
-    rows = kept[run]
-    q, dq, ddq, tau = motion.q[rows], motion.dq[rows], motion.ddq[rows], torque[run]
+    columns, rows, motion = fitted.estimate.columns, found.good.kept[run], found.motion
+    whole = Motion(motion.t[rows], motion.q[rows], motion.dq[rows], motion.ddq[rows])
+    q, tau = whole.q, found.good.log.tau[run]
     if held:  # τ_k acts from t_k to t_{k+1}
         tau = np.vstack([tau[:1], 0.5 * (tau[1:] + tau[:-1])])
-    size = max(2, round(_WINDOW / float(np.median(np.diff(motion.t[rows])))))
+    if fitted.recipe.known is not None:
+        tau = tau - fitted.recipe.known(whole)
+    size = max(2, round(_WINDOW / float(np.median(np.diff(whole.t)))))
     ends = np.arange(size, len(rows) - size, size)
-    if len(ends) < 3 * len(found.columns.names) or not (np.isfinite(tau).all() and np.isfinite(q + dq).all()):
+    if len(ends) < 3 * len(columns.names) or not (np.isfinite(tau).all() and np.isfinite(q + whole.dq).all()):
         return None
-    body, columns = found.columns.body, found.columns
-    gained = np.diff(energy(body, q[ends], dq[ends])[:, list(columns.kept)], axis=0)
-    whole = Motion(motion.t[rows], q, dq, ddq)
-    lost = [work(q, table[..., k]) for law in columns.laws for table in (law.columns(whole, columns.arm),
-                                                                         ) for k in range(table.shape[2])]
+    gained = np.diff(energy(columns.body, q[ends], whole.dq[ends])[:, list(columns.kept)], axis=0)
+    tables = [law.columns(whole, columns.arm) for law in columns.laws]
+    lost = [work(q, table[..., k]) for table in tables for k in range(table.shape[2])]
     table = np.hstack([gained, *(np.diff(x[ends])[:, None] for x in lost)])
     return Block.of(table[:, None, :], np.diff(work(q, tau)[ends])[:, None])

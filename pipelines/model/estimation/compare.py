@@ -44,4 +44,3 @@ def compare(identify: Sequence[ExperimentLog], validate: Sequence[ExperimentLog]
         rows.append(Compared(method, used, found.solution.errors.relative_error, errors.relative_error,
                              tuple(map(float, found.beta[rigid])), tuple(map(float, found.std[rigid])), ""))
     return tuple(rows)
-

@@ -76,11 +76,17 @@ class Estimate:
         """(k,) whether the logs show the parameter: its value, or that it is small beside its like."""
         units = [column.unit + column.name.partition(":")[0].rstrip("0123456789") for column in self.columns.names]
         known = visible(self.beta, self.std, typical_size(self.beta, self.std, units))
-        return np.asarray(known & self.solution.determined)
+        return np.asarray(known & self.trusted)
 
     @cached_property
     def unresolved(self) -> Unresolved:
         return unresolved(self.solution, [column.name for column in self.columns.names], float(self.robust.inflation.max()))
+
+    @cached_property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        """(k,) whether the logs determine the parameter; the value of any other is the smallest that explains them."""
+        lost = set(self.unresolved.parameters)
+        return np.asarray([column.name not in lost for column in self.columns.names] & self.solution.determined)
 
     @cached_property
     def condition_number(self) -> float:

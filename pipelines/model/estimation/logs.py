@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +13,9 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.estimation.estimate import Estimate, by_blocks, estimate, power_of
 from pipelines.model.estimation.regression import Columns, Conditioning, LogEquations, condition
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
+from pipelines.model.rigid.body import Motion
 
-__all__ = ["Fitted", "Judged", "Recipe", "fit_logs", "judge"]
+__all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge"]
 
 Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
@@ -27,6 +28,7 @@ class Recipe:
     cutoff_hz: float | None = None
     decimation: int | None = None
     min_speed: tuple[float, ...] = (0.0,)
+    known: Callable[[Motion], Array] | None = None  # torque (samples, joints) [N m] that is subtracted: of a given friction
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ def judge(fitted: Fitted, logs: Sequence[ExperimentLog], blocks: int) -> Judged:
         return Judged(by_blocks(found.equations, blocks, found.solution.weights), "blocks", ())
     motions = tuple((log, reconstruct(log, fitted.recipe.how)) for log in logs)
     equations = [equations_of(log, motion, fitted.recipe, found.columns) for log, motion in motions]
-    return Judged(power_of(equations, np.where(found.solution.determined, found.beta, 0.0)), "logs", motions)
+    return Judged(power_of(equations, found.beta), "logs", motions)
 
 
 def _condition(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns) -> Conditioning:
@@ -84,7 +86,7 @@ def equations_of(log: ExperimentLog, found: Reconstructed, recipe: Recipe, colum
         InputRejected: T04, every stretch of it is too short for the low-pass.
     """
     how = _condition(log, found, recipe, columns)
-    equations = LogEquations(columns, found, how, held=log.torque != "measured")
+    equations = LogEquations(columns, found, how, held=log.torque != "measured", known=recipe.known)
     if not equations.runs:
         raise InputRejected("T04", f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz",
                             where=log.source or log.name, remedy="filter higher with --filter, or record longer")

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.log.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.rigid.body import Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
 
 __all__ = ["fitted_arm", "geared", "nominal_columns"]
@@ -64,18 +64,23 @@ def _seen_beside(body: RigidBody, effects: Sequence[Effect], arm: Arm) -> list[E
     return seen
 
 
-def fitted_arm(columns: Columns, beta: Array, std: Array, visible: npt.NDArray[np.bool_], name: str, friction: Sequence[Acting] = ()) -> Arm:
-    """The arm that β describes: friction laws as friction, the rest of the laws as effects.
+def fitted_arm(found: Estimate, name: str, friction: Sequence[Acting] = ()) -> Arm:
+    """The arm that an estimate describes: friction laws as friction, the rest of the laws as effects.
+
+    What the logs do not determine has no standard deviation; its value is the smallest that explains them, and predicts the
+    torque of motions like theirs.
 
     Args:
         friction: of a given model, where the fit took it as known.
     """
+    columns, beta, visible = found.columns, found.beta, found.visible
+    std = [float(s) if sure else None for s, sure in zip(found.std, found.trusted, strict=True)]
     body, base = columns.body, []
     place = {i: k for k, i in enumerate(columns.kept)}
     for i, known in enumerate(body.parameters):
         k = place.get(i)
         base.append(Parameter(known.name, 0.0, None, known.unit, origin="assumed") if k is None else
-                    Parameter(known.name, float(beta[k]), float(std[k]), known.unit, origin="fitted", visible=bool(visible[k])))
+                    Parameter(known.name, float(beta[k]), std[k], known.unit, origin="fitted", visible=bool(visible[k])))
     laws: list[Acting] = list(friction)
     effects: list[Acting] = []
     first = len(columns.kept)
@@ -84,7 +89,7 @@ def fitted_arm(columns: Columns, beta: Array, std: Array, visible: npt.NDArray[n
         amplitudes = [q for q in law.parameters if not q.shape]
         part = slice(first, first + len(amplitudes))
         first += len(amplitudes)
-        known_std = dict(zip((q.name for q in amplitudes), map(float, std[part]), strict=True))
+        known_std = {q.name: s for q, s in zip(amplitudes, std[part], strict=True) if s is not None}
         acting = Acting.of(law, law.values(beta[part]), known_std, revolute=law.joint is None or turning[law.joint - 1])
         (laws if law.friction else effects).append(acting)
     return Arm(name, body, tuple(base), tuple(laws), tuple(effects))

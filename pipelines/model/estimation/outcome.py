@@ -53,7 +53,7 @@ class Course:
 def parameters(fitted: Fitted, arm: Arm) -> tuple[Estimated, ...]:
     found, known, rows = fitted.estimate, arm.body.known_parameters(), []
     for k, column in enumerate(found.columns.names):
-        sure = bool(found.solution.determined[k])
+        sure = bool(found.trusted[k])
         place = found.columns.kept[k] if k < len(found.columns.kept) else None
         words = arm.body.parameters[place].combination if place is not None else column.name.partition(":")[0].replace("_", " ")
         rows.append(Estimated(column.name, float(found.beta[k]) if sure else None,

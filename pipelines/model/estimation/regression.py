@@ -10,7 +10,7 @@ zero-phase, and the same over torque and columns: what it takes from one it take
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -146,7 +146,7 @@ class LogEquations:
     found: Reconstructed
     conditioning: Conditioning
     held: bool  # the torque is a held command: centre it
-    known: Array | None = None  # (samples, joints) [N m] torque that is known beforehand, subtracted: friction of a given model
+    known: Callable[[Motion], Array] | None = None  # torque (samples, joints) [N m] that is subtracted: of a given friction
 
     def __iter__(self) -> Iterator[Block]:
         for run in self.runs:
@@ -190,11 +190,14 @@ class LogEquations:
         how = self.conditioning
         motion, tau, bad = self._stretch(wide)
         rows, _ = self.columns.rows(motion)
-        stacks = [np.vstack([row, u]).T for row, u in zip(rows, tau.T, strict=True)]
+        known = None if self.known is None else self.known(motion)
         begin = 0
         if self.held:  # the first and the last sample have no neighbour to be averaged with
-            stacks = [np.column_stack([centre_samples(s[:, :-1]), centre_hold(s[:, -1])]) for s in stacks]
-            begin = 1
+            rows, tau, begin = tuple(centre_samples(row.T).T for row in rows), centre_hold(tau), 1
+            known = None if known is None else centre_samples(known)
+        if known is not None:
+            tau = tau - known
+        stacks = [np.vstack([row, u]).T for row, u in zip(rows, tau.T, strict=True)]
         if how.low_pass is not None:
             stacks = [zero_phase(s, how.low_pass) for s in stacks]
         inside = np.arange(wide.start + begin, wide.start + begin + len(stacks[0]))
@@ -216,7 +219,7 @@ class LogEquations:
     def _stretch(self, wide: slice) -> tuple[Motion, Array, npt.NDArray[np.bool_]]:
         """Motion and torque with what is spoilt bridged by straight lines, and the samples the filter spreads that over."""
         good, motion = self.found.good, _part(self.found, wide)
-        tau = good.log.tau[wide] if self.known is None else good.log.tau[wide] - self.known[good.kept[wide]]
+        tau = good.log.tau[wide]
         spoilt = (good.missing | good.spikes | good.saturated)[wide]
         unknown = ~np.isfinite(motion.q + motion.dq + motion.ddq) | self._vague[good.kept[wide]]
         touched: npt.NDArray[np.bool_] = np.asarray((spoilt | unknown).any(axis=1))

@@ -1,0 +1,45 @@
+"""The result of an estimate: everything computed, nothing drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.model_file import ModelFile
+from pipelines.log.results import NOT_STORED
+from pipelines.model.estimation.checks import Balance, Consistent
+from pipelines.model.estimation.compare import Compared
+from pipelines.model.estimation.outcome import Course, Direction, Estimated
+
+__all__ = ["Result"]
+
+
+@dataclass(frozen=True)
+class Result:
+    """Everything estimated. What these logs do not determine has no value."""
+
+    robot: str
+    joints: tuple[str, ...]
+    parameters: tuple[Estimated, ...]
+    condition_number: float  # of Φ in (13): rigid columns, unweighted, SI
+    condition_number_fit: float  # of the weighted columns at unit length
+    rank: int
+    relative_error: dict[str, float]  # identify, validate
+    torque_rms: dict[str, tuple[float, ...]]  # [N m] of the residual, per joint
+    torque_signal_rms: dict[str, tuple[float, ...]]  # [N m]
+    held_out: str  # "logs" | "blocks"
+    filter_hz: float | None  # low-pass over torque and columns
+    equations: tuple[int, ...]  # of each joint, too slow samples left out
+    friction: str  # "fitted" | "given"
+    physically_consistent: bool | None  # None: not all parameters are determined
+    consistency: Consistent | None
+    balance: Balance | None
+    unresolved: str  # words; empty where everything shows
+    hard_to_see: tuple[Direction, ...]
+    comparison: tuple[Compared, ...]
+    convergence_samples: tuple[int, ...]
+    convergence: Array  # (counts, parameters)
+    convergence_std: Array
+    courses: tuple[Course, ...]
+    model: ModelFile = field(metadata=NOT_STORED, repr=False)
+    derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)
