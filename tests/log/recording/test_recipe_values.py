@@ -1,0 +1,45 @@
+"""Values of a recipe that no recording can have are answered with C01 or C02, never with a traceback."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipelines.errors import UsageError
+from pipelines.log.recording.recipe_reader import parse_recipe
+
+HEAD = """
+[robot]
+use = "rrr"
+[log]
+match = "*.csv"
+experiment = "free"
+[signals]
+q = { columns = "q_{j}", unit = "rad" }
+tau = { columns = "tau_{j}", unit = "N m" }
+[time]
+rate = 1000.0
+"""
+
+
+@pytest.mark.parametrize(("line", "words"), [
+    ('delimiter = ",,"', "format.delimiter"), ('delimiter = "\\n"', "format.delimiter"), ('delimiter = "1"', "format.delimiter"),
+    ('decimal = "x"', "format.decimal"), ('encoding = "utf-8\\u0000"', "format.encoding"),
+    ('encoding = "klingon"', "format.encoding"),
+    ('encoding = "base64"', "format.encoding"), ('comment = "\\n"', "format.comment"), ('comment = ""', "format.comment"),
+])
+def test_a_format_that_no_text_can_have(line: str, words: str) -> None:
+    with pytest.raises(UsageError, match=f"RRID-C02 .*{words}"):
+        parse_recipe(f"{HEAD}[format]\n{line}\n")
+
+
+@pytest.mark.parametrize("line", ['delimiter = ";"', 'delimiter = ""', 'delimiter = "\\t"', 'decimal = ","', 'encoding = "latin-1"',
+                                  'comment = "#"', "header = true"])
+def test_a_format_that_texts_have(line: str) -> None:
+    parse_recipe(f"{HEAD}[format]\n{line}\n")
+
+
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_integers_without_end(digits: int) -> None:
+    """No float holds the one, and Python does not even read the other."""
+    with pytest.raises(UsageError, match="RRID-C0[12]"):
+        parse_recipe(HEAD.replace("1000.0", "1" + "0" * digits))
