@@ -92,7 +92,7 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     (logs / "evil.yaml").write_text("!!python/object/apply:os.system ['touch pwned']")
     (logs / "r.toml").write_text('[format]\ndelimiter = ",,"\n')
     write_log(logs / "own/logs/a.h5", small_log())
-    (logs / "own/provenance.json").write_text('{"tool": "rrrid", "outputs": {}}')
+    (logs / "own/provenance.json").write_text('{"tool": "rrrid", "outputs": {"result.json": "0"}}')
     os.mkfifo(logs / "pipe")
     done = rrrid(*words, "--json", cwd=logs)
     assert done.returncode == exit_code, done.stderr
