@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import numpy.typing as npt
@@ -139,6 +138,8 @@ def _inertial(element: Element, r: Array, p: Array, place: str, source: Source) 
 
 def _canonical(tree: Tree, way: list[TreeJoint]) -> str:
     """The shortest URDF with the same chain: link names, joint origins, axes and limits."""
+    from xml.sax.saxutils import quoteattr  # brings urllib and ssl along: 25 ms
+
     lines = [f"<robot name={quoteattr(tree.name)}>", f"  <link name={quoteattr(tree.root)}/>"]
     for joint in way:
         (low, high), velocity, effort = joint.limits
