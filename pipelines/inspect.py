@@ -17,13 +17,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check, Level, RrridError
-from pipelines.log.doctor.checks import Subject, check_log, check_together
+from pipelines.log.codes import title_of
+from pipelines.log.doctor.checks import NotTested, Subject, check_together, findings
+from pipelines.log.doctor.checks_subject import many
 from pipelines.log.doctor.faults import quantum
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 from pipelines.log.robot import RobotDescription, format_robot
 from pipelines.log.schema import joint_unit
-from pipelines.model.plausibility import plausibility
+from pipelines.model.plausibility import plausibility_findings
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import checks_table, level_tone
@@ -90,6 +92,7 @@ class Result:
     """Everything the doctor found."""
 
     checks: tuple[Check, ...]
+    not_tested: tuple[NotTested, ...]  # checks that a log gives nothing to judge by: neither passed nor failed
     from_reading: int  # how many of them, the first, were made while reading
     logs: tuple[LogSummary, ...]
     rejected: tuple[str, ...]  # files that could not be opened
@@ -107,36 +110,43 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     found = [_as_check(rejected.error, rejected.path) for rejected in inputs.rejected]
     logs: list[LogSummary] = []
     previews: list[Preview] = []
+    blind: list[NotTested] = []
     subjects: list[Subject] = []
     for opened in inputs.logs:
-        subject, mine = _examine(opened, inputs.robot, settings)
+        subject, judged = _examine(opened, inputs.robot, settings)
         subjects.append(subject)
+        mine = [item for item in judged if isinstance(item, Check)]
+        blind += [item for item in judged if isinstance(item, NotTested)]
         found += mine
         logs.append(_summary(opened, subject, (*opened.checks, *mine)))
         if len(previews) < _PREVIEWS and subject.sampled:
             previews.append(log_preview(subject))
     found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
-    return Result((*reading, *found), len(reading), tuple(logs), tuple(str(r.path) for r in inputs.rejected), tuple(previews))
+    return Result((*reading, *found), tuple(blind), len(reading), tuple(logs), tuple(str(r.path) for r in inputs.rejected), tuple(previews))
 
 
 def _as_check(error: RrridError, path: object) -> Check:
     return Check(error.code, "reject", error.message, error.where or str(path), error.remedy, True)
 
 
-def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings) -> tuple[Subject, list[Check]]:
+def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings) -> tuple[Subject, list[Check | NotTested]]:
     log = opened.log
     if robot is not None and robot.n_joints != log.n_joints:
         mismatch = Check.of("S02", "reject", f"log has {log.n_joints} joints, model {robot.n_joints}", where=opened.path,
                             remedy="give the description of this robot, or choose the columns with --joints")
         return Subject(log), [mismatch]
     subject = Subject(log if robot is None else replace(log, robot_text=format_robot(robot)))
-    checks = [*check_log(subject, ("RRID-S07",) if settings.trust_units else ())]
-    if not any(check.level == "reject" for check in checks):
-        try:
-            checks += plausibility(subject)
-        except RrridError as problem:  # a description without usable geometry
-            checks.append(_as_check(problem, opened.path))
-    return subject, checks
+    found = [*findings(subject, ("RRID-S07",) if settings.trust_units else ())]
+    if any(isinstance(item, Check) and item.level == "reject" for item in found):
+        return subject, found
+    twins = any(item.code == "RRID-S13" for item in found)
+    try:
+        # Of two channels with the same samples nobody can say that each fits best where it stands.
+        found += [item for item in plausibility_findings(subject)
+                  if not (twins and item.code == "RRID-S13" and (isinstance(item, NotTested) or item.level == "ok"))]
+    except RrridError as problem:  # a description without usable geometry
+        found.append(_as_check(problem, opened.path))
+    return subject, found
 
 
 def _summary(opened: Opened, subject: Subject, checks: Iterable[Check]) -> LogSummary:
@@ -174,12 +184,17 @@ def exit_code(result: Result, check: bool) -> int:
 
 def report(result: Result) -> Report:
     """The verdict, what was found, what was looked at, and the signals of the first logs."""
-    found = [c for c in result.checks if c.level != "ok"]
-    sections = [_found_section(found)] if found else []
-    sections += [_logs_section(result), _passed_section(result)]
+    found = sorted((c for c in result.checks if c.level != "ok"), key=_first)
+    sections = [_found_section(found), _logs_section(result), _passed_section(result), _not_tested_section(result)]
+    sections = [section for section in sections if any(table.rows for table in section.tables)]
     sections += [_log_section(summary, preview) for summary, preview in _paired(result)]
     tone = level_tone(c.level for c in result.checks)
-    return Report("Log doctor", _verdict(result), tone, _key_figures(result), tuple(sections))
+    return Report("Log doctor", _verdict(result, found), tone, _key_figures(result), tuple(sections))
+
+
+def _first(check: Check) -> tuple[bool, bool, bool, int]:
+    """What to read first: columns in the wrong place or unit explain what else is found."""
+    return check.level != "reject", not check.gate, not check.code.startswith("RRID-S"), _WORST_FIRST.index(check.level)
 
 
 def _paired(result: Result) -> list[tuple[LogSummary, Preview]]:
@@ -191,36 +206,44 @@ def _paired(result: Result) -> list[tuple[LogSummary, Preview]]:
     return pairs
 
 
-def _verdict(result: Result) -> str:
+def _verdict(result: Result, found: list[Check]) -> str:
     total = len(result.logs) + len(result.rejected)
-    found = [c for c in result.checks if c.level != "ok"]
+    robots = len({log.robot for log in result.logs})
+    many_robots = f" of {robots} robots" if robots > 1 else ""
     if not found:
-        which = "The log is" if total == 1 else f"All {total} logs are"
-        return f"{which} in order: nothing was found that a fit would suffer from."
+        which = "The log is" if total == 1 else f"All {total} logs{many_robots} are"
+        return f"{which} in order: nothing was found that a fit would suffer from.{_open_questions(result)}"
     bad = len(result.rejected) + sum(log.verdict == "reject" for log in result.logs)
     mended = sum(log.verdict == "repair" for log in result.logs)
     warned = sum(log.verdict == "warn" for log in result.logs)
-    parts = [f"{count} {words}" for count, words in
-             ((bad, "cannot be used"), (mended, "can be used after mending"), (warned, "should be looked at")) if count]
-    # columns in the wrong place or unit explain what else is found
-    worst = min(found, key=lambda c: (c.level != "reject", not c.gate, not c.code.startswith("RRID-S"),
-                                      _WORST_FIRST.index(c.level)))
-    return f"Of {total} log{'s' * (total != 1)} {', '.join(parts) or 'none is bad alone'}. First of all: {worst.message}."
+    counted = [(count, words) for count, words in
+               ((bad, "cannot be used"), (mended, "can be used after mending"), (warned, "should be looked at")) if count]
+    if total == 1:
+        said = f"The log {counted[0][1] if counted else 'is not bad in itself'}"
+    else:
+        said = f"Of {total} logs{many_robots} {', '.join(f'{n} {words}' for n, words in counted) or 'none is bad alone'}"
+    return f"{said}. First of all: {found[0].message}."
+
+
+def _open_questions(result: Result) -> str:
+    codes = {item.code for item in result.not_tested}
+    return f" {many(len(codes), 'check')} could not be made on every log; the report says why." if codes else ""
 
 
 def _key_figures(result: Result) -> Table:
     count: dict[str, int] = defaultdict(int)
     for check in result.checks:
         count[check.level] += 1
-    rows = (("logs", len(result.logs) + len(result.rejected)), ("checks", len(result.checks)), ("passed", count["ok"]),
-            ("look at it", count["warn"]), ("mended", count["repair"]), ("not usable", count["reject"]))
+    rows = (("logs", len(result.logs) + len(result.rejected)), ("checks made", len(result.checks)), ("passed", count["ok"]),
+            ("look at it", count["warn"]), ("mended", count["repair"]), ("not usable", count["reject"]),
+            ("not tested", len(result.not_tested)))
     return Table(("what", "number"), rows)
 
 
 def _found_section(found: list[Check]) -> Section:
     more = len(found) - _FINDINGS_SHOWN
     text = (f"{more} more stand in result.json.",) if more > 0 else ()
-    return Section("What was found", text, (checks_table(found[:_FINDINGS_SHOWN]),))
+    return Section("What was found", text, (checks_table(found[:_FINDINGS_SHOWN], as_given=True),))
 
 
 def _passed_section(result: Result) -> Section:
@@ -228,14 +251,28 @@ def _passed_section(result: Result) -> Section:
     for check in result.checks:
         if check.level == "ok":
             groups[check.code].append(check)
-    rows = tuple((code, len(group), group[0].message) for code, group in sorted(groups.items()))
-    columns = ("code", "logs", "what was measured, in the first of them")
+    rows = tuple((group[0].message, len({c.where.split(",")[0] for c in group}), f"{code} {title_of(code)}".strip())
+                 for code, group in sorted(groups.items()))
+    columns = ("what was measured, in the first of them", "logs", "code")
     return Section("What was looked at and is in order", (), (Table(columns, rows),))
 
 
+def _not_tested_section(result: Result) -> Section:
+    groups: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for item in result.not_tested:
+        groups[item.code, item.reason].append(item.where)
+    rows = tuple((reason, len(places), places[0], f"{code} {title_of(code)}".strip())
+                 for (code, reason), places in sorted(groups.items()))
+    return Section("Not tested, and why", ("Neither passed nor failed: these logs give nothing to judge by.",),
+                   (Table(("why", "logs", "the first of them", "code"), rows),))
+
+
 def _logs_section(result: Result) -> Section:
-    columns = ("name", "experiment", "role", "joints", "samples", "duration [s]", "rate [Hz]", "integrity")
-    rows = tuple((log.name, log.experiment if log.moving_joint is None else f"{log.experiment}, joint {log.moving_joint}",
+    several = len({log.robot for log in result.logs}) > 1
+    columns = ("name", *(("robot",) if several else ()), "experiment", "role", "joints", "samples", "duration [s]", "rate [Hz]",
+               "integrity")
+    rows = tuple((log.name, *((log.robot,) if several else ()),
+                  log.experiment if log.moving_joint is None else f"{log.experiment}, joint {log.moving_joint}",
                   log.role, log.joints, log.samples, log.duration, 1.0 / log.sample_time, log.integrity) for log in result.logs)
     return Section("The logs", (), (Table(columns, rows, tones=tuple(level_tone([log.verdict]) for log in result.logs)),))
 
@@ -245,9 +282,17 @@ def _log_section(log: LogSummary, preview: Preview) -> Section:
                    tuple((r.signal, r.joint, r.low, r.high, r.unit) for r in log.ranges))
     uneven = log.jitter > 1e-3 or log.dropped_samples > 0 or bool(log.gaps)
     steps = ", ".join("not visible" if step is None else f"{step:.3g}" for step in log.encoder_step)
-    text = (f"{log.usable_samples} of {log.samples} samples can be used. Encoder steps [rad]: {steps}. SHA-256 {log.sha256[:16]}…",)
-    return Section(f"Log {log.name}", text, (ranges,), preview_figures(preview, uneven))
+    # a hyphen and a blank at which no line is broken
+    text = (f"{log.usable_samples} of {log.samples} samples can be used. Encoder steps [rad]: {steps}. "
+            f"SHA\u2011256\u00a0{log.sha256[:16]}…",)
+    return Section(f"Log {log.name}", text, (ranges,) if ranges.rows else (), preview_figures(preview, uneven))
+
+
+def _onward(result: Result, inputs: Inputs) -> Inputs:
+    """Later stages see the logs that can be used."""
+    usable = tuple(opened for opened, summary in zip(inputs.logs, result.logs, strict=True) if summary.verdict != "reject")
+    return replace(inputs, logs=usable)
 
 
 STAGE = Stage("inspect", "Examine logs", Settings, compute, report, read, exit_code=exit_code,
-              checks=lambda result: result.checks[result.from_reading:])
+              checks=lambda result: result.checks[result.from_reading:], onward=_onward)

@@ -102,4 +102,12 @@ def report(result: Result) -> Report:
     return motion_report(result.logs)
 
 
-STAGE = Stage("reconstruct", "Reconstruct motion", Settings, compute, report, read_logs, write, checks=lambda result: result.checks)
+def _onward(result: Result, inputs: Inputs) -> Inputs:
+    """Later stages take the motion from the derived logs instead of reconstructing it again."""
+    found = iter(result.logs)
+    logs = tuple(opened if opened.log.origin == "planned" else replace(opened, log=next(found).log) for opened in inputs.logs)
+    return replace(inputs, logs=logs)
+
+
+STAGE = Stage("reconstruct", "Reconstruct motion", Settings, compute, report, read_logs, write,
+              checks=lambda result: result.checks, onward=_onward)

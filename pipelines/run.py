@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import Check
+from pipelines.errors import Check, InputRejected, NothingMatched, RrridError
 from pipelines.log.files import Opened
 from pipelines.log.results import NOT_STORED
 from pipelines.report.report import Report, Section, Table, Tone
@@ -24,7 +24,7 @@ from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 __all__ = ["STAGE", "STEPS", "Group", "Result", "Settings", "Step", "compute", "report"]
 
 # Modules of the stages, in the order they are run.
-STEPS = ("inspect",)
+STEPS = ("inspect", "reconstruct", "estimate_bps")
 
 _WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
 
@@ -69,14 +69,31 @@ class Result:
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
     """Run every stage on every group of logs."""
-    groups = tuple(Group(name, tuple(_step(module, part, settings) for module in STEPS)) for name, part in _apart(inputs))
+    groups = tuple(Group(name, _stages(part, settings)) for name, part in _apart(inputs))
     return Result((), groups) if len(groups) > 1 else Result(groups[0].stages)
 
 
-def _step(module: str, inputs: Inputs, settings: Settings) -> Step:
-    stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
-    result = stage.compute(inputs, settings.stages.get(stage.name) or stage.settings())
-    return Step(stage.name, stage.exit_code(result, True), result, stage.report(result), stage.checks(result))
+def _stages(inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
+    """Every stage in turn, each on what those before it leave; one that finds nothing to read is passed over."""
+    steps = []
+    for module in STEPS:
+        stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
+        try:
+            result = stage.compute(inputs, settings.stages.get(stage.name) or stage.settings())
+        except (NothingMatched, InputRejected) as problem:
+            steps.append(_without(stage, problem))
+            continue
+        steps.append(Step(stage.name, stage.exit_code(result, True), result, stage.report(result), stage.checks(result)))
+        inputs = stage.onward(result, inputs)
+    return tuple(steps)
+
+
+def _without(stage: Stage[Any, Any], problem: RrridError) -> Step:
+    """A stage that has no result: nothing to read (passed over), or an input it cannot use."""
+    passed_over = problem.exit_code == 5
+    words = f"{'Passed over' if passed_over else 'Not done'}: {problem.message}. {problem.remedy[:1].upper()}{problem.remedy[1:]}."
+    check = Check(problem.code, "warn" if passed_over else "reject", problem.message, problem.where, problem.remedy, not passed_over)
+    return Step(stage.name, problem.exit_code, None, Report(stage.title, words, "neutral" if passed_over else "bad"), (check,))
 
 
 def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
@@ -99,7 +116,7 @@ def report(result: Result) -> Report:
     """The worst verdict first, one table of all stages, then every stage's report."""
     steps = [(group.name, step) for group in result.groups for step in group.stages]
     tone = max((step.report.tone for _, step in steps), key=_WORST.index)
-    verdicts = [f"{name}: {step.report.verdict}" if name else step.report.verdict for name, step in steps]
+    verdicts = [text for group in result.groups for text in _verdicts(group)]
     table = Table(("logs", "stage", "verdict"), tuple((name or "all", step.name, step.report.verdict) for name, step in steps),
                   caption="Each stage in the order it was run.", tones=tuple(step.report.tone for _, step in steps))
     single = len(steps) == 1
@@ -107,6 +124,13 @@ def report(result: Result) -> Report:
     for name, step in steps:
         sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
     return Report("Run", " ".join(verdicts), tone, steps[0][1].report.key_figures if single else None, tuple(sections))
+
+
+def _verdicts(group: Group) -> list[str]:
+    """What the last stage that had a result says, after whatever is not in order before it."""
+    last = max((i for i, step in enumerate(group.stages) if step.result is not None), default=-1)
+    shown = [step for i, step in enumerate(group.stages) if i == last or step.report.tone in ("attention", "bad")]
+    return [f"{group.name}: {step.report.verdict}" if group.name else step.report.verdict for step in shown]
 
 
 def _titled(sections: Iterable[Section], prefix: str) -> list[Section]:
@@ -122,12 +146,12 @@ def write(result: Result, folder: Path, request: Request) -> None:
     for group in result.groups:
         for step in group.stages:
             stage: Stage[Any, Any] = import_module(f"pipelines.{step.name.replace('-', '_')}").STAGE
-            if stage.write is not None:
+            if stage.write is not None and step.result is not None:
                 stage.write(step.result, folder / slug(group.name) / step.name if group.name else folder / step.name, request)
 
 
 def _exit_code(result: Result, check: bool) -> int:
-    codes = [step.exit for group in result.groups for step in group.stages]
+    codes = [step.exit for group in result.groups for step in group.stages if step.exit != NothingMatched.exit_code]
     return 3 if 3 in codes else max(codes) if check else 0
 
 

@@ -1,0 +1,82 @@
+"""The whole workflow: every stage on what the ones before it leave, and nothing mixed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines import estimate_bps, run
+from pipelines.log.experiment import Signal
+from pipelines.log.files import open_log, write_log
+from pipelines.stage import Outcome, Request, run_stage
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Outcome[run.Result]:
+    """`rrrid run` on the sample logs."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    return run_stage(run.STAGE, Request((samples / "rrr-closed-form",), out=out), run.Settings())
+
+
+def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result]) -> None:
+    """inspect, reconstruct, estimate-bps; each with its result in result.json and its files in a folder of its name."""
+    stages = json.loads((whole.folder / "result.json").read_text())["stages"]
+    assert [(stage["name"], stage["exit"]) for stage in stages] == [("inspect", 0), ("reconstruct", 0), ("estimate-bps", 0)]
+    assert {p.name for p in (whole.folder / "reconstruct/logs").iterdir()} == {p.name for p in (
+        whole.folder / "estimate-bps/logs").iterdir()} | {f"{n}.h5" for n in ("friction-1", "friction-2", "friction-3", "hold-1")}
+    assert (whole.folder / "estimate-bps/model.json").is_file()
+    assert "parameters are clearly visible" in whole.report.verdict
+
+
+def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
+    """estimate-bps inside `run`, on derived logs, is bit for bit estimate-bps on the recordings."""
+    alone = run_stage(estimate_bps.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path / "out"), estimate_bps.Settings())
+    inside = json.loads((whole.folder / "result.json").read_text())["stages"][2]["result"]
+    assert inside["parameters"] == alone.json["parameters"]
+    assert inside["relative_error"] == alone.json["relative_error"]
+    assert (whole.folder / "estimate-bps/model.json").read_bytes() == (alone.folder / "model.json").read_bytes()
+
+
+def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path: Path) -> None:
+    """Only friction logs: no rigid body is estimated, the reason is said, and that is no failure."""
+    for number in (1, 2):
+        (tmp_path / "logs").mkdir(exist_ok=True)
+        shutil.copy(samples / f"rrr-closed-form/friction-{number}.h5", tmp_path / "logs")
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", check=True), run.Settings())
+    last = outcome.result.stages[-1]
+    assert (last.name, last.exit, last.result, outcome.exit_code) == ("estimate-bps", 5, None, 0)
+    assert "no excitation or free log" in last.report.verdict
+    assert "ecord an excitation" in last.report.verdict
+
+
+def test_a_bad_log_costs_itself_alone(samples: Path, tmp_path: Path) -> None:
+    """One damaged file and one log that stands still beside good ones: exit 3, and the rest is estimated as without them."""
+    (tmp_path / "logs").mkdir()
+    for name in ("excitation-1", "excitation-2"):
+        shutil.copy(samples / f"rrr-closed-form/{name}.h5", tmp_path / "logs")
+    good = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "good"), run.Settings())
+    (tmp_path / "logs/cut.h5").write_bytes((tmp_path / "logs/excitation-1.h5").read_bytes()[:9000])
+    log = open_log(tmp_path / "logs/excitation-1.h5").log
+    still = {**log.signals, "t": Signal(np.zeros(log.n_samples), "s", "time")}
+    write_log(tmp_path / "logs/still.h5", replace(log, name="still", signals=still))
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out"), run.Settings())
+    assert outcome.exit_code == 3
+    assert {c.code for c in outcome.checks if c.level == "reject"} == {"RRID-F02", "RRID-T02"}
+    assert outcome.json["stages"][2]["result"]["parameters"] == good.json["stages"][2]["result"]["parameters"]
+
+
+def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> None:
+    """Two arms in one folder: one run each, and neither's parameters know of the other."""
+    (tmp_path / "logs/a").mkdir(parents=True)
+    shutil.copy(samples / "rrr-closed-form/excitation-1.h5", tmp_path / "logs/a")
+    log = open_log(tmp_path / "logs/a/excitation-1.h5").log
+    write_log(tmp_path / "logs/b.h5", replace(log, robot_name="other", robot_text=log.robot_text.replace("rrr-tue", "other")))
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), run.Settings())
+    assert outcome.json["stages"] == []
+    assert [group["name"] for group in outcome.json["runs"]] == ["rrr-tue", "other"]
+    assert {p.name for p in (tmp_path / "out").iterdir() if p.is_dir()} == {"rrr-tue", "other"}
