@@ -106,7 +106,7 @@ def _friction_of(model: Arm | None, log: ExperimentLog) -> Arm | None:
 
 def _result(fitted: Fitted, judged: Judged, arm: Arm, settings: Settings) -> Result:
     found, motions = fitted.estimate, (*fitted.motions, *judged.motions)
-    both = {"identify": found.solution.errors, "validate": judged.errors}
+    both = {"identify": fitted.errors, "validate": judged.errors}
     torques = [(log, motion, torque_parts(arm, log, motion)) for log, motion in motions]
     growth, checked = found.convergence(), consistency(found, arm.body)
     names = [column.name for column in found.columns.names]

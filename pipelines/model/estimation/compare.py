@@ -41,6 +41,6 @@ def compare(identify: Sequence[ExperimentLog], validate: Sequence[ExperimentLog]
             rows.append(Compared(method, used, float("nan"), float("nan"), (), (), problem.message))
             continue
         rigid = list(columns.rigid)
-        rows.append(Compared(method, used, found.solution.errors.relative_error, errors.relative_error,
+        rows.append(Compared(method, used, other.errors.relative_error, errors.relative_error,
                              tuple(map(float, found.beta[rigid])), tuple(map(float, found.std[rigid])), ""))
     return tuple(rows)

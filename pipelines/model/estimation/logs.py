@@ -9,8 +9,9 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.fit.least_squares import Errors
+from pipelines.fit.statistics import gather
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.estimation.estimate import Estimate, by_blocks, estimate, power_of
+from pipelines.model.estimation.estimate import Estimate, Stacked, by_blocks, estimate, power_of
 from pipelines.model.estimation.regression import Columns, Conditioning, LogEquations, condition
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
@@ -38,6 +39,7 @@ class Fitted:
     estimate: Estimate
     motions: Motions
     recipe: Recipe  # with the cut-off that was used
+    errors: Errors  # on the logs that were fitted
 
     @property
     def cutoff_hz(self) -> float | None:
@@ -61,17 +63,30 @@ def fit_logs(logs: Sequence[ExperimentLog], columns: Columns, recipe: Recipe, we
         known = [cutoff for cutoff in asked if cutoff is not None]
         recipe = replace(recipe, cutoff_hz=max(known) if known else None)
     equations = [equations_of(log, found, recipe, columns) for log, found in motions]
-    return Fitted(estimate(equations, columns, weighted), motions, recipe)
+    found = estimate(equations, columns, weighted)
+    return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, motions, recipe, columns))
 
 
 def judge(fitted: Fitted, logs: Sequence[ExperimentLog], blocks: int) -> Judged:
     """Held-out errors: on `logs`, or on contiguous blocks of the fitted ones where there are none."""
     found = fitted.estimate
     if not logs:
-        return Judged(by_blocks(found.equations, blocks, found.solution.weights), "blocks", ())
+        errors = by_blocks(found.equations, blocks, found.solution.weights)
+        return Judged(_of_whole_torque(errors, fitted.motions, fitted.recipe, found.columns), "blocks", ())
     motions = tuple((log, reconstruct(log, fitted.recipe.how)) for log in logs)
     equations = [equations_of(log, motion, fitted.recipe, found.columns) for log, motion in motions]
-    return Judged(power_of(equations, found.beta), "logs", motions)
+    errors = power_of(equations, found.beta)
+    return Judged(_of_whole_torque(errors, motions, fitted.recipe, found.columns), "logs", motions)
+
+
+def _of_whole_torque(found: Errors, motions: Motions, recipe: Recipe, columns: Columns) -> Errors:
+    """The same residual beside the whole torque, where a known part had been subtracted from it."""
+    if recipe.known is None:
+        return found
+    whole = gather(Stacked([equations_of(log, motion, replace(recipe, known=None), columns) for log, motion in motions]))
+    counts = np.maximum(whole.counts, 1)
+    return replace(found, signal_rms=np.sqrt(whole.power / counts),
+                   relative_error=float(np.sqrt(np.sum(np.square(found.rms) * counts) / whole.power.sum())))
 
 
 def _condition(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns) -> Conditioning:

@@ -25,7 +25,7 @@ class Quick(Fourier):
 
     def __call__(self, t: Array) -> Motion:
         if len(t) > 4096:
-            parts = [self(part) for part in np.array_split(t, len(t) // 4096)]
+            parts = [self(part) for part in np.array_split(t, -(-len(t) // 4096))]
             return Motion(t, *(np.concatenate([getattr(part, name) for part in parts]) for name in ("q", "dq", "ddq")))
         w = 2 * math.pi * self.df * np.arange(1, self.a.shape[1] + 1)
         turn = np.exp(2j * math.pi * self.df * t)
