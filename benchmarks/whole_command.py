@@ -7,6 +7,8 @@ reconstructs each joint with a filterpy loop, builds Pinocchio's regressor sampl
 alike with scipy and solves with np.linalg.lstsq. It prints base parameters, while the command also holds blocks out, gives
 standard deviations, checks links and the balance of power, and writes a model and a derived log.
 
+Two scripts run: with filterpy's observer, and with its RTS smoother, which is what the command does by default.
+
 The answers are compared by the torque they predict for the validation log: the errors are of it, relative.
 """
 
@@ -31,7 +33,7 @@ import h5py, numpy as np, pinocchio as pin
 from filterpy.kalman import KalmanFilter
 from scipy.signal import butter, sosfiltfilt
 
-log, cutoff, every, out = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
+log, cutoff, every, out, method = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5]
 with h5py.File(log) as file:
     q, tau = file["signals/q"][:], file["signals/tau"][:]
 T, n, t = 1e-3, q.shape[1], np.arange(len(q))
@@ -39,9 +41,13 @@ states = np.empty((len(t), n, 3))
 for j in range(n):
     f = KalmanFilter(dim_x=3, dim_z=1)
     f.F = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])
-    g = np.array([T**3 / 6, T**2 / 2, T]) * 290.0
+    g = np.array([T**3 / 6, T**2 / 2, T]) * (290.0 if method == "observer" else 12.0)
     f.H, f.R, f.Q = np.eye(3)[:1], np.array([[1e-10 / 12]]), np.outer(g, g)
     f.x, f.P = np.array([q[0, j], 0.0, 0.0]), np.diag([1e-10, 1e-2, 1.0])
+    if method == "smoother":
+        means, covariances, _, _ = f.batch_filter(q[:, j], update_first=True)
+        states[:, j] = f.rts_smoother(means, covariances)[0]
+        continue
     for k in range(len(t)):
         f.update(q[k, j])
         states[k, j] = f.x
@@ -88,15 +94,18 @@ def main() -> None:
         script.write_text(PEER)
         ours = [rrrid, "estimate-bps", log, "--no-report", "--quiet", "--out", str(here / "out")]
         cpu_seconds(ours)
-        peer = [sys.executable, str(script), log, *_conditioning(here / "out"), str(here / "peer.json")]
-        cpu_seconds(peer)
-        runs = [(cpu_seconds(ours), cpu_seconds(peer)) for _ in range(repeats)]
-        errors = _errors(here)
-    mine, theirs = (statistics.median(side) for side in zip(*runs, strict=True))
-    ratios = sorted(b / a for a, b in runs)
-    print(f"rrrid estimate-bps {1e3 * mine:.0f} ms CPU, script {1e3 * theirs:.0f} ms, ratio {statistics.median(ratios):.1f} "
-          f"({ratios[0]:.1f}-{ratios[-1]:.1f}); goals: 750 ms at most, 3.5 at least")
-    print(f"rigid torque along excitation-2 against the truth: ours {errors[0]:.1e}, script {errors[1]:.1e}")
+        peers = {method: [sys.executable, str(script), log, *_conditioning(here / "out"), str(here / f"{method}.json"), method]
+                 for method in ("observer", "smoother")}
+        for peer in peers.values():
+            cpu_seconds(peer)
+        runs = [(cpu_seconds(ours), *(cpu_seconds(peer) for peer in peers.values())) for _ in range(repeats)]
+        mine, *theirs = (1e3 * statistics.median(side) for side in zip(*runs, strict=True))
+        errors = _errors(here, list(peers))
+    print(f"rrrid estimate-bps: {mine:.0f} ms CPU, error {errors[0]:.1e}; goals: 750 ms at most, 3.5 times less than a script")
+    for k, method in enumerate(peers):
+        ratios = sorted(run[k + 1] / run[0] for run in runs)
+        print(f"script with filterpy's {method}: {theirs[k]:.0f} ms, error {errors[k + 1]:.1e}, "
+              f"ratio {statistics.median(ratios):.1f} ({ratios[0]:.1f}-{ratios[-1]:.1f})")
 
 
 def _conditioning(out: Path) -> tuple[str, str]:
@@ -105,8 +114,8 @@ def _conditioning(out: Path) -> tuple[str, str]:
     return str(result["filter_hz"]), str(int(1e3 / (4 * result["filter_hz"])))
 
 
-def _errors(folder: Path) -> tuple[float, float]:
-    """‖Y β - τ‖ / ‖τ‖ of the rigid torque along another motion, known exactly: ours, the script's."""
+def _errors(folder: Path, methods: list[str]) -> list[float]:
+    """‖Y β - τ‖ / ‖τ‖ of the rigid torque along another motion, known exactly: ours, then the scripts'."""
     import numpy as np
     import pinocchio as pin
 
@@ -123,11 +132,12 @@ def _errors(folder: Path) -> tuple[float, float]:
     scope: dict[str, object] = {"np": np, "pin": pin}
     building = PEER[PEER.index("model, parent"):PEER.index("Y = np.array")]
     exec(building, scope)
-    beta = np.array(json.loads((folder / "peer.json").read_text()))[:30]
-    theirs = [pin.computeJointTorqueRegressor(scope["model"], scope["data"], *state) @ beta
-              for state in zip(motion.q, motion.dq, motion.ddq, strict=True)]
-    mine = ours.body.torque(motion.q, motion.dq, motion.ddq, ours.p)
-    return tuple(float(np.linalg.norm(found - tau) / np.linalg.norm(tau)) for found in (mine, theirs))  # type: ignore[return-value]
+    found = [ours.body.torque(motion.q, motion.dq, motion.ddq, ours.p)]
+    for method in methods:
+        beta = np.array(json.loads((folder / f"{method}.json").read_text()))[:30]
+        found.append(np.array([pin.computeJointTorqueRegressor(scope["model"], scope["data"], *state) @ beta
+                               for state in zip(motion.q, motion.dq, motion.ddq, strict=True)]))
+    return [float(np.linalg.norm(torque - tau) / np.linalg.norm(tau)) for torque in found]
 
 
 if __name__ == "__main__":

@@ -72,7 +72,8 @@ def draw_convergence(axis: Axes, samples: Array, beta: Array, std: Array, names:
             axis.plot(samples, ratio[:, k], color=style.GREY, linewidth=0.6, alpha=0.5)
     for color, k in zip(colors, sorted(loud), strict=False):
         axis.plot(samples, ratio[:, k], color=color, linewidth=1.2, label=printable(names[shown[k]], 40))
-    axis.set_ylim(0.5, 1.5)
+    reach = np.clip(1.3 * np.nanmax(np.abs(half - 1.0), initial=0.0), 0.02, 0.5)  # the first quarter may leave the frame
+    axis.set_ylim(1.0 - reach, 1.0 + reach)
     axis.set_xlabel("equations a joint")
     axis.set_ylabel("estimate / final estimate")
     if len(shown):

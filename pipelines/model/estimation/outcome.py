@@ -10,6 +10,7 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import Validity
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.logs import Fitted, Motions
+from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed
 
 __all__ = ["Course", "Direction", "Estimated", "course", "parameters", "torques", "validity"]
@@ -51,15 +52,24 @@ class Course:
 
 
 def parameters(fitted: Fitted, arm: Arm) -> tuple[Estimated, ...]:
+    """Every parameter of the fit, in words; without a value where these logs do not determine it."""
     found, known, rows = fitted.estimate, arm.body.known_parameters(), []
+    meanings = _meanings(found.columns)
     for k, column in enumerate(found.columns.names):
         sure = bool(found.trusted[k])
         place = found.columns.kept[k] if k < len(found.columns.kept) else None
-        words = arm.body.parameters[place].combination if place is not None else column.name.partition(":")[0].replace("_", " ")
         rows.append(Estimated(column.name, float(found.beta[k]) if sure else None,
                               float(found.std[k]) if sure else None, column.unit,
-                              bool(found.visible[k]), words, None if known is None or place is None else float(known[place])))
+                              bool(found.visible[k]), meanings[k], None if known is None or place is None else float(known[place])))
     return tuple(rows)
+
+
+def _meanings(columns: Columns) -> list[str]:
+    """What each column stands for: the combination of link parameters, or "Coulomb friction, waist: friction torque …"."""
+    joints = columns.body.robot.joints
+    laws = [f"{law.title}{'' if law.joint is None else f', {joints[law.joint - 1].name}'}: {quantity.meaning}"
+            for law in columns.laws for quantity in law.parameters if not quantity.shape]
+    return [*(columns.body.parameters[i].combination for i in columns.kept), *laws]
 
 
 def torques(arm: Arm, log: ExperimentLog, motion: Reconstructed) -> ArmTorque:

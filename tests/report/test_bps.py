@@ -1,0 +1,63 @@
+"""The report of an estimate says what the estimate says, and no number where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines import estimate_bps
+from pipelines.model.estimation.result import Result
+from pipelines.report.bps_report import bps_report
+from pipelines.report.render import render_report
+from pipelines.stage import Request, run_stage
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    log = Path(__file__).resolve().parents[2] / "sample_logs/rrr-closed-form/excitation-1.h5"
+    request = Request((log,), out=tmp_path_factory.mktemp("bps") / "out", no_report=True)
+    return run_stage(estimate_bps.STAGE, request, estimate_bps.Settings(compare=False)).result
+
+
+def page(result: Result) -> str:
+    html = render_report(bps_report(result), {})["report.html"]
+    return html if isinstance(html, str) else html.decode()
+
+
+def test_a_good_estimate_is_called_good(result: Result) -> None:
+    report = bps_report(result)
+    assert report.tone == "good"
+    assert f"{sum(p.visible for p in result.parameters)} of {len(result.parameters)} parameters" in report.verdict
+    assert "for none has role validate" in report.verdict  # blocks were held out, and that is said
+    assert "gives the same parameters" in page(result)
+
+
+def test_what_is_not_determined_has_no_number(result: Result) -> None:
+    lost = replace(result.parameters[0], value=None, std=None, visible=False)
+    unsure = replace(result, parameters=(lost, *result.parameters[1:]), unresolved="no sample shows p1", physically_consistent=None)
+    report = bps_report(unsure)
+    assert report.tone == "bad"
+    assert "no sample shows p1" in report.verdict
+    row = next(row for row in report.sections[0].tables[0].rows if row[0] == "p1")
+    assert row[1] == "not determined"
+    assert "cannot be said" in page(unsure)
+
+
+def test_impossible_links_and_a_balance_that_differs_are_said(result: Result) -> None:
+    assert result.balance is not None
+    apart = tuple(np.full(len(result.balance.apart), 7.0))
+    wrong = replace(result, physically_consistent=False, balance=replace(result.balance, agree=False, apart=apart))
+    assert bps_report(wrong).tone == "bad"
+    assert "No links that could exist" in bps_report(wrong).verdict
+    assert "gives other parameters" in page(wrong)
+
+
+def test_names_from_logs_are_inert(result: Result) -> None:
+    """X08, X09: joints may be called anything."""
+    hostile = "<script>alert(1)</script> $a_{ [/x]"
+    named = replace(result, joints=(hostile, *result.joints[1:]),
+                    courses=tuple(replace(c, name=hostile) for c in result.courses))
+    assert "<script>" not in page(named)
