@@ -18,6 +18,7 @@ from pipelines.log.model_file import model_text, read_model
 from pipelines.log.results import read_series
 from pipelines.log.robot import format_robot
 from pipelines.stage import Outcome, Request, run_stage
+from tests.cli.test_cli import rrrid
 from tests.faulty import dropped, spiky
 from tests.healthy import changed, with_signal
 from tests.model.estimation.experiments import arm, experiment, truth
@@ -270,3 +271,21 @@ def test_a_model_of_another_robot_is_refused(good: ExperimentLog, tmp_path: Path
     (tmp_path / "small.json").write_text(model_text(small), encoding="utf-8")
     with pytest.raises((UsageError, InputRejected)):
         stage(tmp_path, good, settings=replace(SYMMETRIC, model=str(tmp_path / "small.json")))
+
+
+def test_the_command_line(good: ExperimentLog, held_out: ExperimentLog, tmp_path: Path) -> None:
+    """Exit 5 without a log to fit, 1 with --check where a gate failed; --model and --json; nothing but JSON on stdout."""
+    write_log(tmp_path / "judge/a.h5", held_out)
+    nothing = rrrid("estimate-bps", "judge", "--out", "o", cwd=tmp_path)
+    assert (nothing.returncode, "RRID-C06" in nothing.stderr, nothing.stdout) == (5, True, "")
+    write_log(tmp_path / "still/a.h5", experiment(0, moving=np.array([0.0, 0.0, 1.0])))
+    gate = rrrid("estimate-bps", "still", "--out", "o1", "--no-report", "--check", cwd=tmp_path)
+    assert gate.returncode == 1
+    assert "no sample shows p1" in gate.stdout
+    write_log(tmp_path / "good/a.h5", good)
+    (tmp_path / "given.json").write_text(model_text(arm().to_model()), encoding="utf-8")
+    given = rrrid("estimate-bps", "good", "--out", "o2", "--no-report", "--json", "--model", "given.json", cwd=tmp_path)
+    assert given.returncode == 0
+    assert json.loads(given.stdout)["friction"] == "given"
+    missing = rrrid("estimate-bps", "good", "--out", "o3", "--model", "nowhere.json", cwd=tmp_path)
+    assert (missing.returncode, "RRID-C04" in missing.stderr) == (2, True)
