@@ -20,16 +20,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from pipelines.errors import Check, RrridError
+from pipelines.errors import Check, EnvironmentFault, InputRejected, RrridError, clean
 from pipelines.log.atomic import replace_folder, staging_folder, write_file
-from pipelines.log.files import PROVENANCE, Opened, find_logs, hash_file, open_log
-from pipelines.log.places import given_names, keep_apart, refuse_foreign, renamed, short_names, slug, tilde
+from pipelines.log.files import PROVENANCE, Opened, expanded, find_logs, hash_file, open_log
+from pipelines.log.places import given_names, keep_apart, refuse_foreign, renamed, short_names, slug, tilde, written_by
 from pipelines.log.results import encode, json_text, write_series
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.report.report import Report
 
 __all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "read_logs", "refuse_foreign", "run_stage", "slug", "tilde"]
+
+_NAMED = 6  # rejected files, in one error
 
 S = TypeVar("S")
 R = TypeVar("R")
@@ -108,7 +110,8 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     """Open every log among the request's paths; the default reader of a stage.
 
     Raises:
-        InputRejected: one of them is rejected, unless `keep_rejected` (the doctor looks at those too).
+        InputRejected: some of them are rejected, unless `keep_rejected` (the doctor looks at those too). The error is
+            the first one's, and names the others.
     """
     del settings
     paths, checks = find_logs(request.paths)
@@ -120,18 +123,39 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
         try:
             opened.append(open_log(path, assume_units=request.assume_units, joints=request.joints, robot=robot))
         except RrridError as problem:
-            if not keep_rejected or problem.exit_code != 3:
+            if problem.exit_code != 3:
                 raise
             rejected.append(Rejected(path, problem))
+    if rejected and not keep_rejected:
+        raise _all_of(rejected)
     names = sorted({opened_log.log.robot_name for opened_log in opened})
     return Inputs(tuple(opened), tuple(rejected), checks, paths, {o.path: o.sha256 for o in opened}, robot=robot,
                   label=_label(request.paths),
                   robot_name=names[0] if len(names) == 1 else "several" if names else "unknown")
 
 
+def _all_of(rejected: list[Rejected]) -> RrridError:
+    """The first of several errors, with the names of the other files and their codes."""
+    first, others = rejected[0].error, rejected[1:]
+    if not others:
+        return first
+    named = ", ".join(f"{clean(r.path.name, 40)} ({r.error.code})" for r in others[:_NAMED])
+    more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+    return InputRejected(first.code.removeprefix("RRID-"), f"{clean(first.message, 160)}; {len(others)} more cannot be used: "
+                         f"{named}{more}", where=first.where or rejected[0].path, remedy=first.remedy)
+
+
 def _label(paths: Iterable[Path]) -> str:
+    """What the default --out calls the inputs: the name of the first one's folder.
+
+    Of rrrid's own output in runs/ROBOT/LABEL/COMMAND, or of its `logs`, it is LABEL: what is made of an import stands
+    beside it, and two imports of one robot stay apart. Of own output that lies elsewhere it is that folder's name.
+    """
     first = next(iter(paths)).absolute()
-    return first.name if first.is_dir() else first.parent.name
+    folder = first if first.is_dir() else first.parent
+    if folder.name == "logs" and written_by(folder.parent):
+        folder = folder.parent
+    return folder.parent.name if folder.name == written_by(folder) else folder.name
 
 
 def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
@@ -140,6 +164,7 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     Raises:
         RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed.
     """
+    request = dataclasses.replace(request, paths=expanded(request.paths))
     given = given_names(request.paths)
     try:
         return _run(stage, dataclasses.replace(request, paths=tuple(path.absolute() for path in request.paths)), settings)
@@ -176,6 +201,9 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         _unchanged(hashes)
         _provenance(staging, stage, settings, request, hashes, started)
         replace_folder(staging, out)
+    except EnvironmentFault as problem:
+        problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
+        raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)
     return Outcome(result, object_, report, out, stage.exit_code(result, request.check), renamed(checks, names))

@@ -33,8 +33,9 @@ def environment_faults(path: Path) -> Iterator[None]:
 
 
 def fault_of(problem: OSError, path: Path) -> EnvironmentFault:
-    """The environment fault behind an operating-system error."""
-    where = problem.filename or path
+    """The environment fault behind an operating-system error, at the file it names, or at `path` where that is a draft."""
+    named = problem.filename
+    where = named if named and not os.path.basename(os.fsdecode(named)).startswith(_MARK) else path
     if problem.errno in (errno.ENOSPC, errno.EDQUOT):
         return EnvironmentFault("P02", "no space left on the disk", where=where, remedy="free space and run again")
     if problem.errno in (errno.EACCES, errno.EPERM, errno.EROFS):

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import errno
+import glob
 import hashlib
 import json
 import os
@@ -25,7 +26,7 @@ from pipelines.log.joints import chosen
 from pipelines.log.robot import RobotDescription
 from pipelines.log.structure import conform, refuse_unlike_format
 
-__all__ = ["ENDINGS", "PROVENANCE", "Opened", "find_logs", "hash_file", "open_log", "regular_file", "write_log"]
+__all__ = ["ENDINGS", "PROVENANCE", "Opened", "expanded", "find_logs", "hash_file", "open_log", "regular_file", "write_log"]
 
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
@@ -45,7 +46,7 @@ class Opened:
     container: str = "hdf5"  # or "parquet": what the content is, whatever the file's name says
 
 
-def write_log(path: Path, log: ExperimentLog) -> None:
+def write_log(path: Path | str, log: ExperimentLog) -> None:
     """Write `log` to `path`, the container chosen by its ending, atomically.
 
     Raises:
@@ -53,6 +54,7 @@ def write_log(path: Path, log: ExperimentLog) -> None:
         UsageError: C02, the ending names no container.
         EnvironmentFault: disk full, no permission; what stood at `path` is untouched.
     """
+    path = Path(path)
     container = ENDINGS.get(path.suffix.lower())
     if container is None:
         raise UsageError("C02", f"'{path.suffix}' names no container", where=path, remedy="end the name in .h5 or .parquet")
@@ -64,7 +66,7 @@ def write_log(path: Path, log: ExperimentLog) -> None:
     write_file(path, lambda draft: write(draft, log))
 
 
-def open_log(path: Path, *, assume_units: bool = False, only: Collection[str] | None = None, joints: tuple[int, ...] = (),
+def open_log(path: Path | str, *, assume_units: bool = False, only: Collection[str] | None = None, joints: tuple[int, ...] = (),
              robot: RobotDescription | None = None) -> Opened:
     """Read the log in `path`, in a guarded child, and hold it against its digest, its manifest and the format.
 
@@ -79,6 +81,11 @@ def open_log(path: Path, *, assume_units: bool = False, only: Collection[str] | 
         InputRejected: the file is damaged, hostile or not a log.
         EnvironmentFault: no permission, or another program is writing it.
     """
+    return _open(Path(path), assume_units, only, joints, robot)
+
+
+def _open(path: Path, assume_units: bool, only: Collection[str] | None, joints: tuple[int, ...],
+          robot: RobotDescription | None) -> Opened:
     status = regular_file(path)
     with _reading(path) as handle:
         sha256 = hash_file(path)
@@ -210,6 +217,24 @@ def _listed(folder: Path, path: Path) -> str | None:
     except (OSError, UnicodeDecodeError):
         return None
     return {entry.strip().lstrip("*"): value for value, _, entry in (line.partition(" ") for line in lines)}.get(name)
+
+
+def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
+    """`inputs` with every pattern (*, ?, [ ]) that the shell left as it was replaced by what it matches.
+
+    Raises:
+        NothingMatched: C06, a pattern matches nothing.
+    """
+    found: list[Path] = []
+    for path in inputs:
+        if os.path.lexists(path) or not glob.has_magic(str(path)):
+            found.append(path)
+            continue
+        matches = sorted(glob.glob(str(path), recursive=True))
+        if not matches:
+            raise NothingMatched("C06", "nothing matches that pattern", where=path, remedy="logs end in .h5 or .parquet")
+        found += map(Path, matches)
+    return tuple(dict.fromkeys(found))
 
 
 def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ...]]:

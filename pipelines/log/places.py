@@ -15,7 +15,7 @@ from typing import Any
 from pipelines.errors import UsageError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 
-__all__ = ["given_names", "keep_apart", "refuse_foreign", "renamed", "short_names", "slug", "tilde"]
+__all__ = ["given_names", "keep_apart", "refuse_foreign", "renamed", "short_names", "slug", "tilde", "written_by"]
 
 _ELSEWHERE = "choose another folder with --out"
 
@@ -50,9 +50,8 @@ def refuse_foreign(out: Path, force: bool = False) -> None:
     if not out.exists() or not any(out.iterdir()):
         return
     try:
-        about = json.loads((out / PROVENANCE).read_text(encoding="utf-8"))
-        ours: dict[str, object] = dict(about["outputs"]) if about.get("tool") == "rrrid" else {}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        ours: dict[str, object] = dict(_provenance(out)["outputs"])
+    except (KeyError, TypeError, ValueError):
         ours = {}
     if ours and force:
         return
@@ -64,6 +63,20 @@ def refuse_foreign(out: Path, force: bool = False) -> None:
     if edited := sorted(name for name, path in there.items() if name in ours and hash_file(path) != ours[name]):
         raise UsageError("C05", f"holds files that were changed since rrrid wrote them: {', '.join(edited[:3])}", where=out,
                          remedy=f"{_ELSEWHERE}, or replace them with --force")
+
+
+def written_by(folder: Path) -> str:
+    """The command of rrrid whose output `folder` is; "" where it is none."""
+    return str(_provenance(folder).get("command", ""))
+
+
+def _provenance(folder: Path) -> dict[str, Any]:
+    """The provenance.json of rrrid's own output in `folder`; empty where there is none."""
+    try:
+        about = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return about if isinstance(about, dict) and about.get("tool") == "rrrid" else {}
 
 
 def slug(text: str) -> str:
