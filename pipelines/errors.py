@@ -55,14 +55,25 @@ class RrridError(Exception):
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
-        remedy = f" {self.remedy[0].upper()}{self.remedy[1:].rstrip('.')}." if self.remedy else ""
-        return f"{self.code} {place}{self.message.rstrip('.')}.{remedy}"
+        remedy = f" {_sentence(_capital(self.remedy))}" if self.remedy else ""
+        return f"{self.code} {place}{_sentence(self.message)}{remedy}"
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, (type(self), self.code, self.message, self.where, self.remedy))
 
     def as_dict(self) -> dict[str, str]:
         return {"code": self.code, "where": self.where, "message": self.message, "remedy": self.remedy}
+
+
+def _sentence(text: str) -> str:
+    """`text` with one mark at its end: its own question mark, else a full stop."""
+    return text if text.endswith("?") else f"{text.rstrip('.')}."
+
+
+def _capital(text: str) -> str:
+    """`text` with a capital at its beginning, unless its first word is a name, an option or a value: h5, rrrid, --out."""
+    first = text.split()[0].rstrip(",.:;")
+    return text if first == "rrrid" or not (first.isalpha() and first.islower()) else text[0].upper() + text[1:]
 
 
 def _rebuild(kind: type[RrridError], code: str, message: str, where: str, remedy: str) -> RrridError:
@@ -121,9 +132,19 @@ class EnvironmentFault(RrridError):
     exit_code = 6
 
 
-class Interrupted(RrridError):
-    """A signal ended the work; nothing half written is left."""
+class Interrupted(KeyboardInterrupt):
+    """A signal ended the work; nothing half written is left.
+
+    Not of the family above: who catches an RrridError, to note what is wrong with one file and go on, must not catch
+    the user's wish to stop.
+    """
 
     def __init__(self, signal_number: int) -> None:
-        super().__init__("P06", "interrupted", remedy="run the same command again; nothing was half written")
+        super().__init__(signal_number)
         self.exit_code = 128 + signal_number
+
+    def as_error(self) -> RrridError:
+        """The same in the words of every other error."""
+        told = RrridError("P06", "interrupted", remedy="run the same command again; nothing was half written")
+        told.exit_code = self.exit_code
+        return told

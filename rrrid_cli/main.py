@@ -16,7 +16,8 @@ import typer
 
 from pipelines.errors import Interrupted, RrridError, UsageError
 from rrrid_cli.console import Teller, say_error, say_outcome
-from rrrid_cli.options import Common, LogPaths, numbers, with_common
+from rrrid_cli.options import Common, LogPaths, StageCommand, numbers, with_common
+from rrrid_cli.usage import WrongUsage, as_error
 
 __all__ = ["app", "entry"]
 
@@ -30,7 +31,23 @@ app = typer.Typer(name="rrrid", no_args_is_help=True, add_completion=False, pret
                   help="Identify robot arms from logs: what the simulation gets wrong, why, and how much better it can be.")
 
 
-@app.command()
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"rrrid {version('rrrid')}")
+        raise typer.Exit
+
+
+@app.callback()
+def about(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True,
+                                          callback=_say_version)] = False,
+) -> None:
+    """What holds for every command."""
+
+
+@app.command(cls=StageCommand)
 @with_common
 def run(logs: LogPaths, common: Common) -> None:
     """Do the whole workflow on a folder of logs; one report."""
@@ -39,7 +56,7 @@ def run(logs: LogPaths, common: Common) -> None:
     _go(STAGE, tuple(logs), common, {})
 
 
-@app.command()
+@app.command(cls=StageCommand)
 @with_common
 def inspect(
     logs: LogPaths, common: Common, trust_units: TrustUnits = None,
@@ -51,16 +68,17 @@ def inspect(
     _go(STAGE, tuple(logs), common, {"trust_units": trust_units, "allow_same": allow_same})
 
 
-@app.command("import")
+@app.command("import", cls=StageCommand)
 @with_common
 def import_(
     common: Common,
     recipe: Annotated[str | None,
                       typer.Argument(help="Recipe: a TOML file, or the name of a shipped one.", show_default=False)] = None,
-    source: Annotated[Path | None, typer.Option(help="Folder the recordings are in. [the recipe's]")] = None,
+    source: Annotated[Path | None, typer.Option(readable=False, help="Folder the recordings are in. [the recipe's]")] = None,
     map: Annotated[list[str] | None, typer.Option(help="Column to take for a signal: q_1=Joint_1. Repeatable.")] = None,
     trust_units: TrustUnits = None,
-    guess: Annotated[Path | None, typer.Option(help="Draft a recipe for this recording, with the evidence; print it.")] = None,
+    guess: Annotated[Path | None, typer.Option(
+        readable=False, help="Draft a recipe for this recording, with the evidence; print it.")] = None,
 ) -> None:
     """Make logs of recordings (CSV, MAT, NPY) by a recipe."""
     if guess is not None:
@@ -73,11 +91,11 @@ def import_(
     _go(STAGE, (), common, {"recipe": recipe, "source": source, "map": tuple(map or ()) or None, "trust_units": trust_units})
 
 
-@app.command()
+@app.command(cls=StageCommand)
 @with_common
 def convert(
     logs: LogPaths, common: Common,
-    to: Annotated[str | None, typer.Option(help="h5, parquet or csv. [the container the log is not in]")] = None,
+    to: Annotated[str | None, typer.Option(help="h5, parquet or csv; goes before --format. [what the log is not in]")] = None,
 ) -> None:
     """Convert logs from HDF5 to Parquet and back, or to flat CSV."""
     from pipelines.convert import STAGE
@@ -85,7 +103,7 @@ def convert(
     _go(STAGE, tuple(logs), common, {"to": to}, {"to": common.format})
 
 
-@app.command()
+@app.command(cls=StageCommand)
 @with_common
 def reconstruct(
     logs: LogPaths, common: Common,
@@ -101,7 +119,7 @@ def reconstruct(
                                      "bandwidth": numbers(bandwidth, "--bandwidth")})
 
 
-@app.command("estimate-bps")
+@app.command("estimate-bps", cls=StageCommand)
 @with_common
 def estimate_bps(
     logs: LogPaths, common: Common,
@@ -157,7 +175,7 @@ def _go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, An
     from rrrid_cli.settings import make_settings
 
     if common.format not in (None, "h5", "parquet"):
-        raise UsageError("C02", f"'{common.format}' is no container", where="--format", remedy="h5 or parquet")
+        raise UsageError("C02", f"'{common.format}' is no container", where="--format", remedy="give h5 or parquet")
     settings = make_settings(stage.settings, stage.name, STAGES, common.config, common.set, given, fallback)
     teller = Teller(common.quiet or common.json, common.verbose)
     request = Request(paths, common.out, common.robot, common.strict, common.check, common.force, common.no_report,
@@ -181,14 +199,20 @@ def entry() -> NoReturn:
         os.environ.setdefault(name, "1")
     signal.signal(signal.SIGTERM, _interrupt)
     signal.signal(signal.SIGINT, _interrupt)
+    sys.unraisablehook = _again
     as_json, debug = "--json" in sys.argv, "--debug" in sys.argv
     try:
-        app()
-    except RrridError as problem:
+        _call(sys.argv[1:])
+    except typer.Exit as ended:
+        _deaf()
+        sys.exit(ended.exit_code)
+    except (RrridError, Interrupted) as problem:
+        _deaf()
         if debug:
             raise
-        say_error(problem, as_json=as_json)
-        sys.exit(problem.exit_code)
+        error = problem.as_error() if isinstance(problem, Interrupted) else problem
+        say_error(error, as_json=as_json)
+        sys.exit(error.exit_code)
     except BrokenPipeError:
         # The reader of a pipe has left; what is still buffered goes nowhere, without a second complaint at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -199,6 +223,40 @@ def entry() -> NoReturn:
         say_error(_internal(problem), as_json=as_json)
         sys.exit(70)
     sys.exit(0)
+
+
+def _call(words: list[str]) -> None:
+    """Parse and run, without the parser's own way of ending: it has other words for errors, and 1 for Ctrl-C.
+
+    Raises:
+        typer.Exit: done, with the exit code.
+        UsageError: C01, an unknown option or command; C02, an argument is missing or has the wrong form.
+    """
+    command = typer.main.get_command(app)
+    try:
+        with command.make_context("rrrid", list(words)) as context:
+            command.invoke(context)
+    except WrongUsage as problem:
+        if not words:  # `rrrid` alone: the help
+            print(problem.format_message(), file=sys.stderr)
+            raise typer.Exit(2) from None
+        raise as_error(problem) from None
+
+
+def _deaf() -> None:
+    """All is decided: no signal may end the last words in a traceback."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _again(lost: Any) -> None:
+    """A signal that came while Python could raise nothing (in a destructor, in a callback of C) comes once more."""
+    if isinstance(lost.exc_value, Interrupted):
+        import threading
+
+        threading.Timer(0.01, os.kill, (os.getpid(), lost.exc_value.exit_code - 128)).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _internal(problem: Exception) -> RrridError:

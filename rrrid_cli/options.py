@@ -13,9 +13,10 @@ import typer
 
 from pipelines.errors import UsageError
 
-__all__ = ["Common", "LogPaths", "numbers", "with_common"]
+__all__ = ["Common", "LogPaths", "StageCommand", "numbers", "with_common"]
 
-LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS")]
+LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
+                                                  readable=False)]  # rrrid says it better: exit 6, RRID-F13
 
 
 @dataclass(frozen=True)
@@ -62,16 +63,31 @@ def _flag(words: str, *names: str) -> Any:
     return typer.Option(*names, help=words)
 
 
+def _path(words: str, *names: str) -> Any:
+    return typer.Option(*names, help=words, readable=False)
+
+
+class StageCommand(typer.core.TyperCommand):
+    """A command whose help ends in what --set takes. The stage is imported for its own help alone."""
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        from rrrid_cli.settings import known_options
+
+        for stage, names in known_options(str(self.name)).items():
+            formatter.write_paragraph()
+            formatter.write_text(f"--set {stage}.OPTION=VALUE, options: {', '.join(names) or 'none'}.")
+
+
 _SHARED: tuple[tuple[str, Any, Any], ...] = (
-    ("out", Annotated[Path | None, _flag("Folder for everything the command leaves. [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
+    ("out", Annotated[Path | None, _path("Folder for everything the command leaves. [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
     ("json", Annotated[bool, _flag("Print result.json on standard output, and nothing else there.", "--json")], False),
     ("strict", Annotated[bool, _flag("A repair of the data is an error (exit 3).", "--strict")], False),
     ("check", Annotated[bool, _flag("Exit 1 where a gate failed or something was found.", "--check")], False),
     ("robot", Annotated[str | None, _flag("Robot description to use instead of the logs' own.", "--robot")], None),
     ("assume_units", Annotated[bool, _flag("Take signals without units as SI.", "--assume-units")], False),
     ("format", Annotated[str | None, _flag("Container of the logs that are written: h5 or parquet. [h5]", "--format")], None),
-    ("config", Annotated[Path | None, _flag("TOML file of settings, one table a stage.", "--config")], None),
-    ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable.", "--set")], []),
+    ("config", Annotated[Path | None, _path("TOML file of settings, one table a stage.", "--config")], None),
+    ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable; the names stand below.", "--set")], []),
     ("no_report", Annotated[bool, _flag("Leave report and figures out.", "--no-report")], False),
     ("force", Annotated[bool, _flag("Replace rrrid's own earlier output even where files were changed.", "--force")], False),
     ("quiet", Annotated[bool, _flag("Print nothing but errors.", "-q", "--quiet")], False),
@@ -96,6 +112,8 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def run(**given: Any) -> None:
         said = {name: given.pop(name) for name, _, _ in options}
+        if said["quiet"] and said["verbose"]:
+            raise UsageError("C02", "-q and -v ask for opposite things", where="-q, -v", remedy="give one of them")
         command(**given, common=Common(**(said | {"joints": _joints(said.get("joints"))})))
 
     parameters = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in kept] + shared

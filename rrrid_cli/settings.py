@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from pipelines.errors import UsageError, did_you_mean
 from pipelines.log.text import read_small_text
 
-__all__ = ["make_settings"]
+__all__ = ["known_options", "make_settings"]
 
 S = TypeVar("S")
 
@@ -50,6 +50,20 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
     if stage == "run":
         own["stages"] = {name: _settings_of(name)(**options) for name, options in chosen.items()}
     return kind(**own)
+
+
+def known_options(command: str) -> dict[str, list[str]]:
+    """What --set takes for `command`: stage -> its options. For `run` those of every stage it runs."""
+    stages = [command]
+    if command == "run":
+        from pipelines.run import STEPS
+
+        stages = [module.replace("_", "-") for module in STEPS]
+    return {stage: _options_of(_settings_of(stage)) for stage in stages}
+
+
+def _options_of(kind: type[Any]) -> list[str]:
+    return [field.name for field in dataclasses.fields(kind) if field.metadata.get("option", True)]
 
 
 def _said(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -90,7 +104,7 @@ def _from_sets(sets: Iterable[str]) -> list[tuple[str, dict[str, Any]]]:
 
 def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
     hints = typing.get_type_hints(kind)
-    known = [field.name for field in dataclasses.fields(kind) if field.metadata.get("option", True)]
+    known = _options_of(kind)
     if name not in known:
         raise UsageError("C01", f"no such option{did_you_mean(name, known)}", where=where,
                          remedy=f"there are: {', '.join(known) or 'none'}")

@@ -30,6 +30,7 @@ __all__ = ["Answer", "guarded"]
 
 _SECONDS = 10.0  # a healthy file of 20 MB takes a tenth of it
 _BYTES_A_SECOND = 5e6
+_STOPPING = (signal.SIGINT, signal.SIGTERM)
 _MEMORY = 1 << 30  # [B] beyond three times the file and what its samples need
 
 
@@ -59,27 +60,30 @@ def guarded(work: Callable[[], Answer], path: Path, *, seconds: float | None = N
     budget = min(_MEMORY + 1200 * size, 32 << 30) if memory is None else memory
     store = _shared_file()
     receive, send = os.pipe()
-    with warnings.catch_warnings():
-        # Python 3.12 warns of forks beside threads; ours runs one reader and leaves without touching any lock of theirs.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        child = os.fork()
-    if child == 0:
-        os.close(receive)
-        _serve(work, send, store, budget)
-    os.close(send)
+    # No signal between the fork and the child's own handlers: the child would run the rest of the parent's program.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
     try:
-        text, complete = _listen(receive, time.monotonic() + limit)
-        if not complete:
-            os.kill(child, signal.SIGKILL)
-        _, status = os.waitpid(child, 0)
-    except BaseException:
-        _end(child)
-        raise
-    finally:
-        os.close(receive)
-    try:
+        with warnings.catch_warnings():
+            # Python 3.12 warns of forks beside threads; ours runs one reader and leaves without touching any lock of theirs.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
+        if child == 0:
+            os.close(receive)
+            _serve(work, send, store, budget)
+        os.close(send)
+        try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            text, complete = _listen(receive, time.monotonic() + limit)
+            if not complete:
+                os.kill(child, signal.SIGKILL)
+            _, status = os.waitpid(child, 0)
+        except BaseException:
+            _end(child)
+            raise
         return _answer(text, complete, status, store, path, limit)
     finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)  # where the fork itself failed
+        os.close(receive)
         os.close(store)
 
 
@@ -97,8 +101,11 @@ def _serve(work: Callable[[], Answer], send: int, store: int, budget: int) -> No
     """The child: work, answer, leave without running anybody's clean-up."""
     code = 0
     try:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        # A signal for the whole group is the parent's to answer, and it ends this child: a child that died of it alone
+        # would look like a file that crashes the library.
+        for number in _STOPPING:
+            signal.signal(number, signal.SIG_IGN)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPPING)
         _limit_memory(budget)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # HDF5 prints its error stack there
         faulthandler.disable()  # a crash here is the parent's to tell

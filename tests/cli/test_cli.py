@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -106,13 +107,31 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     assert open_log(logs / "logs/a.h5").log == open_log(logs / "own/logs/a.h5").log == small_log()
 
 
-@pytest.mark.parametrize("words", [("convret",), ("convert",), ("convert", "logs", "--ot", "x")])
-def test_wrong_usage_is_exit_2(logs: Path, words: tuple[str, ...]) -> None:
-    """C01: a misspelt command or option, or a missing argument, ends in 2 with a usage line."""
-    done = rrrid(*words, cwd=logs)
-    assert done.returncode == 2
-    assert "Usage" in done.stderr
-    assert "Traceback" not in done.stderr
+@pytest.mark.parametrize(("words", "said"), [
+    (("convret",), "RRID-C01 rrrid: no such command 'convret', did you mean 'convert'? See 'rrrid --help'."),
+    (("--vers",), "RRID-C01 rrrid: no such option '--vers', did you mean '--version'? See 'rrrid --help'."),
+    (("convert", "logs", "--ot", "x"),
+     "RRID-C01 rrrid convert: no such option '--ot', did you mean '--out'? See 'rrrid convert --help'."),
+    (("convert",), "RRID-C02 rrrid convert: missing argument 'LOGS'. See 'rrrid convert --help'."),
+    (("reconstruct", "logs", "--order", "x"), "RRID-C02 rrrid reconstruct: invalid value for '--order': "),
+    (("convert", "logs", "-q", "-v"), "RRID-C02 -q, -v: "),
+])
+def test_wrong_usage_is_one_line_and_exit_2(logs: Path, words: tuple[str, ...], said: str) -> None:
+    """A misspelt command or option, a missing argument or a wrong value is said as every other error is."""
+    for json_too in ((), ("--json",)):
+        done = rrrid(*words, *json_too, cwd=logs)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"rrrid: {said}")
+        assert done.stderr.count("\n") == 1
+        assert not json_too or said.startswith(json.loads(done.stdout)["error"]["code"])
+
+
+def test_rrrid_alone_says_its_help(tmp_path: Path) -> None:
+    """Without a command: the help, on standard error, exit 2. --version is one line."""
+    done = rrrid(cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == rrrid("--help", cwd=tmp_path).stdout
+    assert rrrid("--version", cwd=tmp_path).stdout.startswith("rrrid 0.")
 
 
 def test_settings_come_from_file_then_set_then_options(logs: Path) -> None:
@@ -259,6 +278,73 @@ def test_help_is_plain(tmp_path: Path) -> None:
     for command in ("run", "inspect", "import", "convert"):
         assert f"  {command} " in top
         assert "--out" in rrrid(command, "--help", cwd=tmp_path).stdout
+
+
+def test_help_names_what_set_takes(tmp_path: Path) -> None:
+    """The options of --set, for `run` those of every stage, are made of the stages' own settings."""
+    assert "--set convert.OPTION=VALUE, options: to." in rrrid("convert", "--help", cwd=tmp_path).stdout
+    assert "--set inspect.OPTION=VALUE, options: trust_units, allow_same." in rrrid("run", "--help", cwd=tmp_path).stdout
+
+
+def test_a_pattern_that_the_shell_left_is_expanded(logs: Path) -> None:
+    """C06: a pattern that matches nothing is exit 5, not a missing file; one that matches is its matches."""
+    done = rrrid("inspect", "nope*.h5", cwd=logs)
+    assert (done.returncode, done.stderr.split(":")[1]) == (5, " RRID-C06 nope*.h5")
+    write_log(logs / "logs/b.h5", small_log())
+    write_log(logs / "logs/[c].h5", small_log())
+    done = rrrid("convert", "logs/[a-b].h5", "logs/[c].h5", "--json", cwd=logs)
+    assert [log["source"] for log in json.loads(done.stdout)["logs"]] == ["a.h5", "b.h5", "[c].h5"]
+    assert (logs / "runs/rrr-tue/logs/convert").is_dir()
+
+
+def test_an_unreadable_log_is_exit_6(logs: Path) -> None:
+    """F13: the parser leaves it to rrrid to say who may not read what; the superuser plays nobody."""
+    (logs / "logs/a.h5").chmod(0)
+    code = ("import os, runpy, sys\n"
+            "import rrrid_cli.main, pipelines.convert, h5py, pipelines.log.hdf5\n"
+            "may = os.access\n"
+            "os.access = lambda path, mode, **more: (mode != os.R_OK or not str(path).endswith('a.h5')) and may(path, mode, **more)\n"
+            "sys.argv = ['rrrid', 'convert', 'logs/a.h5']\n"
+            "rrrid_cli.main.entry()")
+    done = subprocess.run([sys.executable, "-c", code], cwd=logs, env=os.environ | {"PYTHONPATH": str(REPO)}, text=True,
+                          capture_output=True, check=False, timeout=60)
+    assert done.returncode == 6
+    assert done.stderr == "rrrid: RRID-F13 logs/a.h5: permission denied. Change its permissions.\n"
+
+
+def test_all_bad_files_are_named(logs: Path) -> None:
+    """One bad file of a folder is exit 3, and the others are named with it: nobody mends them one run at a time."""
+    for name in ("b", "c"):
+        (logs / f"logs/{name}.h5").write_text("t,q\n")
+    (logs / "logs/d.h5").touch()
+    done = rrrid("convert", "logs", "--out", "out", cwd=logs)
+    assert done.returncode == 3
+    assert done.stderr.startswith("rrrid: RRID-F06 logs/b.h5: neither HDF5 nor Parquet; "
+                                  "2 more cannot be used: c.h5 (RRID-F06), d.h5 (RRID-F01). ")
+    assert not (logs / "out").exists()
+
+
+def test_an_unwritable_place_is_named_as_it_was_given(logs: Path) -> None:
+    """Exit 6 names --out, never the hidden folder that was to become it."""
+    done = rrrid("convert", "logs", "--out", "/proc/mine", cwd=logs)
+    assert done.returncode == 6
+    assert " /proc/mine: " in done.stderr
+    assert "rrrid-tmp" not in done.stderr
+
+
+def test_what_is_made_of_own_output_stands_beside_it(logs: Path) -> None:
+    """runs/ROBOT/LABEL/COMMAND is the default of a stage on LABEL's own output too, so that two imports stay apart."""
+    for name in ("one", "two"):
+        write_log(logs / f"{name}/a.h5", small_log())
+        assert rrrid("convert", name, cwd=logs).returncode == 0
+        assert rrrid("convert", name, "--out", f"mine/{name}", cwd=logs).returncode == 0
+    runs = logs / "runs/rrr-tue"
+    for given, label in (("runs/rrr-tue/one/convert", "one"), ("runs/rrr-tue/two/convert/logs", "two"), ("mine/one", "one"),
+                         ("mine/two/logs/a.parquet", "two")):
+        assert rrrid("inspect", given, "--no-report", cwd=logs).returncode in (0, 3)
+        assert (runs / label / "inspect/result.json").is_file()
+        shutil.rmtree(runs / label / "inspect")
+    assert sorted(path.name for path in runs.iterdir()) == ["one", "two"]
 
 
 def test_schema_describes_the_shipped_model(tmp_path: Path, samples: Path) -> None:

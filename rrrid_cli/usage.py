@@ -1,0 +1,35 @@
+"""Say what is wrong with a command line as every other error is said: one line with a code, a place and a remedy."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import typer
+
+from pipelines.errors import UsageError, did_you_mean
+
+__all__ = ["WrongUsage", "as_error"]
+
+# typer has carried its own copy of click since 0.26: the class is asked of typer, whichever copy that uses.
+WrongUsage: Final[Any] = typer.BadParameter.__mro__[1]
+
+
+def as_error(problem: Any) -> UsageError:
+    """The parser's complaint in rrrid's words.
+
+    Args:
+        problem: a `WrongUsage`.
+    """
+    context = problem.ctx
+    command = context.command_path if context is not None else "rrrid"
+    remedy = f"see '{command} --help'"
+    option = getattr(problem, "option_name", None)
+    if type(problem).__name__ == "NoSuchOption":
+        known = [name for parameter in context.command.get_params(context) for name in parameter.opts] if context else []
+        return UsageError("C01", f"no such option '{option}'{did_you_mean(str(option), known)}", where=command, remedy=remedy)
+    commands = getattr(context.command, "commands", {}) if context is not None else {}
+    words = problem.format_message().splitlines()[0].rstrip(".")
+    if words.startswith("No such command"):
+        word = words.split("'")[1]
+        return UsageError("C01", f"no such command '{word}'{did_you_mean(word, commands)}", where=command, remedy=remedy)
+    return UsageError("C02", f"{words[:1].lower()}{words[1:]}", where=command, remedy=remedy)

@@ -1,0 +1,114 @@
+"""Ctrl-C at any moment: exit 130, the old output or the new one, and never a word about damaged logs."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from pipelines.errors import Interrupted, RrridError
+from pipelines.log.files import hash_file, write_log
+from pipelines.log.guard import Answer, guarded
+from tests.cli.test_cli import REPO, RRRID
+from tests.log.logs import small_log
+
+RUNS = 15
+ENDED = "rrrid: RRID-P06 interrupted. Run the same command again; nothing was half written."
+
+
+def _started(folder: Path) -> subprocess.Popen[str]:
+    """`rrrid inspect` in a process group of its own, waited for until it has begun to read."""
+    process = subprocess.Popen([*RRRID, "inspect", "logs", "--out", "out", "--no-report", "-v"], cwd=folder, text=True,
+                               env=os.environ | {"PYTHONPATH": str(REPO)}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                               start_new_session=True)
+    assert process.stderr is not None
+    assert process.stderr.readline().startswith("reading")
+    return process
+
+
+def _complete(out: Path) -> dict[str, str]:
+    """Every file of `out` by its hash, each as provenance.json says."""
+    there = {p.relative_to(out).as_posix(): hash_file(p) for p in out.rglob("*") if p.is_file() and p.name != "provenance.json"}
+    assert there == json.loads((out / "provenance.json").read_text())["outputs"]
+    return there
+
+
+def test_ctrl_c_at_any_moment_ends_the_run(tmp_path: Path) -> None:
+    """P06: SIGINT to the whole process group, as a terminal sends it, at random times from the first log read on.
+
+    The signal meets the parent, and while a log is read the child that reads it as well.
+    """
+    for i in range(12):
+        write_log(tmp_path / f"logs/{i}.h5", small_log(samples=4000, seed=i))
+    began = time.monotonic()
+    with _started(tmp_path) as process:
+        began = time.monotonic()
+        process.communicate()
+    lasted = time.monotonic() - began
+    before = _complete(tmp_path / "out")
+    random_time = random.Random(20040509)
+    interrupted = 0
+    for _ in range(RUNS):
+        with _started(tmp_path) as process:
+            time.sleep(random_time.uniform(0.0, 0.8 * lasted))
+            os.killpg(process.pid, signal.SIGINT)
+            _, said = process.communicate(timeout=20)
+        assert _complete(tmp_path / "out") == before
+        assert not list(tmp_path.glob(".rrrid-tmp-*"))
+        assert "RRID-F" not in said
+        if process.returncode != 0:  # else all was done before the signal came
+            assert process.returncode == 130, said
+            assert said.splitlines()[-1] == ENDED
+            assert "Traceback" not in said
+            interrupted += 1
+        with pytest.raises(ProcessLookupError):
+            os.killpg(process.pid, 0)
+    assert interrupted > RUNS // 2
+
+
+def test_no_handler_of_errors_catches_an_interruption() -> None:
+    """It is no RrridError, not even an Exception; it is told in the words of one."""
+    assert not issubclass(Interrupted, Exception)
+    told = Interrupted(signal.SIGTERM).as_error()
+    assert (type(told), told.exit_code, told.code) == (RrridError, 143, "RRID-P06")
+
+
+def test_a_signal_for_the_group_is_not_the_childs_answer(tmp_path: Path) -> None:
+    """The child that reads ignores what its parent answers: it neither dies of a signal nor makes an error of it."""
+    (tmp_path / "a").write_bytes(b"x")
+
+    def work() -> Answer:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            os.kill(os.getpid(), number)
+        return Answer({"still": "here"}, {})
+
+    assert guarded(work, tmp_path / "a").about == {"still": "here"}
+
+
+def test_a_child_is_born_deaf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A signal between the fork and the child's own handlers waits: the child never runs its parent's handler."""
+    (tmp_path / "a").write_bytes(b"x")
+    fork, parent = os.fork, os.getpid()
+
+    def forked() -> int:
+        child = fork()
+        if child == 0:
+            os.kill(os.getpid(), signal.SIGINT)
+        return child
+
+    def handler(number: int, _: object) -> None:
+        (tmp_path / ("parent" if os.getpid() == parent else "child")).touch()
+
+    monkeypatch.setattr(os, "fork", forked)
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        assert guarded(lambda: Answer({}, {}), tmp_path / "a").about == {}
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert not (tmp_path / "child").exists()
