@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, UsageError
+from pipelines.log.doctor.checks_subject import many
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
 from pipelines.log.recording import filenames
@@ -36,7 +37,7 @@ from pipelines.stage import Inputs, Request, Stage, slug
 
 __all__ = ["STAGE", "ImportedLog", "Result", "Settings", "compute", "read", "report"]
 
-_PREVIEWS, _PREVIEW_POINTS = 3, 400
+_PREVIEWS, _PREVIEW_POINTS = 3, 150
 _FINEST = 4.0  # times the recorded rate
 
 
@@ -53,11 +54,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class Preview:
-    """Every so-manieth sample of a log, for the report's figure."""
+    """Every so-manieth sample of a log, for the report's figure: numbers as one short text a column.
 
-    t: tuple[float, ...]  # [s]
-    q: tuple[tuple[float, ...], ...]  # [rad] (points, joints)
-    tau: tuple[tuple[float, ...], ...]  # [N m] (points, joints)
+    A result.h5 for them would lie among logs of the same ending, and one line a number would make most of result.json.
+    """
+
+    t: str  # [s]
+    q: tuple[str, ...]  # [rad] one a joint
+    tau: tuple[str, ...]  # [N m] one a joint
 
 
 @dataclass(frozen=True)
@@ -152,7 +156,7 @@ def _import(source: Source, material: Material, mapped: Map, settings: Settings,
         made.append(_on_one_clock(parts, converted, recipe.resample, checks))
     logs = []
     for k, (t, signals, steps, altered) in enumerate(made, start=1):
-        altered = (*repairs, *altered)
+        steps, altered = (*assembled.undeclared, *steps), (*repairs, *altered)
         log, files, altered = make_log(source, material, assembled, t, signals, steps, altered, k if len(made) > 1 else None)
         checks += examine(log, source.primary, settings.trust_units)
         logs.append(ImportedLog(log.name, "", log.experiment, log.role, log.joint, log.n_samples, log.n_joints, log.sample_time,
@@ -182,7 +186,8 @@ def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec
         words = (f"resampled from {part.t.size} samples {1e3 * interval.min():.4g} to {1e3 * interval.max():.4g} ms apart (median "
                  f"{1e3 * float(np.median(interval)):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
                  + (f"; {late} interval{'s' if late != 1 else ''} of more than 1.5 times the median bridged" if late else ""))
-        checks.append(Check.of("T05", "warn", words, where=part.where))
+        checks.append(Check.of("T05", "warn", words, where=part.where,
+                               remedy="none needed for fits; record with an even clock where frequencies near the rate matter"))
         altered = (*altered, words)
     return at, signals, steps, altered
 
@@ -190,11 +195,14 @@ def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec
 def _preview(log: ExperimentLog) -> Preview:
     every = max(1, -(-log.n_samples // _PREVIEW_POINTS))
 
-    def rows(values: Array) -> tuple[tuple[float, ...], ...]:
-        # Six digits are more than a figure shows.
-        return tuple(tuple(float(f"{x:.6g}") for x in row) for row in values[::every].tolist())
+    def words(values: Array, digits: int = 4) -> str:
+        return " ".join(f"{x:.{digits}g}" for x in values[::every].tolist())
 
-    return Preview(tuple(float(f"{x:.6g}") for x in log.t[::every].tolist()), rows(log.q), rows(log.tau))
+    return Preview(words(log.t, 6), tuple(map(words, log.q.T)), tuple(map(words, log.tau.T)))
+
+
+def _numbers(texts: tuple[str, ...]) -> Array:
+    return np.array([text.split() for text in texts], dtype=np.float64).T
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
@@ -210,19 +218,26 @@ def report(result: Result) -> Report:
     """What was written, what was done to the samples, and a look at them."""
     n, repaired = len(result.logs), [c for c in result.checks if c.level == "repair"]
     seconds = sum(item.duration for item in result.logs)
-    words = f"{n} log{'s' if n != 1 else ''} of robot {result.robot} imported, {seconds:.4g} s in all"
+    words = f"{many(n, 'log')} of robot {result.robot} imported, {seconds:.4g} s in all"
     words += f", and {len(result.tables)} table{'s' if len(result.tables) != 1 else ''}" if result.tables else ""
-    count = f"{len(repaired)} repair{'s' if len(repaired) != 1 else ''}"
-    words += f"; {count}, listed below." if repaired else "; nothing had to be repaired."
+    words += f"; {many(len(repaired), 'repair')}, listed below" if repaired else "; nothing had to be repaired"
+    resampled = [item for item in result.logs if any(step.startswith("resampled ") for step in item.altered)]
+    if resampled:
+        rates = ", ".join(dict.fromkeys(f"{1.0 / item.sample_time:g} Hz" for item in resampled))
+        words += f"; {'all' if len(resampled) == n > 1 else many(len(resampled), 'log')} resampled to {rates}"
+    warned = sum(c.level == "warn" for c in result.checks)
+    words += f"; {many(warned, 'warning')}, listed below." if warned else "."
     logs = Table(("log", "experiment", "role", "joint", "samples", "rate [Hz]", "duration [s]"),
                  tuple((i.name, i.experiment, i.role, i.joint, i.samples, 1.0 / i.sample_time, i.duration) for i in result.logs))
-    sections = [Section("Logs", tables=(logs,), figures=tuple(_figure(item, item.preview) for item in result.logs if item.preview))]
+    drawn = f"Drawn are the first {_PREVIEWS} of {n} logs; rrrid inspect draws more."
+    sections = [Section("Logs", (drawn,) if n > _PREVIEWS else (), tables=(logs,),
+                        figures=tuple(_figure(item, item.preview) for item in result.logs if item.preview))]
     if result.tables:
         rows = tuple((t.name, t.source, ", ".join(f"{c} [{t.units[c]}]" for c in t.units), t.rows) for t in result.tables)
         sections.append(Section("Tables", ("Files without a clock are no logs; they are kept as tables in SI.",),
                                 (Table(("table", "from", "columns", "rows"), rows),)))
     sections.append(_treatment(result))
-    return Report("Import", words, "attention" if repaired else "good", sections=tuple(sections))
+    return Report("Import", words, "attention" if repaired or warned else "good", sections=tuple(sections))
 
 
 def _treatment(result: Result) -> Section:
@@ -236,7 +251,7 @@ def _treatment(result: Result) -> Section:
     text = [f"By recipe {result.recipe}."]
     if result.ignored:
         more = " …" if len(result.ignored) > 8 else ""
-        text.append(f"The recipe does not speak of {len(result.ignored)} files: {', '.join(result.ignored[:8])}{more}.")
+        text.append(f"The recipe does not speak of {many(len(result.ignored), 'file')}: {', '.join(result.ignored[:8])}{more}.")
     return Section("What was done to the data", tuple(text), tuple(tables))
 
 
@@ -245,9 +260,9 @@ def _figure(item: ImportedLog, preview: Preview) -> Figure:
         from pipelines.report.figures import draw_joint_signals, joint_axes
 
         top, bottom = figure.subfigures(1, 2)
-        t = np.array(preview.t)
-        draw_joint_signals(joint_axes(top, item.joints), t, np.array(preview.q), "rad", quantity="q")
-        draw_joint_signals(joint_axes(bottom, item.joints), t, np.array(preview.tau), "N m", quantity="tau")
+        t = _numbers((preview.t,))[:, 0]
+        draw_joint_signals(joint_axes(top, item.joints), t, _numbers(preview.q), "rad", quantity="q")
+        draw_joint_signals(joint_axes(bottom, item.joints), t, _numbers(preview.tau), "N m", quantity="tau")
 
     return Figure(f"import-{slug(item.name)}", f"{item.name}: position and torque of each joint as they are in the log.", draw,
                   (7.2, 0.7 + 1.1 * item.joints), f"position and torque of log {item.name} against time")

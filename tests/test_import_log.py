@@ -200,3 +200,84 @@ def test_t07_exactly_one_period_is_a_whole_one(folder: Path, samples: int, perio
         return
     (item,) = run(folder, recipe).result.logs
     assert item.log.period == 1.0
+
+
+def test_c02_one_column_for_two_joints_is_refused(folder: Path) -> None:
+    """A torque used twice makes a log whose second joint is the first once more."""
+    twice = RECIPE.replace('columns = "tau_{j}"', 'columns = ["tau_1", "tau_1", "tau_3"]')
+    with pytest.raises(UsageError, match=r"RRID-C02.*'tau_1' serves tau of joint 1 and of joint 2"):
+        run(folder, twice)
+    with pytest.raises(UsageError, match=r"RRID-C02.*'tau_2' serves tau of joint 1 and of joint 2"):
+        run(folder, map=("tau_1=tau_2",))
+
+
+def test_a_column_that_is_missing_is_asked_for_by_its_signal(folder: Path) -> None:
+    """The remedy names the signal that was asked for, and columns that can be it: never the time for a position."""
+    with pytest.raises(InputRejected, match=r"RRID-S01.*no column 'foo'.*--map tau_1='tau_1'") as problem:
+        run(folder, map=("tau_1=foo",))
+    assert "q_1=" not in problem.value.remedy
+    assert "'t'" not in problem.value.remedy
+
+
+def test_what_the_header_says_of_units_is_said_in_the_result(folder: Path) -> None:
+    columns = good()
+    write(folder, text({"t [s]": columns["t"]} | {f"{k} [{'rad' if k[0] == 'q' else 'N m'}]": v
+                                                  for k, v in columns.items() if k != "t"}))
+    recipe = RECIPE.replace('unit = "s"\n', "").replace(', unit = "rad"', "").replace(', unit = "N m"', "")
+    outcome = run(folder, recipe)
+    assert {"t: unit s from the header", "q: unit rad from the header", "tau: unit N m from the header"} <= set(
+        outcome.result.logs[0].steps)
+    assert "unit rad from the header" in str(outcome.report.sections[-1].tables[0].rows)
+
+
+def test_the_verdict_says_what_was_resampled_and_warned(folder: Path) -> None:
+    """Green is for samples that are as recorded."""
+    outcome = run(folder, RECIPE + "[resample]\nrate = 500\n")
+    assert "1 log resampled to 500 Hz; 1 warning, listed below." in outcome.report.verdict
+    assert outcome.report.tone == "attention"
+    assert all(check.remedy for check in outcome.result.checks if check.level != "ok")
+
+
+def test_pictures_stay_out_of_the_json_and_their_number_is_said(folder: Path) -> None:
+    for name in "abc":
+        write(folder, text(good()), f"{name}.csv")
+    outcome = run(folder)
+    assert len(json.dumps(outcome.json)) < 30_000
+    assert "first 3 of 4 logs" in outcome.report.sections[0].text[0]
+
+
+def test_a_place_is_the_path_below_the_source_folder(folder: Path) -> None:
+    """Two days, one file name: the message says which of the two."""
+    for day in ("monday", "tuesday"):
+        write(folder / day, text(good()))
+    broken = (folder / "tuesday" / "run.csv").read_text().replace("tau_3", "tau_x", 1)
+    (folder / "tuesday" / "run.csv").write_text(broken)
+    with pytest.raises(InputRejected, match="RRID-S01") as problem:
+        run(folder, RECIPE.replace("*.csv", "*/run.csv"))
+    assert problem.value.where == "tuesday/run.csv"
+
+
+def test_c04_the_folder_of_the_recordings_is_asked_for(tmp_path: Path) -> None:
+    """A shipped recipe without --source, with a folder that is not there, and with one that lacks the robot."""
+    def attempt(source: Path | None) -> str:
+        with pytest.raises(UsageError, match="RRID-C04") as problem:
+            run_stage(STAGE, Request((), tmp_path / "out", no_report=True), Settings(recipe="tx40", source=source))
+        return str(problem.value)
+
+    assert "--source FOLDER" in attempt(None)
+    assert "nowhere: no such folder" in attempt(tmp_path / "nowhere")
+    (tmp_path / "data").mkdir()
+    assert "'tx40.urdf' that the recipe names lies neither in" in attempt(tmp_path / "data")
+
+
+def test_s07_motor_positions_are_named_with_the_ratio_they_need(folder: Path) -> None:
+    """Motors at 32 quarter turns at rest: degrees are one reading, [drive] the other; both stand in the remedy."""
+    columns = good()
+    write(folder, text(columns | {f"q_{j}": 16.0 * np.pi + 60.0 * columns[f"q_{j}"] for j in (1, 2, 3)}))
+    joint = '[[robot.joint]]\nname = "j"\ntype = "revolute"\na = 0.0\nalpha = 0.0\nd = 0.0\noffset = 0.0\nposition = [-2.0, 2.0]\n'
+    recipe = RECIPE.replace('use = "rrr"',
+                            'name = "r"\ngravity = [0.0, 0.0, -9.81]\n[robot.kinematics]\nconvention = "dh"\n' + 3 * joint)
+    with pytest.raises(InputRejected, match=r"RRID-S07.*motor side; it starts at 32, 32, 32 times pi/2") as problem:
+        run(folder, recipe)
+    assert 'unit = "deg"' in problem.value.remedy
+    assert "transmission = the gear ratios of at least 12" in problem.value.remedy

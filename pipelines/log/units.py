@@ -8,7 +8,7 @@ from typing import Final
 
 from pipelines.errors import InputRejected, did_you_mean
 
-__all__ = ["UNITS", "Unit", "to_si"]
+__all__ = ["UNITS", "Unit", "canonical_unit", "to_si"]
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,16 @@ UNITS: Final[dict[str, Unit]] = {
     "degC": Unit("temperature", 1.0), "°C": Unit("temperature", 1.0), "K": Unit("temperature", 1.0, -273.15),
 }
 
-_SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "²": "^2"})
+_SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "²": "^2", "\u03bc": "µ"})
 _ALIASES: Final = {"Nm": "N m", "mNm": "mN m", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
                    "radian": "rad", "radians": "rad", "seconds": "s", "sec": "s", "rad/s2": "rad/s^2",
                    "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "1/min": "rpm"}
+
+
+def canonical_unit(unit: str) -> str:
+    """`unit` as `UNITS` spells it: "Nm" and "N·m" are "N m"."""
+    name = " ".join(str(unit).translate(_SPELLINGS).split())
+    return _ALIASES.get(name, name)
 
 
 def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
@@ -61,8 +67,7 @@ def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
     Raises:
         InputRejected: S05, the unit is unknown or measures something else.
     """
-    name = " ".join(str(unit).translate(_SPELLINGS).split())
-    name = _ALIASES.get(name, name)
+    name = canonical_unit(unit)
     accepted = [known for known, value in UNITS.items() if value.quantity == quantity]
     found = UNITS.get(name)
     if found is None or found.quantity != quantity:

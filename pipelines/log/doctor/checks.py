@@ -17,14 +17,14 @@ from typing import Final
 from pipelines.errors import Check
 from pipelines.log.doctor.checks_motion import MOTION_CHECKS, both_ways
 from pipelines.log.doctor.checks_signal import SIGNAL_CHECKS
-from pipelines.log.doctor.checks_subject import Subject
+from pipelines.log.doctor.checks_subject import NotTested, Subject
 from pipelines.log.doctor.checks_time import CLOCK_CHECKS, MOTION_BAND, TIME_CHECKS
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 
-__all__ = ["CHECKS", "LogCheck", "Subject", "check_log", "check_together"]
+__all__ = ["CHECKS", "LogCheck", "NotTested", "Subject", "check_log", "check_together", "findings"]
 
-LogCheck = Callable[[Subject], list[Check]]
+LogCheck = Callable[[Subject], Sequence[Check | NotTested]]
 
 CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, MOTION_BAND, *SIGNAL_CHECKS, *MOTION_CHECKS)
 
@@ -41,17 +41,23 @@ _CONSEQUENCES: Final = {
 def check_log(log: ExperimentLog | Subject, trusted: tuple[str, ...] = ()) -> tuple[Check, ...]:
     """Everything the doctor has to say about one log, but what the user vouches for: codes in `trusted`."""
     subject = log if isinstance(log, Subject) else Subject(log)
+    return tuple(found for found in findings(subject, trusted) if isinstance(found, Check))
+
+
+def findings(subject: Subject, trusted: tuple[str, ...] = ()) -> tuple[Check | NotTested, ...]:
+    """The same, and what could not be tested."""
     if subject.log.n_samples < 2:
         return tuple(TIME_CHECKS[0](subject))
     if subject.planned:
         return ()  # a plan has neither clock nor sensors
     if not subject.good.time.advances:
-        said = (found for check in CLOCK_CHECKS for found in check(subject) if found.level != "ok")
+        said = (found for check in CLOCK_CHECKS for found in check(subject) if isinstance(found, Check) and found.level != "ok")
         return tuple(found for found in said if found.code != "RRID-T07")  # without time nothing is shorter than a period
     checks = CHECKS if subject.sampled else TIME_CHECKS
     found = [found for check in checks for found in check(subject) if found.code not in trusted]
-    follows = {f"RRID-{code}" for check in found if check.level == "reject" for code in _CONSEQUENCES.get(check.code, ())}
-    return tuple(check for check in found if check.level == "ok" or check.code not in follows)
+    follows = {f"RRID-{code}" for check in found if isinstance(check, Check) and check.level == "reject"
+               for code in _CONSEQUENCES.get(check.code, ())}
+    return tuple(check for check in found if (isinstance(check, Check) and check.level == "ok") or check.code not in follows)
 
 
 def check_together(opened: Sequence[Opened], subjects: Sequence[Subject]) -> tuple[Check, ...]:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.doctor.checks_subject import Subject, spread
+from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
 from pipelines.log.doctor.faults import lagged_speed
 from pipelines.log.doctor.stop import emergency_stop
 from pipelines.log.experiment import Array
 from pipelines.log.limits import percent
 
-__all__ = ["MOTION_CHECKS", "both_ways"]
+__all__ = ["MOTION_CHECKS", "both_ways", "degrees_or_motor"]
 
 _DEGREE = np.pi / 180.0
 _NOISE_SPEED = 6.0  # standard deviations that a limit must be exceeded by
 
 
-def degrees(s: Subject) -> list[Check]:
+def degrees(s: Subject) -> Sequence[Check | NotTested]:
     """S07: angles declared in rad are not degrees. Only limits of position and speed can tell."""
+    if not any(np.isfinite([*joint.position, joint.velocity]).any() for joint in s.log.robot.joints):
+        return s.cannot_tell("S07", "the robot's description has no limits of position or speed", signal="q")
     found = []
     speed = peak_speed(s)
     for j, joint in enumerate(s.log.robot.joints):
@@ -32,24 +36,41 @@ def degrees(s: Subject) -> list[Check]:
         fits = reach * _DEGREE <= 1.1 * bounds and speed[j] * _DEGREE <= 1.1 * joint.velocity
         if reach > 4.0 * np.pi and beyond and fits:
             found.append(s.say("S07", "reject",
-                               f"q of joint {j + 1} is declared in rad, but looks like degrees: it reaches {reach:.4g} "
-                               f"at up to {speed[j]:.4g} a second, beyond the limits in rad and within them in deg",
+                               f"q of joint {j + 1} is declared in rad, but looks like degrees or the motor side: it reaches "
+                               f"{reach:.4g} at up to {speed[j]:.4g} a second, beyond the limits in rad",
                                signal="q", joint=j,
-                               remedy="declare the unit deg, or pass --trust-units"))
+                               remedy=degrees_or_motor(reach, joint.position)))
     travel = ", ".join(f"{v:.3g}" for v in s.travel)
     return found or s.ok("S07", f"angles: {travel} rad of travel, speeds as the limits allow", signal="q")
 
 
 def peak_speed(s: Subject) -> Array:
-    """(joints,) [rad/s] largest speed over ±10 ms within the usable stretches."""
-    peaks = [np.nanmax(np.abs(lagged_speed(s.position[run], s.log.sample_time)), axis=0, initial=0.0)
-             for run in s.good.runs if s.good.time.known]
-    return np.max(peaks, axis=0) if peaks else np.zeros(s.log.n_joints)
+    """(joints,) [rad/s] largest speed over ±10 ms within the usable stretches; NaN where none could be taken."""
+    peaks = [_largest(np.abs(lagged_speed(s.position[run], s.log.sample_time)))
+             for run in _stretches(s) if run.stop - run.start > 2]
+    return _largest(np.array(peaks)) if peaks else np.full(s.log.n_joints, np.nan)
 
 
-def limits(s: Subject) -> list[Check]:
+def _stretches(s: Subject) -> tuple[slice, ...]:
+    """The usable runs; in a log too short for one, everything, where no sample is left out of it."""
+    if not s.good.time.known:
+        return ()
+    even = bool((np.abs(np.diff(s.good.log.t[:s.good.end]) / s.log.sample_time - 1.0) < 0.5).all())
+    return s.good.runs or ((slice(0, s.good.end),) if even else ())
+
+
+def _largest(x: Array) -> Array:
+    """(joints,) largest finite value of each column, NaN where there is none."""
+    finite = np.isfinite(x)
+    return np.where(finite.any(axis=0), np.max(np.where(finite, x, -np.inf), axis=0, initial=-np.inf), np.nan)
+
+
+def limits(s: Subject) -> Sequence[Check | NotTested]:
     """D12: position, speed and acceleration stay within what the description allows."""
-    found, robot = [], s.log.robot
+    found: list[Check] = []
+    robot = s.log.robot
+    if not any(np.isfinite([*joint.position, joint.velocity, joint.acceleration]).any() for joint in robot.joints):
+        return s.cannot_tell("D12", "the robot's description has no limits", signal="q")
     speed, acceleration = peak_speed(s), _peak_acceleration(s)
     for j, joint in enumerate(robot.joints):
         q = s.position[np.isfinite(s.position[:, j]), j]
@@ -69,24 +90,38 @@ def limits(s: Subject) -> list[Check]:
                                    f"the {what} reaches {value:.4g} {unit}, {value / limit:.3g} times its limit",
                                    signal="q", joint=j, gate=value > 1.5 * limit,
                                    remedy="move slower, or correct the limit"))
-    fastest, hardest = (", ".join(f"{v:.3g}" for v in values) for values in (speed, acceleration))
-    return found or s.ok("D12", f"within the limits; speed at most {fastest} rad/s, acceleration {hardest} rad/s^2", signal="q")
+    if found:
+        return found
+    if np.isnan(speed).any():
+        joints = ", ".join(str(j + 1) for j in np.flatnonzero(np.isnan(speed)))
+        return s.cannot_tell("D12", f"no stretch of even samples to take the speed of joint {joints} from", signal="q")
+    fastest = ", ".join(f"{v:.3g}" for v in speed)
+    hardest = ", ".join("not visible" if np.isnan(v) else f"{v:.3g}" for v in acceleration)
+    return s.ok("D12", f"within the limits; speed at most {fastest} rad/s, acceleration {hardest} rad/s^2", signal="q")
 
 
 def _peak_acceleration(s: Subject) -> Array:
     """(joints,) acceleration over ±20 ms, less what the position's own noise gives."""
-    peaks = [np.zeros(s.log.n_joints)]
-    m = max(2, round(0.02 / s.log.sample_time))
-    for run in s.good.runs if s.good.time.known else ():
+    peaks = []
+    for run in _stretches(s):
         q = np.where(np.isfinite(s.position[run]).any(axis=0), s.position[run], 0.0)
+        m = max(2, min(round(0.02 / s.log.sample_time), len(q) // 20))
         if len(q) <= 4 * m:
             continue
         second = np.abs(q[2 * m:] - 2.0 * q[m:-m] + q[:-2 * m]) / (m * s.log.sample_time) ** 2
         # white noise of variance σ² leaves 20 σ² in the third difference; √6 σ / (m Ts)² in this acceleration
         sigma = np.sqrt(np.nanmean(np.diff(q, 3, axis=0) ** 2, axis=0) / 20.0)
         noise = np.sqrt(6.0) * sigma / (m * s.log.sample_time) ** 2
-        peaks.append(np.nanmax(second, axis=0, initial=0.0) - _NOISE_SPEED * noise)
-    return np.asarray(np.max(peaks, axis=0))
+        peaks.append(np.maximum(np.nanmax(second, axis=0, initial=0.0) - _NOISE_SPEED * noise, 0.0))
+    return _largest(np.array(peaks)) if peaks else np.full(s.log.n_joints, np.nan)
+
+
+def degrees_or_motor(reach: float, bounds: tuple[float, float]) -> str:
+    """S07's remedy: numbers too large for a joint in rad are degrees, or of the motor, and each asks for something else."""
+    wide = max(abs(bounds[0]), abs(bounds[1]), bounds[1] - bounds[0])
+    least = f" of at least {reach / wide:.3g}" if np.isfinite(wide) and wide > 0 else ""
+    return (f'if degrees, declare unit = "deg" (divides by 57.3); if motor side, add [drive] transmission = the gear ratios'
+            f"{least}, which multiplies torque by them as well; if neither, pass --trust-units")
 
 
 def held_joints(s: Subject) -> list[Check]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipelines.errors import Check
 from pipelines.log import schema
-from pipelines.log.doctor.checks_subject import Subject, many, spread
+from pipelines.log.doctor.checks_subject import NotTested, Subject, many, spread
 from pipelines.log.doctor.faults import torque_limit
 from pipelines.log.doctor.segments import long_blocks
 from pipelines.log.limits import ABSURD, GAP_LIMIT, percent, sentinels
@@ -168,7 +171,7 @@ def wraps(s: Subject) -> list[Check]:
     return found or s.ok("D07", "the position neither wraps nor jumps", signal="q")
 
 
-def resolution(s: Subject) -> list[Check]:
+def resolution(s: Subject) -> Sequence[Check | NotTested]:
     """D08: encoders count as finely as the description says; the observer's noise is R = δ² / 12."""
     found, seen = [], []
     for j, joint in enumerate(s.log.robot.joints):
@@ -186,7 +189,26 @@ def resolution(s: Subject) -> list[Check]:
                                f"noise is set to R = δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}^2 from the data",
                                signal="q", joint=j,
                                remedy="correct encoder_resolution, or look for bits lost on the way"))
-    return found or s.ok("D08", f"encoder steps: {', '.join(seen)}", signal="q")
+    hidden = [str(j + 1) for j, step in enumerate(s.steps) if step is None]
+    blind = s.cannot_tell("D08", f"no step of the encoder shows in the positions of joint {', '.join(hidden)}",
+                          signal="q") if hidden else []
+    if found or len(hidden) == len(s.steps):
+        return [*found, *blind]
+    return [*s.ok("D08", f"encoder steps: {', '.join(seen)}", signal="q"), *blind]
 
 
-SIGNAL_CHECKS = (missing_samples, absurd_samples, dead_channels, saturation, glitches, wraps, resolution)
+def identical(s: Subject) -> list[Check]:
+    """S13: no two channels hold the same samples; two sensors never do."""
+    alike: dict[bytes, list[tuple[str, int]]] = defaultdict(list)
+    for name in ("q", "tau"):
+        moving = np.flatnonzero(spread(s.log[name]) > 0).tolist() if name in s.log else []
+        for j in moving:
+            alike[s.log[name][:, j].tobytes()].append((name, j))
+    return [s.say("S13", "warn",
+                  f"{' and '.join(f'{name} of joint {j + 1}' for name, j in group)} are the same, sample for sample",
+                  signal=group[-1][0], joint=group[-1][1], gate=True,
+                  remedy="correct the column map of the import: one column serves two channels")
+            for group in alike.values() if len(group) > 1]
+
+
+SIGNAL_CHECKS = (missing_samples, absurd_samples, dead_channels, saturation, glitches, wraps, resolution, identical)

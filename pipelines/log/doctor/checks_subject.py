@@ -7,14 +7,23 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.errors import Check, Level
+from pipelines.errors import Check, Level, clean
 from pipelines.log.doctor.faults import quantum
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.limits import FEWEST
 from pipelines.log.schema import joint_unit
 
-__all__ = ["Subject", "many", "spread"]
+__all__ = ["NotTested", "Subject", "many", "spread"]
+
+
+@dataclass(frozen=True)
+class NotTested:
+    """A check that this log gives nothing to judge by: neither passed nor failed."""
+
+    code: str  # with prefix: "RRID-S15"
+    where: str
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +85,10 @@ class Subject:
 
     def ok(self, code: str, message: str, *, signal: str = "") -> list[Check]:
         return [self.say(code, "ok", message, signal=signal)]
+
+    def cannot_tell(self, code: str, reason: str, *, signal: str = "") -> list[NotTested]:
+        """What this log cannot show is said, and not counted as passed."""
+        return [NotTested(f"RRID-{code}", clean(self.place(signal)), clean(reason))]
 
 
 def many(number: int, thing: str) -> str:

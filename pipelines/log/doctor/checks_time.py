@@ -40,7 +40,8 @@ def length(s: Subject) -> list[Check]:
                       f"{duration:.4g} s < {log.period:.4g} s period",
                       signal="t",
                       remedy="record at least one whole period, or correct the attribute period")]
-    whole = "" if log.period is None else f", {duration / log.period:.3g} periods"
+    number = "" if log.period is None else f"{duration / log.period:.3g}"
+    whole = f", {number} period{'' if number == '1' else 's'}" if number else ""
     return s.ok("T07", f"{log.n_samples} samples in {duration:.4g} s{whole}", signal="t")
 
 

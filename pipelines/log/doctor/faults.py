@@ -124,8 +124,11 @@ def quantum(x: Array) -> float | None:
 
 
 def lagged_speed(q: Array, sample_time: float, lag: float = 0.01) -> Array:
-    """Speed (samples - 2 m, joints) as the difference over ±`lag` seconds: m = lag / sample_time, at least 1."""
-    m = max(1, min(round(lag / sample_time), (len(q) - 1) // 2))
+    """Speed (samples - 2 m, joints) as the difference over ±`lag` seconds: m = lag / sample_time, at least 1.
+
+    In a short or very fast log `lag` is a twentieth of it at most: over half the log, a motion to and fro has no speed.
+    """
+    m = max(1, min(round(lag / sample_time), len(q) // 20))
     return (q[2 * m:] - q[:-2 * m]) / (2 * m * sample_time)
 
 

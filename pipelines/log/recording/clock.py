@@ -10,7 +10,7 @@ from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.recipe import TimeSpec
-from pipelines.log.units import to_si
+from pipelines.log.units import UNITS, canonical_unit, to_si
 
 __all__ = ["declared_step", "plausible_units", "time_of"]
 
@@ -33,7 +33,7 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     step = declared_step(spec)
     if spec.column is None:  # the recipe was checked: then there is a rate
         return table.rows * np.float64(step or math.nan), []
-    name = table.name_of(spec.column)
+    name = table.name_of(spec.column, "t")
     where = f"{table.source}, column '{name}'"
     stamps = table.columns[name]
     finite = stamps[np.isfinite(stamps)]
@@ -47,15 +47,26 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     checks: list[Check] = []
     if unit is None:
         unit = _detected(median, step, where, assume, checks)
-    elif spec.unit and (other := table.units.get(name)) and other != spec.unit:
-        checks.append(Check.of("S08", "warn", f"the header says '{other}', the recipe says '{spec.unit}' and is followed",
-                               where=where))
+    elif spec.unit and (other := table.units.get(name)) and _contradict(other, spec.unit):
+        raise InputRejected("S08", f"the header says '{other}', the recipe says '{spec.unit}'", where=where,
+                            remedy="correct one of them: the unit in [time], or the header")
+    elif not spec.unit:
+        checks.append(Check.of("S06", "ok", f"unit '{unit}' of time taken from the header", where=where))
     factor = _factor(unit, step, where)
     _plausible(median, factor, unit, step, where)
     origin = finite[0] if abs(finite[0]) > 1e6 * median * finite.size else 0.0  # an epoch: seconds since 1970 cost digits
     if origin:
         checks.append(Check.of("S08", "ok", f"time starts at {finite[0]:.16g} {unit}; counted from there", where=where))
     return (stamps - origin) * factor, checks
+
+
+def _contradict(header: str, declared: str) -> bool:
+    """Whether two units of time differ; a header that names none of them says nothing."""
+    header, declared = canonical_unit(header), canonical_unit(declared)
+    known = header in UNITS and UNITS[header].quantity == "time"
+    if declared in ("sample", "samples", "index"):
+        return known
+    return known and declared in UNITS and UNITS[header] != UNITS[declared]
 
 
 def _factor(unit: str, step: float | None, where: str) -> float:

@@ -10,33 +10,38 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
-from pipelines.log.units import UNITS
+from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["companion_of", "named_unit", "roles_of"]
+__all__ = ["companion_of", "named_unit", "role_of", "roles_of"]
 
 # What a column is, by its name. The first that fits counts; the order keeps "pos_ref" from being a position.
 _NAMES: tuple[tuple[str, str], ...] = (
     ("q_ref",
      r"(q|pos|position|angle|theta)_?(ref|des|desired|cmd|target|set)\w*"
      r"|(ref|des|desired|target|cmd|set)_?(q|pos|position|angle)\w*"),
-    ("dq", r"(dq|qd|qdot|vel|velocity|speed|omega|\w*_(vel|velocity|speed))(?![a-z])\w*"),
+    ("dq", r"(dq|qd|qdot|vel|velocity|speed|omega|geschwindigkeit|drehzahl|\w*_(vel|velocity|speed))(?![a-z])\w*"),
     ("t", r"(t|time|timestamp|stamp|zeit|clock|sec|seconds?)(?![a-z])\w*|(t|time)(_|$).*"),
-    ("tau", r"(tau|torque|trq|moment|effort|mom)\w*|\w*(torque|effort)\w*"),
+    ("tau", r"(tau|torque|trq|moment|effort|mom|drehmoment)\w*|\w*(torque|effort|moment)\w*"),
     ("current", r"(i|iq|curr|current|amp|strom)(?![a-z])\w*|\w*(current)\w*"),
-    ("q", r"(q|pos|position|angle|theta|joint|enc|encoder|axis|j)(?![a-z])\w*|\w*(_pos|position|_angle|encoder)\w*"),
+    ("q", r"(q|pos|position|angle|theta|joint|enc|encoder|axis|j|winkel|achse|gelenk)(?![a-z])\w*"
+          r"|\w*(_pos|position|_angle|encoder|winkel)\w*"),
 )
 _SUFFIX_UNITS = {"s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns", "rad": "rad", "deg": "deg", "rev": "rev",
                  "turns": "turn", "counts": "counts",
                  "cnt": "counts", "ticks": "counts", "a": "A", "ma": "mA", "nm": "N m", "mnm": "mN m", "rpm": "rpm"}
 
 
+def role_of(column: str) -> str | None:
+    """What a column holds, by its name alone: "t", "q", "tau", …"""
+    word = re.sub(r"[^\w]+", "_", column.strip()).lower()
+    return next((role for role, pattern in _NAMES if re.fullmatch(pattern, word)), None)
+
+
 def roles_of(table: RawTable, path: Path) -> dict[str, tuple[str, ...]]:
     """Which columns hold what, by their names; a column of time also by rising evenly. The file's name settles "Joint_1"."""
     found: dict[str, list[str]] = {}
     for name in table.columns:
-        word = re.sub(r"[^\w]+", "_", name.strip()).lower()
-        role = next((role for role, pattern in _NAMES if re.fullmatch(pattern, word)), None)
-        if role is not None:
+        if (role := role_of(name)) is not None:
             found.setdefault(role, []).append(name)
     if "t" not in found:
         first = next(iter(table.columns))
@@ -75,7 +80,7 @@ def _is_torque(path: Path) -> bool:
 
 def named_unit(column: str, table: RawTable) -> str | None:
     """The unit in the header, or in the last part of the name."""
-    header = table.units.get(column, "")
+    header = canonical_unit(table.units.get(column, ""))
     if header in UNITS or header == "counts":
         return header
     parts = re.split(r"[_\s.]+", column.lower())

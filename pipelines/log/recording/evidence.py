@@ -10,7 +10,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 
-__all__ = ["Guess", "motion_of", "position_unit", "rollover", "sign_of", "torque_unit"]
+__all__ = ["Guess", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of", "torque_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
@@ -53,9 +53,9 @@ def position_unit(q: Array, t: Array | None, dq: Array | None, named: str | None
     if span > 720.0:
         return Guess("deg", "unsure",
                      f"a range of {span:.5g} is neither an arm's in rad nor in deg: motor side, or counts?"), further
-    if (turns := _quarter_turns(q)) is not None:
-        return Guess("rad", "likely",
-                     f"starts at {turns} times pi/2: motor side, and these are likely its gear ratios for [drive]"), further
+    if turns := quarter_turns(q):
+        return Guess("rad", "likely", f"starts at {', '.join(f'{x}' for x in turns.values())} times pi/2: "
+                     "motor side, and these are likely its gear ratios for [drive]"), further
     if span > 4.0 * math.pi:
         return Guess("deg", "unsure",
                      f"a range of {span:.4g} is too much for a joint in rad; or motor side in rad, then [drive]"), further
@@ -64,12 +64,29 @@ def position_unit(q: Array, t: Array | None, dq: Array | None, named: str | None
     return Guess("rad", "likely", f"{why}: a joint's in rad, hardly a movement in deg"), further
 
 
-def _quarter_turns(q: Array) -> str | None:
-    """Robots rest at right angles: a motor then stands at its gear ratio times quarter turns, in rad."""
-    start = q[0][np.abs(q[0]) > 4.0 * math.pi] / (0.5 * math.pi)
+def quarter_turns(q: Array) -> dict[int, int]:
+    """Robots rest at right angles: a motor then stands at its gear ratio times quarter turns, in rad.
+
+    Returns:
+        joint (from 0) -> quarter turns at the start, of those that stand far from zero; empty where one is at none.
+    """
+    far = np.flatnonzero(np.abs(q[0]) > 4.0 * math.pi)
+    start = q[0][far] / (0.5 * math.pi)
     if start.size == 0 or np.abs(start - np.round(start)).max() > 2e-3:
-        return None
-    return ", ".join(f"{x:.0f}" for x in np.round(start))
+        return {}
+    return {int(j): int(x) for j, x in zip(far, np.round(start), strict=True)}
+
+
+def held(tau: Array, q: Array) -> Guess:
+    """Whether a torque is a command that is held: then it stands still over samples in which the position moves."""
+    moving = np.abs(np.diff(q, axis=0)) > 0
+    both = np.diff(tau, axis=0)[moving[:, :tau.shape[1]]] if tau.shape == q.shape else np.diff(tau, axis=0).ravel()
+    share = float(np.mean(both == 0)) if both.size else 0.0
+    if share > 0.4 and np.unique(tau).size > 50:
+        return Guess("held-command", "likely", f"{100 * share:.0f} % of the steps between samples are none while the position "
+                     "moves: a command, held over several samples")
+    return Guess("measured", "unsure", 'nothing in the numbers tells; ask who recorded them: "held-command" where this is what '
+                 "the drive was commanded, to be held until the next sample")
 
 
 def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tuple[Guess, str]:

@@ -20,13 +20,21 @@ from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.clock import plausible_units
 from pipelines.log.recording.column_roles import companion_of, named_unit, roles_of
-from pipelines.log.recording.evidence import Guess, motion_of, position_unit, sign_of, torque_unit
+from pipelines.log.recording.evidence import (
+    Guess,
+    held,
+    motion_of,
+    position_unit,
+    quarter_turns,
+    sign_of,
+    torque_unit,
+)
 from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.recording.sources import read_table
 
 __all__ = ["Draft", "guess_recipe"]
 
-_BLANK = "FILL IN"
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 
 
@@ -82,6 +90,7 @@ class _Drafting:
         self.n = len(q) or len(torque) or 1
         self.torque_table = companion if companion is not None and not torque else table
         self.torque = torque or (tuple(companion.columns)[: self.n] if companion is not None else ())
+        self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
         self.current = "tau" not in roles and "current" in roles
 
     def note(self, what: str, guess: Guess) -> str:
@@ -91,13 +100,13 @@ class _Drafting:
 
     def blank(self, what: str) -> str:
         self.blanks.append(what)
-        return _BLANK
+        return BLANK
 
     def draft(self) -> Draft:
         name = clean(self.path.name, 80)
         columns = ", ".join(clean(c, 40) for c in self.table.columns)
         lines = [f"# Drafted by `rrrid import --guess {name}`: {self.table.rows.size} samples, columns {columns}.",
-                 f"# Go through every \"check:\" and fill in what says {_BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
+                 f"# Go through every \"check:\" and fill in what says {BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
                  ""]
         lines += [*self._robot(), *self._log(), *self._time(), *self._signals(), *self._drive(), *self._resample()]
         return Draft("\n".join(lines) + "\n", tuple(self.evidence), tuple(self.blanks))
@@ -118,13 +127,26 @@ class _Drafting:
         return ["[log]", f"match = {_quoted(self.path.name)}      # a pattern such as \"run_{{number}}.csv\" takes many files",
                 'experiment = "free"                     # check: friction | excitation | writing | frf | hold | free',
                 'role = "identify"                       # check: identify | validate | reference',
-                'torque = "measured"                     # check: "held-command" where the drive was commanded and holds it', ""]
+                self._held(), ""]
+
+    def _held(self) -> str:
+        """`torque = …`: by the name of its columns, else by whether it is held over samples."""
+        name = next((c for c in self.torque if re.search(r"cmd|command|setpoint|soll|desired|target", c.lower())), None)
+        if self.current or not self.torque:
+            guess = Guess("measured", "likely", "a current is sampled like the position")
+        elif name is not None:
+            guess = Guess("held-command", "likely", f"column '{clean(name, 40)}' is named a command")
+        else:
+            q = self.roles.get("q", ())
+            tau = np.column_stack([self.torque_table.columns[c] for c in self.torque])
+            guess = held(tau, np.column_stack([self.table.columns[c] for c in q]) if q else tau)
+        return f'torque = "{guess.value}"   {self.note("torque", guess)}'
 
     def _time(self) -> list[str]:
         if "t" not in self.roles:
             self.evidence.append("rate: no column of time")
             self.blanks.append("time.rate")
-            lines = ["[time]", f'rate = "{_BLANK}"                        # Hz; no column rises steadily, so only you know it']
+            lines = ["[time]", f'rate = "{BLANK}"                        # Hz; no column rises steadily, so only you know it']
             return [*lines, *self._map_hint(), ""]
         column = self.roles["t"][0]
         guess = self._time_unit(column)
@@ -171,15 +193,16 @@ class _Drafting:
             speed = np.column_stack([self.table.columns[c] for c in dq]) if len(dq) == len(q) else None
             named = named_unit(q[0], self.table)
             guess, extra = position_unit(values, self.seconds(), speed, named)
+            self.ratios = quarter_turns(values) if guess.value == "rad" and "times pi/2" in guess.why else {}
             lines += [f"q = {{ {_columns(q)}, unit = \"{guess.value}\"{extra} }}", f"    {self.note('q unit', guess)}"]
             lines += [f"    {comment}" for comment in motion_of(values, guess.value)]
         else:
-            lines.append(f'q = {{ columns = "{self.blank("signals.q")}", unit = "{_BLANK}" }}')
+            lines.append(f'q = {{ columns = "{self.blank("signals.q")}", unit = "{BLANK}" }}')
         return [*lines, *self._torque(), ""]
 
     def _torque(self) -> list[str]:
         if not self.torque:
-            return [f'tau = {{ columns = "{self.blank("signals.tau")}", unit = "{_BLANK}" }}   # no column looks like it']
+            return [f'tau = {{ columns = "{self.blank("signals.tau")}", unit = "{BLANK}" }}   # no column looks like it']
         values = np.column_stack([self.torque_table.columns[c] for c in self.torque])
         named = named_unit(self.torque[0], self.torque_table)
         guess = torque_unit(values, named, self.current)
@@ -192,12 +215,23 @@ class _Drafting:
         return lines
 
     def _drive(self) -> list[str]:
+        ratios = [str(abs(self.ratios[j])) + ".0" if j in self.ratios else f'"{BLANK}"' for j in range(self.n)]
+        if self.ratios:
+            if len(self.ratios) < self.n:
+                self.blanks.append("drive.transmission")
+            unknown = f"; those marked {BLANK} stood near zero: from the data sheet" if len(self.ratios) < self.n else ""
+            lines = ["[drive]                  # check: likely, positions start at these numbers of quarter turns: motor side",
+                     f"transmission = [{', '.join(ratios)}]   # check: sign, + where motor and joint turn alike{unknown}"]
+            if self.current:
+                self.blanks.append("drive.torque_constant")
+                lines.append(f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet')
+            return [*lines, ""]
         lines = ["# [drive]                # where numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
                  f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
         if not self.current:
             return [*lines, ""]
         self.blanks.append("drive.torque_constant")
-        return ["[drive]", f'torque_constant = "{_BLANK}"             # N m/A, motor side: from the data sheet',
+        return ["[drive]", f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet',
                 f"# transmission = [{', '.join(['100.0'] * self.n)}]   # where numbers are motor side: q_motor = N q_joint", ""]
 
     def _resample(self) -> list[str]:

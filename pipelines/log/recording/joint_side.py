@@ -13,12 +13,15 @@ import numpy as np
 
 from pipelines.errors import Check, InputRejected, UsageError
 from pipelines.log import schema
+from pipelines.log.doctor.checks_motion import degrees_or_motor
+from pipelines.log.doctor.checks_subject import many
 from pipelines.log.experiment import Array, Signal
+from pipelines.log.recording.evidence import quarter_turns
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.recipe import DriveSpec, Numbers, Recipe, SignalSpec
 from pipelines.log.recording.repair import Recording
 from pipelines.log.robot import Drive, RobotDescription
-from pipelines.log.units import UNITS, to_si
+from pipelines.log.units import UNITS, canonical_unit, to_si
 
 __all__ = ["Converted", "drive_of", "joint_side", "si_of", "unit_declared"]
 
@@ -99,7 +102,7 @@ def si_of(unit: str, spec: SignalSpec) -> float:
 
 
 def _known(unit: str) -> object:
-    return UNITS.get(unit.replace("Nm", "N m"))
+    return UNITS.get(canonical_unit(unit))
 
 
 def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot: RobotDescription, drive: Drive | None,
@@ -149,9 +152,9 @@ def _unwrapped(part: Recording, name: str, raw: Array, spec: SignalSpec, unit: s
     for joint in np.flatnonzero(turns.any(axis=0)):
         count = int(np.abs(turns[:, joint]).sum())
         at = part.listed(np.flatnonzero(turns[:, joint]) + 1)
-        checks.append(Check.of("D07", "warn", f"{count} rollovers of {wrap:g} unwrapped ({at})",
-                               where=part.column(name, int(joint))))
-        altered.append(f"{name} of joint {joint + 1}: {count} rollovers of {wrap:g} unwrapped")
+        checks.append(Check.of("D07", "warn", f"{many(count, 'rollover')} of {wrap:g} unwrapped ({at})",
+                               where=part.column(name, int(joint)), remedy="let the recorder count turns"))
+        altered.append(f"{name} of joint {joint + 1}: {many(count, 'rollover')} of {wrap:g} unwrapped")
     return raw - wrap * np.concatenate([np.zeros((1, raw.shape[1])), np.cumsum(turns, axis=0)])
 
 
@@ -228,7 +231,7 @@ def _refuse_wrong_kind(part: Recording, name: str, unit: str, spec: SignalSpec, 
 
 
 def _refuse_degrees(part: Recording, q: Array, unit: str, robot: RobotDescription) -> None:
-    """S07: declared radians that leave the joint's range by far, and would lie in it as degrees."""
+    """S07: declared radians that leave the joint's range by far: degrees, or the motor's. Only a person can tell which."""
     if unit != "rad":
         return
     for j, joint in enumerate(robot.joints):
@@ -238,7 +241,12 @@ def _refuse_degrees(part: Recording, q: Array, unit: str, robot: RobotDescriptio
             continue
         slack = 0.05 * (high - low)
         as_degrees = np.deg2rad(q[:, j])
-        if as_degrees.min() >= low - slack and as_degrees.max() <= high + slack:
+        degrees = bool(as_degrees.min() >= low - slack and as_degrees.max() <= high + slack)
+        if degrees or span > 2.0 * (high - low):
+            turns = quarter_turns(q)
+            starts = ", ".join(map(str, turns.values()))
+            motor = f"; it starts at {starts} times pi/2, as motors of such gear ratios do at rest" if turns else ""
+            what = "looks like degrees or the motor side" if degrees else "looks like the motor side"
             raise InputRejected("S07", f"moves over {span:.4g} declared rad, its limits are {low:.4g} to {high:.4g} rad: "
-                                "looks like degrees",
-                                where=part.column("q", j), remedy='declare unit = "deg", or pass --trust-units')
+                                f"{what}{motor}",
+                                where=part.column("q", j), remedy=degrees_or_motor(span, (low, high)))

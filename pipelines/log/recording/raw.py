@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import Check, InputRejected, did_you_mean
+from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
 from pipelines.log.experiment import Array
 
 __all__ = ["RawTable", "columns_of_arrays", "expand"]
@@ -36,8 +37,8 @@ class RawTable:
         """Where sample `index` stands in the file, in words."""
         return f"row {int(self.rows[index]) + 1}" if self.lines is None else f"line {int(self.lines[index])}"
 
-    def name_of(self, column: str | int) -> str:
-        """The name of a column asked for by name or by 1-based number.
+    def name_of(self, column: str | int, wanted: str = "") -> str:
+        """The name of a column asked for by name or by 1-based number, as what is `wanted`: "tau_1", "t".
 
         Raises:
             InputRejected: S01, there is none; S12, it does not hold numbers.
@@ -54,8 +55,23 @@ class RawTable:
                                 remedy="export it as numbers, or choose another column")
         if column not in self.columns:
             raise InputRejected("S01", f"no column '{column}'{did_you_mean(column, names)}; there are {', '.join(names[:40])}",
-                                where=self.source, remedy=f"correct the recipe, or pass --map q_1='{names[0] if names else '…'}'")
+                                where=self.source, remedy=self._remedy(column, wanted))
         return column
+
+    def _remedy(self, column: str, wanted: str) -> str:
+        """Which columns could be meant: by their names, those of the signal that was asked for."""
+        from pipelines.log.recording.column_roles import role_of
+
+        if not wanted:
+            return "correct the recipe"
+        signal = wanted.rpartition("_")[0] or wanted
+        fitting = [name for name in self.columns if role_of(name) == signal]
+        near = difflib.get_close_matches(column, fitting or list(self.columns), n=1) or fitting[:1]
+        if not near:
+            return f"correct the recipe, or pass --map {wanted}='…' with the column of {wanted}"
+        others = [name for name in fitting if name != near[0]]
+        also = f" (or {', '.join(others[:8])})" if others else ""
+        return f"correct the recipe, or pass --map {wanted}='{near[0]}'{also}"
 
 
 def expand(table: RawTable, columns: str | int | tuple[str | int, ...], n: int, signal: str,
@@ -66,6 +82,7 @@ def expand(table: RawTable, columns: str | int | tuple[str | int, ...], n: int, 
 
     Raises:
         InputRejected: S01 a column is missing, S02 there are not `n` of them, S12 one holds no numbers.
+        UsageError: C02, one column for two joints.
     """
     if isinstance(columns, str) and "{j}" in columns:
         if (further := columns.replace("{j}", str(n + 1))) in table.columns:
@@ -77,7 +94,12 @@ def expand(table: RawTable, columns: str | int | tuple[str | int, ...], n: int, 
     chosen = (columns,) if isinstance(columns, str | int) else columns
     if len(chosen) != n:
         _wrong_count(table, signal, len(chosen), n, "the recipe names " + ", ".join(str(c) for c in chosen))
-    return tuple(table.name_of((instead or {}).get(j, column)) for j, column in enumerate(chosen, start=1))
+    names = tuple(table.name_of((instead or {}).get(j, column), f"{signal}_{j}") for j, column in enumerate(chosen, start=1))
+    for j, name in enumerate(names, start=1):
+        if (first := names.index(name) + 1) < j:
+            raise UsageError("C02", f"column '{name}' serves {signal} of joint {first} and of joint {j}", where=table.source,
+                             remedy=f"give each joint its own column in signals.{signal}, or by --map {signal}_{j}=…")
+    return names
 
 
 def _wrong_count(table: RawTable, signal: str, have: int, n: int, why: str) -> None:

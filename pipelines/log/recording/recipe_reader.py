@@ -29,7 +29,9 @@ from pipelines.log.recording.recipe import (
 )
 from pipelines.log.shipped import shipped
 
-__all__ = ["find_recipe", "parse_recipe"]
+__all__ = ["BLANK", "find_recipe", "parse_recipe"]
+
+BLANK = "FILL IN"  # stands in a drafted recipe where nothing in the recording could tell
 
 
 def find_recipe(source: str | Path) -> Path:
@@ -52,6 +54,7 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     except (ValueError, RecursionError) as problem:
         raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where,
                          remedy="correct that line; strings stand in quotes, tables in [ ]") from None
+    _blanks(table, where)
     if "where" in table:
         raise UsageError("C01", "'where' is not a key of a recipe", where=where, remedy="remove it")
     try:
@@ -65,6 +68,26 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     _format(recipe.format, where)
     _meaning(recipe, where)
     return recipe
+
+
+def _blanks(table: dict[str, Any], where: object) -> None:
+    """C02: what --guess could not know and nobody has filled in."""
+    if blanks := [place for place, text in _texts(table, "") if BLANK in text.upper()]:
+        more = f" and at {', '.join(blanks[1:6])}" if len(blanks) > 1 else ""
+        raise UsageError("C02", f"'{blanks[0]}' is still marked {BLANK}", where=where,
+                         remedy=f"replace the blank marked {BLANK} at {blanks[0]}{more}; the draft says what belongs there")
+
+
+def _texts(value: Any, path: str) -> Iterator[tuple[str, str]]:
+    """(place, text) of every text in the recipe."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _texts(item, f"{path}.{key}".lstrip("."))
+    elif isinstance(value, list):
+        for i, item in enumerate(value, start=1):
+            yield from _texts(item, f"{path}[{i}]")
+    elif isinstance(value, str):
+        yield path, value
 
 
 def _plain(value: Any) -> Any:

@@ -20,6 +20,7 @@ from pipelines.log.recording.repair import Recording
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Drive, RobotDescription, parse_robot
 from pipelines.log.robot_files import load_robot
+from pipelines.log.shipped import shipped, shipped_names
 from pipelines.log.text import read_small_text
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
@@ -65,7 +66,7 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
     """
     path = find_recipe(recipe_name)
     recipe = replace(parse_recipe(read_small_text(path, what="a recipe, a TOML file"), path), where=str(path))
-    folder = source if source else path.parent
+    folder = _folder(path, source)
     arm, described = _robot(recipe, folder, path, robot)
     drive = drive_of(recipe.drive, arm, path)
     names = filenames.files_below(folder)
@@ -75,7 +76,7 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
     def table_of(name: str) -> RawTable:
         if name not in read:
             tell(f"reading {name}")
-            read[name] = read_table(filenames.inside(folder, name, path), recipe.format)
+            read[name] = read_table(filenames.inside(folder, name, path), recipe.format, name)
         return read[name]
 
     hits = {name: hit for name in names if (hit := _case(cases, name)) is not None}
@@ -92,6 +93,23 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
                     tuple(name for name in names if name not in read and Path(name).suffix.lower() in _RECORDINGS),
                     (path, *described, *(folder / name for name in read)),
                     hashes={folder / name: table.sha256 for name, table in read.items()})
+
+
+def _folder(recipe: Path, source: Path | None) -> Path:
+    """Where the recordings lie: --source, or beside a recipe of one's own; a shipped recipe has none beside it.
+
+    Raises:
+        UsageError: C04, no such folder, or none was given.
+    """
+    if source is None:
+        if recipe.stem in shipped_names("recipes") and recipe == shipped("recipes", recipe.stem):
+            raise UsageError("C04", f"the shipped recipe '{recipe.stem}' does not say where the recordings lie",
+                             where="rrrid import", remedy="give their folder with --source FOLDER")
+        return recipe.parent
+    if not source.is_dir():
+        raise UsageError("C04", "is not a folder" if source.exists() else "no such folder", where=source,
+                         remedy="give the folder of the recordings with --source")
+    return source
 
 
 def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] | None:
@@ -141,6 +159,11 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
         raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path,
                          remedy="fill it in")
     found = next((place / use for place in (folder, path.parent) if (place / use).is_file()), None)
+    if found is None and Path(use).suffix and use not in shipped_names("robots"):
+        places = " nor ".join(dict.fromkeys((f"in {folder}", f"in {path.parent}")))
+        raise UsageError("C04", f"the robot '{use}' that the recipe names lies neither {places}" if folder != path.parent
+                         else f"the robot '{use}' that the recipe names does not lie in {folder}", where=path,
+                         remedy="copy it to the recordings, give their folder with --source, or another robot with --robot")
     robot = load_robot(found if found is not None else use)
     files = () if found is None else (found,)
     if "name" in table:
@@ -187,6 +210,7 @@ class Assembled:
     units: Mapping[str, str]
     columns: Mapping[str, tuple[str, ...]]
     checks: tuple[Check, ...]
+    undeclared: tuple[str, ...] = ()  # units that the recipe leaves open and where they come from, in words
 
 
 def assemble(source: Source, material: Material, mapped: Map, assume_units: bool = False) -> Assembled:
@@ -201,15 +225,22 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
     units: dict[str, str] = {}
     columns: dict[str, tuple[str, ...]] = {}
     recordings: list[Recording] = []
+    undeclared: list[str] = []
     for file, table in source.tables.items():
         here = [s for s in recipe.signals if _file_of(recipe, s, source.groups, source.primary, recipe.where) == file]
         for signal in here:
             spec = recipe.signals[signal]
             columns[signal] = expand(table, spec.where or 1, n, signal, mapped.get(signal))
             units[signal] = unit_declared(signal, spec, table, columns[signal], assume_units, checks)
+            if spec.unit is None:
+                origin = "from the header" if any(c in table.units for c in columns[signal]) else "assumed, as --assume-units says"
+                undeclared.append(f"{signal}: unit {units[signal]} {origin}")
         if not here and file != source.primary:
             continue
         own_clock = time.column is None or file == source.primary or isinstance(time.column, int) or time.column in table.columns
+        open_unit = own_clock and time.column is not None and time.unit is None
+        if open_unit and (header := table.units.get(table.name_of(time.column or 1, "t"))):
+            undeclared.append(f"t: unit {header} from the header")
         t, said = time_of(table, time, assume_units) if own_clock else (np.full(table.rows.size, np.nan), [])
         checks += said
         signals: dict[str, Array] = {s: np.column_stack([table.columns[c] for c in columns[s]]) for s in here}
@@ -222,7 +253,7 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
     if len(joined) > 1 and recipe.resample is None:
         raise InputRejected("T06", "the files have different time stamps", where=", ".join(source.tables),
                             remedy="add [resample] rate = … to bring them on one clock")
-    return Assembled(joined, units, columns, tuple(checks))
+    return Assembled(joined, units, columns, tuple(checks), tuple(undeclared))
 
 
 def _joined(recordings: list[Recording], tables: list[RawTable], clocked: bool, checks: list[Check]) -> tuple[Recording, ...]:
@@ -253,4 +284,4 @@ def _refuse_unequal(first: Recording, other: Recording, a: int, b: int, one_cloc
         raise InputRejected("S16", f"{a + 1} and {b + 1} samples: not of one recording", where=where,
                             remedy="give files of the same run, or files with time stamps of their own and [resample]")
     checks.append(Check.of("T06", "warn", f"{a + 1} and {b + 1} samples; the rows both have are used, counted from the start",
-                           where=where))
+                           where=where, remedy="begin and end both recordings together"))

@@ -30,8 +30,8 @@ _REFUSED = ((b"PAR1", "F06", "a Parquet file", "rrrid convert and inspect read l
             (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"))
 
 
-def read_table(path: Path, text: TextFormat | None = None) -> RawTable:
-    """Everything numeric in a recorded file.
+def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> RawTable:
+    """Everything numeric in a recorded file; `name` is what messages call it, such as its path below the source folder.
 
     Raises:
         InputRejected: the file is damaged, hostile or holds no table; the code says which.
@@ -48,7 +48,7 @@ def read_table(path: Path, text: TextFormat | None = None) -> RawTable:
             data = file.read(_LARGEST + 1)
     except OSError as problem:
         raise fault_of(problem, path) from None
-    source = path.name
+    source = name or path.name
     kind = _kind(data, source)
     table = _read(kind, data, path, source, text)
     checks = table.checks
@@ -99,13 +99,13 @@ def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | No
     if kind == "mat5":
         import scipy.io  # noqa: F401  imported before the fork, so that every child has it
 
-        return _in_child(lambda: columns_of_arrays(read_mat5(data, source), source), path)
+        return _in_child(lambda: columns_of_arrays(read_mat5(data, source), source), path, source)
     import h5py  # noqa: F401
 
-    return _in_child(lambda: columns_of_arrays(read_mat73(path, source), source), path)
+    return _in_child(lambda: columns_of_arrays(read_mat73(path, source), source), path, source)
 
 
-def _in_child(read: Callable[[], RawTable], path: Path) -> RawTable:
+def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable:
     """The table, read where a crash or a flood of memory costs a child process only."""
     def work() -> Answer:
         table = read()
@@ -118,10 +118,10 @@ def _in_child(read: Callable[[], RawTable], path: Path) -> RawTable:
     except InputRejected as problem:
         # However it was damaged, and however the library took it: one message (F08).
         if problem.code == "RRID-F03":
-            raise damaged(path.name) from None
+            raise damaged(source) from None
         raise
     about = answer.about
     columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
-    return RawTable(path.name, columns, np.arange(len(next(iter(columns.values())))), text=about["text"],
+    return RawTable(source, columns, np.arange(len(next(iter(columns.values())))), text=about["text"],
                     groups={key: tuple(names) for key, names in about["groups"].items()},
                     checks=tuple(Check(**check) for check in about["checks"]))

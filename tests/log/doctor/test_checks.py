@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.doctor.checks import CHECKS, LogCheck, Subject, check_log, check_together
+from pipelines.log.doctor.checks import CHECKS, LogCheck, NotTested, Subject, check_log, check_together
+from pipelines.log.doctor.checks_motion import limits, peak_speed
 from pipelines.log.doctor.faults import quantum, spikes, time_base
 from pipelines.log.files import Opened
 from pipelines.log.limits import sentinels
@@ -182,3 +183,23 @@ def test_consequences_are_not_repeated() -> None:
     log = healthy_without_reference(good_log())
     found = [c.code for c in check_log(with_signal(log, q=np.rad2deg(log.q))) if c.level != "ok"]
     assert found == ["RRID-S07"] * 3
+
+
+@pytest.mark.parametrize(("samples", "sample_time"), [(60, 1e-3), (150, 1e-3), (1200, 1e-6)])
+def test_a_short_or_fast_log_has_a_speed(samples: int, sample_time: float) -> None:
+    """D12: the peak of a sine of two periods is found within 10 %, however short and fast; zero would pass every limit."""
+    log = rows(good_log(), slice(0, samples))
+    t = sample_time * np.arange(samples)
+    omega = 4.0 * np.pi / t[-1]
+    fast = replace(with_signal(healthy_without_reference(log), t=t, q=np.outer(np.sin(omega * t), [1.0, 0.5, 0.2])),
+                   sample_time=sample_time)
+    np.testing.assert_allclose(peak_speed(Subject(fast)), omega * np.array([1.0, 0.5, 0.2]), rtol=0.1)
+    found = [c for c in check_log(fast) if c.code == "RRID-D12"]
+    assert any(c.gate and "speed reaches" in c.message for c in found)
+
+
+def test_a_speed_that_cannot_be_taken_is_not_within_the_limits() -> None:
+    """D12: of 60 samples with a hole in them no speed is taken; that is said, and counted as not tested."""
+    log = rows(healthy_without_reference(good_log()), np.r_[0:30, 80:110])
+    (found,) = [c for c in limits(Subject(log)) if c.code == "RRID-D12"]
+    assert isinstance(found, NotTested)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,3 +49,16 @@ def test_s08_an_absurd_rate_is_refused() -> None:
 def test_an_epoch_in_nanoseconds_keeps_its_digits() -> None:
     t, _ = time_of(table(1.7e18 + np.arange(1200) * 1024000.0), TimeSpec(column="t", unit="ns"))
     assert np.allclose(np.diff(t), 1.024e-3, rtol=1e-9)
+
+
+def test_s08_a_header_that_contradicts_the_recipe_is_refused() -> None:
+    """Seconds read as milliseconds make a log a thousand times too fast that nothing else needs to notice."""
+    with pytest.raises(InputRejected, match=r"RRID-S08.*the header says 's', the recipe says 'ms'"):
+        time_of(replace(table(good()["t"]), units={"t": "s"}), TimeSpec(column="t", unit="ms"))
+
+
+@pytest.mark.parametrize(("header", "unit"), [("sec", "s"), ("µs", "us"), ("μs", "us"), ("local", "s")])
+def test_a_header_that_says_the_same_or_nothing_is_no_contradiction(header: str, unit: str) -> None:
+    stamps = good()["t"] * (1e6 if unit == "us" else 1.0)
+    _, checks = time_of(replace(table(stamps), units={"t": header}), TimeSpec(column="t", unit=unit))
+    assert not checks

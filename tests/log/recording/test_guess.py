@@ -28,8 +28,37 @@ def test_a_plain_recording_needs_only_its_robot(tmp_path: Path) -> None:
 
 
 def test_a_blank_that_is_left_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="RRID-C0"):
+    with pytest.raises(UsageError, match=r"RRID-C02.*'robot.use' is still marked FILL IN.*Replace the blank.*at robot.use"):
         run(tmp_path / "data", drafted(tmp_path / "data", text(good())))
+
+
+@pytest.mark.parametrize(("line", "place"), [('rate = "FILL IN"', "time.rate"), ('q = "FILL IN"', "signals.q")])
+def test_any_blank_is_named_with_its_place(line: str, place: str) -> None:
+    section, _, key = place.partition(".")
+    with pytest.raises(UsageError, match=f"RRID-C02.*at {section}.{key}"):
+        parse_recipe(f"[{section}]\n{line}\n")
+
+
+def test_units_in_a_header_are_used_and_sure(tmp_path: Path) -> None:
+    """"[Nm]" is a unit as good as "[s]" and "[rad]"; Winkel and Drehmoment are an angle and a torque."""
+    columns = good()
+    named = {"Zeit [s]": columns["t"]} | {f"Winkel {j} [rad]": columns[f"q_{j}"] for j in (1, 2, 3)}
+    named |= {f"Drehmoment {j} [Nm]": columns[f"tau_{j}"] for j in (1, 2, 3)}
+    draft = guess_recipe(write(tmp_path, text(named)))
+    assert draft.blanks == ("robot.use",)
+    assert 'unit = "N m" }' in draft.text
+    assert any(words.startswith("tau unit: N m (sure: named so") for words in draft.evidence)
+    assert any(words.startswith("q unit: rad (sure: named so") for words in draft.evidence)
+
+
+def test_a_held_torque_is_drafted_as_a_command(tmp_path: Path) -> None:
+    """Held over four samples, or called a command; where nothing tells, the draft says whom to ask."""
+    columns = good()
+    held = {f"tau_{j}": np.repeat(columns[f"tau_{j}"][::4], 4) for j in (1, 2, 3)}
+    assert 'torque = "held-command"' in drafted(tmp_path, text(columns | held))
+    named = {("tau_cmd_" + k[-1] if k.startswith("tau") else k): v for k, v in columns.items()}
+    assert 'torque = "held-command"' in drafted(tmp_path, text(named))
+    assert "ask who recorded them" in drafted(tmp_path, text(columns))
 
 
 def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) -> None:
@@ -54,8 +83,9 @@ def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) ->
 @pytest.mark.parametrize("name", ["pos_read_data.csv", "curr_data.csv"])
 def test_the_tx40_draft_finds_both_files_and_the_motor_side(shared: Path, name: str) -> None:
     draft = guess_recipe(shared / "real" / "tx40" / name)
-    assert draft.blanks == ("time.rate",)
-    recipe = parse_recipe(draft.text.replace('rate = "FILL IN"', "rate = 5000"))
+    assert draft.blanks == ("time.rate", "drive.transmission")
+    assert 'transmission = ["FILL IN", 32.0, 45.0, "FILL IN", "FILL IN", "FILL IN"]' in draft.text
+    recipe = parse_recipe(draft.text.replace('rate = "FILL IN"', "rate = 5000").replace('"FILL IN"', "40.0"))
     assert recipe.robot["use"] == "tx40.urdf"
     assert recipe.log.match == "pos_read_data.csv"
     assert (recipe.signals["q"].columns, recipe.signals["q"].unit, recipe.signals["tau"].file) == ("Joint_{j}", "rad",
@@ -119,5 +149,6 @@ def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
 def test_nanoseconds_since_1970_are_a_time(tmp_path: Path) -> None:
     """Such stamps lie beyond 1e18; they are neither absurd nor a hole."""
     stamps = 1.7e18 + 1024000.0 * np.arange(1200)
-    recipe = parse_recipe(drafted(tmp_path / "data", text({"time_ns": stamps} | {k: v for k, v in good().items() if k != "t"})))
+    draft = drafted(tmp_path / "data", text({"time_ns": stamps} | {k: v for k, v in good().items() if k != "t"}))
+    recipe = parse_recipe(draft.replace('use = "FILL IN"', 'use = "rrr"'))
     assert (recipe.time.column, recipe.time.unit) == ("time_ns", "ns")

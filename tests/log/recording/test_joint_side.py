@@ -23,7 +23,7 @@ def columns(*names: str) -> RawTable:
 
 
 def test_s01_a_missing_column_is_named_with_its_neighbour() -> None:
-    with pytest.raises(InputRejected, match=r"RRID-S01 run.csv: no column 'Joint_2', did you mean 'Joint2'\?.*--map q_1="):
+    with pytest.raises(InputRejected, match=r"RRID-S01 run.csv: no column 'Joint_2', did you mean 'Joint2'\?.*--map q_2='Joint2'"):
         expand(columns("Joint_1", "Joint2", "Joint_3"), "Joint_{j}", 3, "q")
 
 
