@@ -122,7 +122,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         if len(previews) < _PREVIEWS and subject.sampled:
             previews.append(log_preview(subject))
     found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
-    return Result((*reading, *found), tuple(blind), len(reading), tuple(logs), tuple(str(r.path) for r in inputs.rejected), tuple(previews))
+    return Result((*reading, *found), tuple(blind), len(reading), tuple(logs),
+                  tuple(str(r.path) for r in inputs.rejected), tuple(previews))
 
 
 def _as_check(error: RrridError, path: object) -> Check:

@@ -45,7 +45,7 @@ class Fault:
 
 
 FAULTS = (
-    Fault("S07", lambda g: with_signal(g, q=np.rad2deg(g.q)), "reject", "looks like degrees", "signal q, joint 1"),
+    Fault("S07", lambda g: with_signal(g, q=np.rad2deg(g.q)), "reject", "looks like degrees or the motor", "signal q, joint 1"),
     Fault("S08 ms", lambda g: retimed(g, lambda t: t * 1000.0), "repair", "is in ms", "signal t"),
     Fault("S08 us", lambda g: retimed(g, lambda t: t * 1000000.0), "repair", "is in us", "signal t"),
     Fault("S08 ns", lambda g: retimed(g, lambda t: t * 1000000000.0), "repair", "is in ns", "signal t"),

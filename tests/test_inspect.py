@@ -16,7 +16,8 @@ from pipelines.log.files import find_logs, open_log, write_log
 from pipelines.log.results import decode, read_series
 from pipelines.stage import Outcome, Request, run_stage
 from tests.fault_table import FAULTS
-from tests.healthy import good_log, make_log, rest, with_signal
+from tests.faulty import faster
+from tests.healthy import good_log, make_log, rest, rows, with_signal
 
 MAKE = {fault.row: fault.make for fault in FAULTS}
 
@@ -123,7 +124,7 @@ def test_every_fault_has_a_report() -> None:
         opened = Opened(Path("log.h5"), "0" * 64, fault.make(good_log()), ())
         result = inspect.compute(Inputs((opened,)), inspect.Settings())
         report = inspect.report(result)
-        assert report.verdict.startswith("Of 1 log"), fault.row
+        assert report.verdict.startswith("The log "), fault.row
         assert report.sections[0].title == "What was found"
 
 
@@ -205,3 +206,66 @@ def test_signals_of_the_preview_cover_the_log() -> None:
     assert len(preview.t) <= 400
     np.testing.assert_array_equal(preview.q.max(axis=0), log.q.max(axis=0))
     np.testing.assert_array_equal(preview.tau.min(axis=0), log.tau.min(axis=0))
+
+
+def test_a_preview_is_broken_at_every_gap() -> None:
+    """A hole of 30 samples, less than a bucket: no bucket holds both its sides, and a blank stands between them."""
+    from pipelines.log.doctor.checks import Subject
+    from pipelines.report.log_preview import log_preview
+
+    log = make_log(lambda t: (np.outer(t, np.ones(3)), np.ones((t.size, 3)), np.zeros((t.size, 3))), duration=20.0)
+    log = rows(log, np.r_[0:9000, 9030:log.n_samples])
+    preview = log_preview(Subject(log))
+    (blank,) = np.flatnonzero(np.isnan(preview.q).all(axis=1))
+    assert log.t[8999] < preview.t[blank] < log.t[9000]
+    assert (np.diff(preview.t) >= 0).all()
+    assert np.nanmax(preview.q[:blank, 0]) <= log.q[:9000, 0].max()
+    assert preview.intervals.size == preview.n_intervals == log.n_samples - 1
+
+
+def test_several_robots_are_named(tmp_path: Path) -> None:
+    """Logs of two robots are not "all logs": the verdict counts the robots, and the table names them."""
+    outcome = doctor(tmp_path, good_log(), replace(good_log(1), robot_name="another"))
+    assert "2 logs of 2 robots are in order" in outcome.report.verdict
+    (logs,) = next(s for s in outcome.report.sections if s.title == "The logs").tables
+    assert [row[logs.columns.index("robot")] for row in logs.rows] == ["rrr-tue", "another"]
+
+
+def test_what_cannot_be_judged_has_not_passed(tmp_path: Path) -> None:
+    """A hold log without an encoder step: neither its columns nor its torque nor its resolution were tested."""
+    log = make_log(rest, "hold", duration=2.0)
+    log = with_signal(log, q=log.q + 1e-3 * np.random.default_rng(0).standard_normal(log.q.shape))
+    outcome = doctor(tmp_path, log)
+    untested = {item["code"] for item in outcome.json["not_tested"]}
+    assert untested >= {"RRID-S13", "RRID-S14", "RRID-S15", "RRID-T06", "RRID-D08"}
+    assert untested.isdisjoint(check["code"] for check in outcome.json["checks"])
+    assert all(item["where"] and item["reason"] for item in outcome.json["not_tested"])
+    assert "Not tested, and why" in [section.title for section in outcome.report.sections]
+    assert "could not be made" in outcome.report.verdict
+
+
+def test_a_channel_used_twice_is_seen(tmp_path: Path) -> None:
+    """S13: torque 1 in the place of torque 2, sample for sample, whatever the model would say of it."""
+    log = good_log()
+    outcome = doctor(tmp_path, with_signal(log, tau=log.tau[:, [0, 0, 2]]), check=True)
+    (twice,) = [c for c in outcome.result.checks if "sample for sample" in c.message]
+    assert (twice.code, twice.gate) == ("RRID-S13", True)
+    assert "tau of joint 1 and tau of joint 2" in twice.message
+    assert not [c for c in outcome.result.checks if c.code == "RRID-S13" and c.level == "ok"]
+    assert outcome.exit_code == 1
+
+
+def test_the_verdict_and_the_first_row_agree(tmp_path: Path) -> None:
+    """Columns in the wrong place come before what follows from them."""
+    outcome = doctor(tmp_path, MAKE["S13 tau"](make_log(faster(3.0))))
+    table = outcome.report.sections[0].tables[0]
+    assert str(table.rows[0][1]) in outcome.report.verdict
+
+
+def test_a_log_that_cannot_be_opened_has_no_empty_tables(tmp_path: Path) -> None:
+    write_log(tmp_path / "cut.h5", good_log())
+    (tmp_path / "cut.h5").write_bytes((tmp_path / "cut.h5").read_bytes()[:5000])
+    request = Request((tmp_path / "cut.h5",), out=tmp_path / "out", no_report=True)
+    outcome = run_stage(inspect.STAGE, request, inspect.Settings())
+    assert all(table.rows for section in outcome.report.sections for table in section.tables)
+    assert outcome.report.verdict.startswith("The log cannot be used.")

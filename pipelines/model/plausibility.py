@@ -11,10 +11,12 @@ explains it better, and what is wrong with it is for `diagnose` to say.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.doctor.checks_subject import Subject, spread
+from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
 from pipelines.model.clock_offset import clock_offset
 from pipelines.model.evidence import Evidence
 from pipelines.model.mix_ups import encoder_scale, position_columns, torque_columns
@@ -22,33 +24,63 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 
-__all__ = ["excitation_condition", "plausibility"]
+__all__ = ["excitation_condition", "plausibility", "plausibility_findings"]
 
 _DOUBLED = 3.0  # 2² - 1: growth of the squared residual when the residual doubles
 _SURE = 5.0  # standard deviations
 _RATIO = 2.5  # a load of a quarter of the arm's mass doubles a joint's inertia at most
 _RATIO_RESIDUAL = 0.25
+_EXPLAINED, _UNEXPLAINED, _APART = 0.1, 0.3, 5.0  # relative residuals; a saturated or touched arm is not so clear a case
+_TIMED = 1.0  # samples; a wider bound cannot tell an offset of one sample
 _CONDITION = 1e4  # of unit columns: what 0.01 % of noise in the motion makes of a parameter
 
 
 def plausibility(subject: Subject) -> tuple[Check, ...]:
     """S13, S14, S15, T06 and D09 of one log; nothing where it moves too little or too short to tell."""
+    return tuple(found for found in plausibility_findings(subject) if isinstance(found, Check))
+
+
+def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
+    """The same, and which of these questions the log leaves open, and why."""
     log = subject.log
-    if not subject.sampled or log.experiment not in ("excitation", "free", "writing") or not subject.good.time.known:
+    if not subject.sampled or not subject.good.time.known:
         return ()
-    if not subject.good.runs or (spread(subject.good.log.tau) == 0).any() or (subject.travel == 0).any():
-        return ()
+    if log.experiment not in ("excitation", "free", "writing"):
+        return _open(subject, f"a '{log.experiment}' log does not move the whole arm")
+    if not subject.good.runs:
+        return _open(subject, "no stretch of even samples is long enough")
+    if (spread(subject.good.log.tau) == 0).any() or (subject.travel == 0).any():
+        return _open(subject, "a joint's position or torque never changes")
     motion = sample_motion(subject.good)
     body = rigid_body(log.robot)
     if motion is None or len(motion.t) < 4 * (len(body.parameters) + 4):
-        return ()
+        return _open(subject, f"too short for the {len(body.parameters) + 4} numbers that explain a joint's torque")
     evidence = Evidence(subject, body, motion)
     swapped = torque_columns(evidence) or position_columns(evidence) or encoder_scale(evidence)
     if swapped:
         return tuple(swapped)  # nothing else can be said of columns that are in the wrong place
-    words = ", ".join(f"{v:.2g}" for v in evidence.residual)
-    found = subject.ok("S13", f"each joint's torque fits its own motion best, relative residual {words}")
-    return (*found, *_signs(evidence), *_ratios(evidence), *_clock(evidence), *_excited(evidence))
+    return (*_explained(evidence), *_signs(evidence), *_ratios(evidence), *_clock(evidence), *_excited(evidence))
+
+
+def _open(subject: Subject, reason: str) -> tuple[NotTested, ...]:
+    return tuple(found for code in ("S13", "S14", "S15", "T06") for found in subject.cannot_tell(code, reason))
+
+
+def _explained(e: Evidence) -> list[Check]:
+    """S13: a joint whose torque nothing explains, beside others whose torque is, has another channel's torque or none."""
+    words = ", ".join(f"{v:.2g}" for v in e.residual)
+    lost = np.flatnonzero(e.residual > _UNEXPLAINED)
+    rest = np.delete(e.residual, lost)
+    clear = lost.size and rest.size and rest.max() < _EXPLAINED and e.residual[lost].min() > _APART * rest.max()
+    if not clear:
+        return e.subject.ok("S13", f"each joint's torque fits its own motion best, relative residual {words}")
+    others = ", ".join(f"{v:.2g}" for v in rest)
+    return [e.subject.say("S13", "warn",
+                          f"joint {j + 1}'s torque is not explained by its motion: relative residual {e.residual[j]:.2g}, "
+                          f"others {others}",
+                          signal="tau", joint=j,
+                          remedy="look whether this column is the torque of this joint, and which joint it repeats")
+            for j in lost.tolist()]
 
 
 def _signs(e: Evidence) -> list[Check]:
@@ -86,11 +118,11 @@ def _negative(e: Evidence, joint: int) -> bool:
     return (sigmas[0] < decisive and sigmas[1] < _SURE) or (sigmas[1] < decisive and sigmas[0] < -_SURE)
 
 
-def _ratios(e: Evidence) -> list[Check]:
+def _ratios(e: Evidence) -> Sequence[Check | NotTested]:
     """S15: the torque is as large as the described links need, within what load and friction can make of it."""
     known = e.body.known_parameters()
     if known is None:
-        return []
+        return e.subject.cannot_tell("S15", "the robot's description has no masses and inertias to compare with", signal="tau")
     motion = e.motion
     expected = e.body.torque(motion.q, motion.dq, motion.ddq, known)
     found, seen = [], []
@@ -108,8 +140,10 @@ def _ratios(e: Evidence) -> list[Check]:
                                        signal="tau", joint=j, gate=True,
                                        remedy=f"look for a gear ratio or torque constant of about {slope:.3g} or "
                                               f"{1 / slope:.3g} that was applied twice or not at all"))
-    words = ", ".join(seen) or "not comparable"
-    return found or e.subject.ok("S15", f"torque over that of the described links: {words}", signal="tau")
+    if not seen:
+        return e.subject.cannot_tell("S15", "the described masses and inertias do not explain the torque of any joint, "
+                                     "so that a wrong gear ratio or unit would not show", signal="tau")
+    return found or e.subject.ok("S15", f"torque over that of the described links: {', '.join(seen)}", signal="tau")
 
 
 def _unexplained(columns: Array, tau: Array) -> float:
@@ -118,11 +152,11 @@ def _unexplained(columns: Array, tau: Array) -> float:
     return float(np.linalg.norm(rest) / np.linalg.norm(tau - tau.mean()))
 
 
-def _clock(e: Evidence) -> list[Check]:
+def _clock(e: Evidence) -> Sequence[Check | NotTested]:
     """T06: position and torque were stamped by the same clock."""
     found = clock_offset(e.rows, e.motion)
     if found is None:
-        return e.subject.ok("T06", "no torque follows its motion closely enough to time it", signal="tau")
+        return e.subject.cannot_tell("T06", "no torque follows its motion closely enough to time it", signal="tau")
     ms = 1e3 * e.motion.sample_time
     words = (f"torque lies {abs(found.samples):.2f} ± {found.bound:.2f} samples ({abs(found.samples) * ms:.3g} ms) "
              f"{'behind' if found.samples > 0 else 'ahead of'} the motion")
@@ -138,6 +172,8 @@ def _clock(e: Evidence) -> list[Check]:
                               signal="tau",
                               remedy="look for a delay between the recorders of q and tau; 'diagnose' tells a late "
                                      "encoder from a late drive")]
+    if found.bound > _TIMED:
+        return e.subject.cannot_tell("T06", f"{words}: an offset of one sample would not show", signal="tau")
     return e.subject.ok("T06", f"{words}, drift {drift}", signal="tau")
 
 

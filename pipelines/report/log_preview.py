@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.doctor.faults import Mask
+from pipelines.log.doctor.segments import long_blocks
 from pipelines.log.experiment import Array
 from pipelines.log.limits import GAP_TICKS
 from pipelines.report.report import Figure
@@ -16,7 +19,7 @@ from pipelines.report.sections import interval_figure, joint_signal_figure, time
 
 __all__ = ["Preview", "log_preview", "preview_figures"]
 
-_BUCKETS, _INTERVALS = 200, 4000
+_BUCKETS, _INTERVALS = 200, 100_000
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,8 @@ class Preview:
     tau: Array  # [N m] (points, joints)
     flagged_q: Array  # 1 where a sample of the bucket is missing or spiky
     flagged_tau: Array
-    intervals: Array  # [s]; quantiles where there are many
+    intervals: Array  # [s]; a hundred thousand quantiles where there are more
+    n_intervals: int  # how many there are
     spans: dict[str, tuple[tuple[float, float], ...]]  # [s] kind -> from, to
 
 
@@ -43,6 +47,7 @@ def log_preview(subject: Subject) -> Preview:
     lost = good.missing
     t = good.log.t
     intervals = np.diff(t)
+    n_intervals = intervals.size
     if intervals.size > _INTERVALS:
         intervals = np.quantile(intervals, np.linspace(0.0, 1.0, _INTERVALS))
     gaps = np.flatnonzero(np.diff(t) > GAP_TICKS * subject.log.sample_time)
@@ -50,9 +55,23 @@ def log_preview(subject: Subject) -> Preview:
              "missing": _spans(t, lost.any(axis=1)), "glitch": _spans(t, good.spikes.any(axis=1)),
              "saturated": _spans(t, good.saturated.any(axis=1)), "after the stop": _spans(t, np.arange(t.size) >= good.end)}
     bounded = [np.where(lost, np.nan, values) for values in recorded]
+    flags = lost | good.position_spikes, lost | good.torque_spikes | good.saturated
+    # no bucket holds samples from both sides of a gap, or of a block without measurement: no curve crosses one
+    blocks = long_blocks(np.asarray(lost.any(axis=1)))
+    cuts = sorted({*(gaps + 1).tolist(), *(edge for block in blocks for edge in block)} - {0, t.size})
+    pieces = [slice(a, b) for a, b in pairwise((0, *cuts[:_BUCKETS], t.size))]
+    broken = [bool(p.start and t[p.start] - t[p.start - 1] > GAP_TICKS * subject.log.sample_time) for p in pieces]
+    times = [np.concatenate([[0.5 * (t[p.start] + t[p.start - 1])] * int(gap), _bucket_times(t[p], size)])
+             for p, gap in zip(pieces, broken, strict=True)]
+
+    def joined(part: Callable[[Any, int], Array], values: Any, between: float) -> Array:
+        blank = np.full((1, values.shape[1]), between)
+        return np.concatenate([np.concatenate([blank[:int(gap)], part(values[p], size)])
+                               for p, gap in zip(pieces, broken, strict=True)])
+
     return Preview(subject.log.name, subject.log.sample_time, (subject.unit("q", 0), subject.unit("tau", 0)),
-                   _bucket_times(t, size), _envelope(bounded[0], size), _envelope(bounded[1], size),
-                   _any(lost | good.position_spikes, size), _any(lost | good.torque_spikes | good.saturated, size), intervals,
+                   np.concatenate(times), joined(_envelope, bounded[0], np.nan), joined(_envelope, bounded[1], np.nan),
+                   joined(_any, flags[0], 0.0), joined(_any, flags[1], 0.0), intervals, n_intervals,
                    {kind: found for kind, found in spans.items() if found})
 
 
@@ -94,8 +113,10 @@ def preview_figures(preview: Preview, uneven: bool) -> tuple[Figure, ...]:
                             flagged=preview.flagged_tau > 0, flag_name="missing, glitch or saturated")]
     if uneven:
         clock = np.concatenate([[0.0], np.cumsum(preview.intervals)])
-        figures.append(interval_figure(f"intervals-{preview.name}",
-                                       "How evenly the log was sampled; one bar would be perfect.", clock, preview.sample_time))
+        which = "" if preview.n_intervals == preview.intervals.size else (
+            f" Drawn are {preview.intervals.size} of its {preview.n_intervals} intervals, evenly chosen by length.")
+        caption = f"How evenly the log was sampled; one bar would be perfect.{which}"
+        figures.append(interval_figure(f"intervals-{preview.name}", caption, clock, preview.sample_time))
     if preview.spans:
         figures.append(timeline_figure(f"timeline-{preview.name}", "Where samples are missing or left out.",
                                        (float(preview.t[0]), float(preview.t[-1])),

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.doctor.checks import Subject
+from pipelines.log.doctor.checks import NotTested, Subject
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.robot import LinkParameters
 from pipelines.model.clock_offset import clock_offset
 from pipelines.model.evidence import Evidence
-from pipelines.model.plausibility import excitation_condition, plausibility
+from pipelines.model.plausibility import excitation_condition, plausibility, plausibility_findings
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import quick_residual, relative_residual, row_fits, sample_motion
 from tests.faulty import drifting, healthy_without_reference
@@ -184,3 +184,30 @@ def test_quick_residuals_are_the_residuals() -> None:
 def test_the_fit_of_the_good_log_is_close() -> None:
     """With the right columns 1 % of the torque at most is left: the smoothing costs little."""
     assert (evidence(good_log()).residual < 0.01).all()
+
+
+def test_a_torque_that_nothing_explains_is_not_in_order() -> None:
+    """The second column is noise of the torque's size; the others fit within 1 %."""
+    log = good_log()
+    tau = log.tau.copy()
+    tau[:, 1] = np.convolve(np.random.default_rng(0).standard_normal(len(tau)), np.ones(40) / 6.0, mode="same") * tau[:, 1].std()
+    found = [c for c in plausibility(Subject(with_signal(log, tau=tau))) if c.code == "RRID-S13"]
+    assert [c.level for c in found] == ["warn"]
+    assert "joint 2's torque is not explained by its motion" in found[0].message
+
+
+def test_links_that_explain_nothing_judge_nothing() -> None:
+    """S15: torques a thirtieth of another arm's are not comparable, which is not the same as in order."""
+    log = good_log()
+    rng = np.random.default_rng(0)
+    tau = np.stack([np.convolve(rng.standard_normal(len(log.t)), np.ones(60) / 8.0, mode="same") for _ in range(3)], axis=-1)
+    found = plausibility_findings(Subject(with_signal(log, tau=tau)))
+    assert [type(c) for c in found if c.code in ("RRID-S15", "RRID-T06")] == [NotTested, NotTested]
+
+
+def test_a_clock_that_cannot_be_read_to_a_sample_is_not_passed() -> None:
+    """T06: cogging hides the offset; its bound is more than a sample."""
+    log = make_log(fourier(np.random.default_rng(0)), torque=CAUSES["cogging"], seed=0)
+    (found,) = [c for c in plausibility_findings(Subject(log)) if c.code == "RRID-T06"]
+    assert isinstance(found, NotTested)
+    assert "would not show" in found.reason
