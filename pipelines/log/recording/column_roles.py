@@ -37,11 +37,18 @@ def role_of(column: str) -> str | None:
     return next((role for role, pattern in _NAMES if re.fullmatch(pattern, word)), None)
 
 
+def _role_by_unit(unit: str) -> str | None:
+    """What a column whose name says nothing holds, by the unit in its header: "M1 [Nm]" is a torque."""
+    known = UNITS.get(canonical_unit(unit))
+    roles = {"time": "t", "position": "q", "velocity": "dq", "torque": "tau", "current": "current"}
+    return roles.get(known.quantity) if known is not None else None
+
+
 def roles_of(table: RawTable, path: Path) -> dict[str, tuple[str, ...]]:
     """Which columns hold what, by their names; a column of time also by rising evenly. The file's name settles "Joint_1"."""
     found: dict[str, list[str]] = {}
     for name in table.columns:
-        if (role := role_of(name)) is not None:
+        if (role := role_of(name) or _role_by_unit(table.units.get(name, ""))) is not None:
             found.setdefault(role, []).append(name)
     if "t" not in found:
         first = next(iter(table.columns))

@@ -132,7 +132,9 @@ class _Drafting:
     def _held(self) -> str:
         """`torque = …`: by the name of its columns, else by whether it is held over samples."""
         name = next((c for c in self.torque if re.search(r"cmd|command|setpoint|soll|desired|target", c.lower())), None)
-        if self.current or not self.torque:
+        if not self.torque:
+            guess = Guess("measured", "unsure", 'no column of torque was found; "held-command" where the drive was commanded')
+        elif self.current:
             guess = Guess("measured", "likely", "a current is sampled like the position")
         elif name is not None:
             guess = Guess("held-command", "likely", f"column '{clean(name, 40)}' is named a command")

@@ -12,7 +12,7 @@ from pipelines.log.files import open_log
 from pipelines.log.recording.evidence import rollover
 from pipelines.log.recording.guess import guess_recipe
 from pipelines.log.recording.recipe_reader import parse_recipe
-from tests.log.recording.good import good, run, text, write
+from tests.log.recording.good import Array, good, run, text, write
 
 
 def drafted(folder: Path, content: str, name: str = "run.csv") -> str:
@@ -43,7 +43,11 @@ def test_units_in_a_header_are_used_and_sure(tmp_path: Path) -> None:
     """"[Nm]" is a unit as good as "[s]" and "[rad]"; Winkel and Drehmoment are an angle and a torque."""
     columns = good()
     named = {"Zeit [s]": columns["t"]} | {f"Winkel {j} [rad]": columns[f"q_{j}"] for j in (1, 2, 3)}
-    named |= {f"Drehmoment {j} [Nm]": columns[f"tau_{j}"] for j in (1, 2, 3)}
+    for word in ("Drehmoment ", "M"):  # the second is known by its unit alone
+        _draft_with_header_units(tmp_path, named | {f"{word}{j} [Nm]": columns[f"tau_{j}"] for j in (1, 2, 3)})
+
+
+def _draft_with_header_units(tmp_path: Path, named: dict[str, Array]) -> None:
     draft = guess_recipe(write(tmp_path, text(named)))
     assert draft.blanks == ("robot.use",)
     assert 'unit = "N m" }' in draft.text
