@@ -42,6 +42,6 @@ def test_no_parameter_is_biased(deviations: tuple[list[str], Array]) -> None:
 
 
 def test_each_standard_deviation_is_right(deviations: tuple[list[str], Array]) -> None:
-    """The scatter over 100 experiments is the predicted one, parameter by parameter: 5 of the 7 % that chance leaves."""
+    """The scatter over 100 experiments is the predicted one, parameter by parameter; chance alone leaves 7 %."""
     _, z = deviations
     assert np.all(np.abs(z.std(axis=0) - 1.0) < 0.3)
