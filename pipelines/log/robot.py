@@ -26,6 +26,10 @@ _ROBOT_KEYS = ("name", "gravity", "kinematics", "joint", "drive")
 _KINEMATICS_KEYS = ("convention", "urdf", "urdf_text", "tip_link", "tool")
 _JOINT_KEYS = ("name", "type", "a", "alpha", "d", "offset", "position", "velocity", "acceleration", "torque",
                "encoder_resolution", "link")
+_GEOMETRY = ("a", "alpha", "d", "offset")
+_LEAST = 'write at least: [[joint]] name = "elbow", type = "revolute", a = 0.4, alpha = 0.0, d = 0.0, offset = 0.0, a line each'
+_LEAST_URDF = 'write at least: [[joint]] name = "elbow", type = "revolute", a line each'
+_LONGEST = 100.0  # [m] no arm has such a link
 _LINK_KEYS = ("mass", "com", "inertia")
 _DRIVE_KEYS = ("transmission", "torque_constant")
 _CONVENTIONS = ("dh", "mdh", "urdf")
@@ -194,9 +198,7 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
 
 def _joint(read: _Reader, convention: str) -> Joint:
     read.only(_JOINT_KEYS)
-    geometric = {} if convention == "urdf" else {key: read.number(key) for key in ("a", "alpha", "d", "offset")}
-    if convention == "urdf" and "offset" in read.table:
-        geometric = {"offset": read.number("offset")}
+    geometric = _geometric(read, convention)
     low, high = read.numbers("position", 2, infinite=True) if "position" in read.table else (-math.inf, math.inf)
     if low >= high:
         read.wrong("position", f"its lower end {low} is not below its upper end {high}")
@@ -209,6 +211,22 @@ def _joint(read: _Reader, convention: str) -> Joint:
     link = _link(_Reader(read.table["link"], f"{read.path}.link", read.fail, read.where)) if "link" in read.table else None
     return Joint(read.text("name"), read.text("type", among=("revolute", "prismatic")), position=(low, high),
                  encoder_resolution=resolution, link=link, **geometric, **limits)
+
+
+def _geometric(read: _Reader, convention: str) -> dict[str, float]:
+    """The numbers that place the joint; what is missing is named at once, and what cannot be in rad or m."""
+    wanted = () if convention == "urdf" else _GEOMETRY
+    missing = [key for key in ("name", "type", *wanted) if key not in read.table]
+    if missing:
+        read.wrong(read.path, f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing",
+                   remedy=_LEAST if wanted else _LEAST_URDF)
+    found = {key: read.number(key) for key in _GEOMETRY if key in wanted or (key == "offset" and key in read.table)}
+    if abs(found.get("alpha", 0.0)) > 2 * math.pi:
+        read.wrong("alpha", f"is {found['alpha']:g} rad: looks like degrees", remedy="write it in rad")
+    for key in ("a", "d"):
+        if abs(found.get(key, 0.0)) > _LONGEST:
+            read.wrong(key, f"is {found[key]:g} m: looks like mm", remedy="write it in m")
+    return found
 
 
 def _link(read: _Reader) -> LinkParameters:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid import chain as serial
-from pipelines.model.rigid.body import BaseParameter, TorqueParts
+from pipelines.model.rigid.body import BaseParameter, TorqueParts, refuse_other_length, refuse_other_shapes
 from pipelines.model.rigid.geometry import SerialChain, serial_chain
 from pipelines.model.rigid.kinematics import tip_position
 
@@ -135,11 +135,13 @@ class BaseArm:
 
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Y (samples, joints, parameters), stored with samples fastest."""
+        self._check(q=q, dq=dq, ddq=ddq)
         return serial.regressor(self.chain, q, dq, ddq, self.base.chosen)
 
     def regressor_blocks(self, q: Array, dq: Array, ddq: Array,
                          block: int = serial.BLOCK) -> Iterator[tuple[slice, Array]]:
         """(which samples, Y (joints, parameters, block)); the array is written anew for every block."""
+        self._check(q=q, dq=dq, ddq=ddq)
         return serial.regressor_blocks(self.chain, q, dq, ddq, self.base.chosen, block)
 
     def standard(self, p: Array) -> Array:
@@ -150,10 +152,12 @@ class BaseArm:
 
     def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
         """τ = Y p (samples, joints) [N m], by the recursion, without forming Y."""
+        self._check(p, q=q, dq=dq, ddq=ddq)
         return serial.inverse_dynamics(self.chain, q, dq, ddq, self.standard(p))
 
     def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
         """Inertial, Coriolis and gravity torque."""
+        self._check(p, q=q, dq=dq, ddq=ddq)
         phi, rest, weightless = self.standard(p), np.zeros_like(q), np.zeros(3)
         return TorqueParts(inertia=serial.inverse_dynamics(self.chain, q, rest, ddq, phi, weightless),
                            coriolis=serial.inverse_dynamics(self.chain, q, dq, rest, phi, weightless),
@@ -161,11 +165,18 @@ class BaseArm:
 
     def mass_matrix(self, q: Array, p: Array) -> Array:
         """D(q) (samples, joints, joints) [kg m^2]."""
+        self._check(p, q=q)
         return serial.mass_matrix(self.chain, q, self.standard(p))
 
     def tip(self, q: Array) -> Array:
         """Tip (samples, 3) [m] in the base frame."""
+        self._check(q=q)
         return tip_position(self.chain, q)
+
+    def _check(self, p: Array | None = None, **states: Array) -> None:
+        refuse_other_shapes(self.chain.n_joints, **states)
+        if p is not None:
+            refuse_other_length(len(self.parameters), p)
 
     def known_parameters(self) -> Array | None:
         """p (parameters,) of the links the description knows; None where it does not know them all."""

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pipelines.log.robot import RobotDescription
 
-__all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts"]
+__all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "refuse_other_length", "refuse_other_shapes"]
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +41,35 @@ class TorqueParts:
     inertia: Array  # D(q) ddq
     coriolis: Array  # c(q, dq)
     gravity: Array  # h(q)
+
+
+def refuse_other_shapes(columns: int, **states: Array) -> None:
+    """Refuse arrays that are not (samples, columns), all with as many samples; a 1-D q would else give nonsense.
+
+    Args:
+        states: the arrays by their names.
+
+    Raises:
+        ValueError: says which array, the shape it has and the shape it must have.
+    """
+    samples = None
+    for name, values in states.items():
+        shape = np.shape(values)
+        if len(shape) != 2 or shape[1] != columns:
+            raise ValueError(f"{name} has the shape {shape}, wanted is (samples, {columns})")
+        samples = shape[0] if samples is None else samples
+        if shape[0] != samples:
+            raise ValueError(f"{name} has the shape {shape}, wanted is {(samples, columns)}, as before it")
+
+
+def refuse_other_length(parameters: int, p: Array, samples: int | None = None) -> None:
+    """Refuse p that is not (parameters,), nor (samples, parameters) where every sample may have its own arm.
+
+    Raises:
+        ValueError: says the shape it has and the shape it must have.
+    """
+    if np.shape(p) not in ((parameters,), (samples, parameters)):
+        raise ValueError(f"p has the shape {np.shape(p)}, wanted is ({parameters},)")
 
 
 class RigidBody(Protocol):

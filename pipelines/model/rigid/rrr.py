@@ -14,7 +14,7 @@ import numpy as np
 
 from pipelines.log.robot import LinkParameters, RobotDescription
 from pipelines.model.rigid import rrr_kinematics
-from pipelines.model.rigid.body import Array, BaseParameter, TorqueParts
+from pipelines.model.rigid.body import Array, BaseParameter, TorqueParts, refuse_other_length, refuse_other_shapes
 
 __all__ = ["ACTING", "RRR", "fits"]
 
@@ -69,9 +69,11 @@ class RRR:
         self._offset = np.array(self.geometry.offset)
 
     def tip(self, q: Array) -> Array:
+        refuse_other_shapes(3, q=q)
         return rrr_kinematics.tip(self.geometry, q)
 
     def orientation(self, q: Array) -> Array:
+        refuse_other_shapes(3, q=q)
         return rrr_kinematics.orientation(self.geometry, q)
 
     def inverse(self, tips: Array) -> rrr_kinematics.InverseKinematics:
@@ -79,6 +81,7 @@ class RRR:
 
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
         """R (samples, 3, 15), stored with samples fastest. Kostić et al. 2004, eq. (A5), with r34 as in erratum E1."""
+        refuse_other_shapes(3, q=q, dq=dq, ddq=ddq)
         shape = np.shape(q)[:-1]
         R = np.zeros((3, 15, *shape))
         angles, v, u = (np.moveaxis(np.asarray(x, dtype=np.float64), -1, 0) for x in (q, dq, ddq))
@@ -160,6 +163,8 @@ class RRR:
 
     def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
         """D(q) ddq, c(q, dq) and h(q): the terms of (A5) gathered by what they multiply."""
+        refuse_other_shapes(3, q=q, dq=dq, ddq=ddq)
+        refuse_other_length(15, p, len(q))
         trigonometry = self._trigonometry(q)
         D11, D12, D13, D22, D23, D33 = self._mass(trigonometry, p)
         u1, u2, u3 = np.moveaxis(ddq, -1, 0)
@@ -169,6 +174,8 @@ class RRR:
 
     def mass_matrix(self, q: Array, p: Array) -> Array:
         """D(q) (samples, 3, 3) [kg m^2]."""
+        refuse_other_shapes(3, q=q)
+        refuse_other_length(15, p, len(q))
         D11, D12, D13, D22, D23, D33 = np.broadcast_arrays(*self._mass(self._trigonometry(q), p))
         entries = np.stack([D11, D12, D13, D12, D22, D23, D13, D23, D33], axis=-1)
         return entries.reshape(*entries.shape[:-1], 3, 3)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.robot import RobotDescription
-from pipelines.model.rigid.body import Array
+from pipelines.model.rigid.body import Array, refuse_other_shapes
 
 __all__ = ["BRANCHES", "Geometry", "InverseKinematics", "Reach", "continuous_branch", "inverse", "orientation",
            "rrr_geometry", "tip"]
@@ -51,6 +51,7 @@ class Reach(IntEnum):
     INSIDE_CYLINDER = 4
     TOO_NEAR = 5
     TOO_FAR = 6
+    NOT_A_NUMBER = 7
 
     @property
     def words(self) -> str:
@@ -65,6 +66,7 @@ _WORDS = {
     Reach.INSIDE_CYLINDER: "unreachable: inside the cylinder of radius d2 + d3 about the first axis",
     Reach.TOO_NEAR: "unreachable: nearer to the shoulder than the folded arm",
     Reach.TOO_FAR: "unreachable: farther from the shoulder than the stretched arm",
+    Reach.NOT_A_NUMBER: "unreachable: a coordinate of the tip is not a number",
 }
 
 
@@ -126,6 +128,7 @@ def inverse(geometry: Geometry, tips: Array) -> InverseKinematics:
     Args:
         tips: (samples, 3) [m] in the base frame.
     """
+    refuse_other_shapes(3, tips=tips)
     a2, a3, d = geometry.a2, geometry.a3, geometry.d
     x, y, z = np.moveaxis(np.asarray(tips, dtype=np.float64), -1, 0)
     shoulder, elbow = (np.array(signs, dtype=np.float64)[:, None] for signs in zip(*BRANCHES, strict=True))
@@ -144,7 +147,7 @@ def inverse(geometry: Geometry, tips: Array) -> InverseKinematics:
 
 
 def _reach(geometry: Geometry, rho: Array, V: Array) -> npt.NDArray[np.int8]:
-    """Reachable iff rho >= |d| and |a3 - a2| <= sqrt(rho^2 - d^2 + V^2) <= a2 + a3 (E5); NaN never."""
+    """Reachable iff rho >= |d| and |a3 - a2| <= sqrt(rho^2 - d^2 + V^2) <= a2 + a3 (E5)."""
     beyond = rho - abs(geometry.d)  # [m] beyond the cylinder
     r = np.sqrt(np.maximum(beyond, 0.0) * (rho + abs(geometry.d)) + V**2)
     folded, stretched = r - abs(geometry.a3 - geometry.a2), geometry.a2 + geometry.a3 - r
@@ -153,6 +156,7 @@ def _reach(geometry: Geometry, rho: Array, V: Array) -> npt.NDArray[np.int8]:
     status[folded < -_CLIP] = Reach.TOO_NEAR
     status[~(stretched >= -_CLIP)] = Reach.TOO_FAR
     status[beyond < -_CLIP] = Reach.INSIDE_CYLINDER
+    status[np.isnan(rho) | np.isnan(V)] = Reach.NOT_A_NUMBER
     return status
 
 

@@ -93,6 +93,7 @@ def test_just_outside_is_rounding_and_farther_is_not(geometry: Geometry) -> None
     assert answer.reachable.tolist() == [True, False, False]
     assert np.isnan(answer.q[:, 1:]).all()
     assert "farther" in answer.words(1)
+    assert "not a number" in answer.words(2)
 
 
 def test_every_status_has_words() -> None:
