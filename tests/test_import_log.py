@@ -281,3 +281,13 @@ def test_s07_motor_positions_are_named_with_the_ratio_they_need(folder: Path) ->
         run(folder, recipe)
     assert 'unit = "deg"' in problem.value.remedy
     assert "transmission = the gear ratios of at least 12" in problem.value.remedy
+
+
+def test_s07_radians_of_motors_declared_as_degrees_are_noticed(folder: Path) -> None:
+    """32 quarter turns in radians, called degrees: a log that nothing else contradicts, with torques 30 times too small."""
+    columns = good()
+    write(folder, text(columns | {f"q_{j}": 16.0 * np.pi + 60.0 * columns[f"q_{j}"] for j in (1, 2, 3)}))
+    outcome = run(folder, RECIPE.replace('"rad"', '"deg"'))
+    (found,) = [c for c in outcome.checks if c.code == "RRID-S07"]
+    assert "start at 32, 32, 32 times pi/2" in found.message
+    assert outcome.report.tone == "attention"
