@@ -134,7 +134,8 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, str], robot:
         signals[name] = Signal(values + offset, schema.unit_of(name, law), schema.SIGNALS[name][1])
     if not trust_units and "q" in signals:
         _refuse_degrees(part, signals["q"].values, units["q"], robot)
-    if units.get("q") in ("deg", "°") and len(turns := quarter_turns(part.signals["q"])) > 1:
+    turns = quarter_turns(part.signals["q"]) if "q" in part.signals and units["q"] in ("deg", "°") else {}
+    if len(turns) > 1:
         starts = ", ".join(map(str, turns.values()))
         checks.append(Check.of("S07", "warn", f"declared in degrees, but the numbers start at {starts} times "
                                "pi/2, to the last digit: radians of the motor side?", where=f"{part.where}, signal q",
