@@ -221,3 +221,10 @@ def test_a_part_of_a_log_is_the_part(tmp_path: Path, ending: str) -> None:
     part = open_log(tmp_path / f"a{ending}", only=("q_ref",)).log
     assert list(part.signals) == ["t", "q", "tau", "q_ref"]
     assert all(part.signals[name] == log.signals[name] for name in part.signals)
+
+
+def test_a_path_may_be_a_text(tmp_path: Path) -> None:
+    """From Python, as anywhere: open_log("x.h5") and write_log("x.h5", log)."""
+    for name in ("a.h5", "a.parquet"):
+        write_log(str(tmp_path / name), small_log())
+        assert open_log(str(tmp_path / name)).log == small_log()
