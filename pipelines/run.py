@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import Check, InputRejected, NothingMatched, RrridError
+from pipelines.errors import Check, InputRejected, Level, NothingMatched, RrridError
 from pipelines.log.files import Opened
 from pipelines.log.results import NOT_STORED
 from pipelines.report.report import Report, Section, Table, Tone
@@ -92,7 +92,8 @@ def _without(stage: Stage[Any, Any], problem: RrridError) -> Step:
     """A stage that has no result: nothing to read (passed over), or an input it cannot use."""
     passed_over = problem.exit_code == 5
     words = f"{'Passed over' if passed_over else 'Not done'}: {problem.message}. {problem.remedy[:1].upper()}{problem.remedy[1:]}."
-    check = Check(problem.code, "warn" if passed_over else "reject", problem.message, problem.where, problem.remedy, not passed_over)
+    level: Level = "warn" if passed_over else "reject"
+    check = Check(problem.code, level, problem.message, problem.where, problem.remedy, not passed_over)
     return Step(stage.name, problem.exit_code, None, Report(stage.title, words, "neutral" if passed_over else "bad"), (check,))
 
 
