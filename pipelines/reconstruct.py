@@ -21,7 +21,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.files import Opened, write_log
 from pipelines.log.robot import RobotDescription, format_robot
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.motion_result import LogResult, ObserverResult, Place, assess
+from pipelines.model.motion_result import ALARM, LogResult, ObserverResult, Place, assess, coloured, straying
 from pipelines.report.motion_report import motion_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug
@@ -87,7 +87,33 @@ def _one(opened: Opened, robot: RobotDescription | None, settings: Settings, fil
         raise reject.as_error()
     found = reconstruct(bare, settings, subject.good)
     derived = derive(bare, "reconstruct", settings.as_settings(), found.signals())
-    return assess(bare, found, settings, Place(opened.path.name, file), derived, draw), checks
+    result = assess(bare, found, settings, Place(opened.path.name, file), derived, draw)
+    return result, [*checks, *_doubts(result, settings, opened.path)]
+
+
+def _doubts(log: LogResult, settings: Settings, path: Path) -> list[Check]:
+    """A motion far from what was measured; deviations that the settings asked for make meaningless."""
+    found = []
+    if far := straying(log):
+        worst = max(float(log.reconstruction_error_max[j - 1]) for j in far)
+        found.append(Check.of("D12", "warn", f"the reconstructed position of joint {_listed(far)} is up to {worst:.2g} rad from "
+                              f"the measured one, more than {ALARM:g} rad", where=path, gate=True,
+                              remedy="allow more jerk or bandwidth, or look for jumps and slips of the encoder"))
+    forced = settings.jerk_std is not None or settings.bandwidth is not None
+    if forced and (doubtful := coloured(log)) and not np.isnan(log.speed_std).all():
+        found.append(Check.of("C02", "warn", f"with the settings asked for the innovations of joint {_listed(doubtful)} are "
+                              "strongly coloured; the stated standard deviations hold only where they are white", where=path,
+                              remedy="leave --jerk-std and --bandwidth to be found from the data"))
+    return found
+
+
+def _listed(joints: tuple[int, ...]) -> str:
+    return ", ".join(map(str, joints))
+
+
+def exit_code(result: Result, check: bool) -> int:
+    """With --check 1 where a reconstructed position is further from the measured one than the paper's ever is."""
+    return int(check and any(straying(log) for log in result.logs))
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
@@ -110,4 +136,4 @@ def _onward(result: Result, inputs: Inputs) -> Inputs:
 
 
 STAGE = Stage("reconstruct", "Reconstruct motion", Settings, compute, report, read_logs, write,
-              checks=lambda result: result.checks, onward=_onward)
+              exit_code=exit_code, checks=lambda result: result.checks, onward=_onward)

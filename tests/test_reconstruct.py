@@ -162,6 +162,52 @@ def test_innovations_are_judged(tmp_path: Path) -> None:
     assert np.isnan(still.innovation_whiteness).all()
 
 
+def test_asked_for_deviations_that_mean_nothing_are_doubted(tmp_path: Path) -> None:
+    """Coloured innovations under a jerk level asked for: a warning, words in the report, and no good verdict."""
+    stiff = stage(tmp_path / "a", good_log(), settings=Settings(jerk_std=(0.5,)))
+    assert any(check.level == "warn" and "only where they are white" in check.message for check in stiff.result.checks)
+    assert any("holds only where the innovations are white" in text for section in stiff.report.sections for text in section.text)
+    assert stiff.report.tone == "attention"
+    tuned = stage(tmp_path / "b", good_log())
+    assert tuned.report.tone == "good"
+    assert not any("white" in check.message for check in tuned.result.checks)
+
+
+@pytest.mark.parametrize("method", ["central-differences", "zero-phase"])
+def test_a_method_without_deviations_is_not_called_good(method: str, tmp_path: Path) -> None:
+    """That central differences keep every sample says nothing of the speed they find."""
+    report = stage(tmp_path, good_log(), settings=Settings(method)).report
+    assert report.tone != "good"
+    assert "cannot say" in report.verdict
+    assert "within 0" not in report.verdict
+
+
+def test_far_from_the_encoder_is_an_alarm(tmp_path: Path) -> None:
+    """More than 5e-4 rad: attention, and exit 1 with --check; without it, or within it, 0; a slide is not judged by it."""
+    result = stage(tmp_path / "a", good_log()).result
+    assert reconstruct.exit_code(result, True) == 0
+    log = replace(result.logs[0], reconstruction_error_max=np.array([1e-5, 6e-4, 1e-5]))
+    far = replace(result, logs=(log,))
+    assert (reconstruct.exit_code(far, True), reconstruct.exit_code(far, False)) == (1, 0)
+    assert reconstruct.report(far).tone == "attention"
+    assert "joint 2 strays" in reconstruct.report(far).verdict
+    slide = replace(result, logs=(replace(log, units=("rad", "m", "rad")),))
+    assert reconstruct.exit_code(slide, True) == 0
+    assert reconstruct.report(slide).tone == "good"
+    assert "strays" not in reconstruct.report(slide).verdict
+    stiff = stage(tmp_path / "b", good_log(), settings=Settings(jerk_std=(0.01,)))
+    assert (stiff.result.reconstruction_error_max > 5e-4).any()
+    assert any(check.code == "RRID-D12" and check.gate for check in stiff.result.checks)
+
+
+def test_periods_are_compared_and_not_averaged(tmp_path: Path) -> None:
+    """The report claims no more than is done with them."""
+    report = stage(tmp_path, make_log(good_path(), duration=15.0, period=5.0)).report
+    text = " ".join(text for section in report.sections for text in section.text)
+    assert "3 periods were compared: their scatter is the noise floor" in text
+    assert "averaged" not in text
+
+
 def test_plans_have_no_motion(tmp_path: Path) -> None:
     """A planned trajectory beside logs is passed over and named; alone it is nothing to reconstruct."""
     log = good_log()
@@ -181,7 +227,7 @@ def test_report_shows_what_the_paper_shows(tmp_path: Path) -> None:
     page = (outcome.folder / "report.html").read_text(encoding="utf-8")
     assert "<script" not in page
     assert page.count("<svg") >= 5
-    assert "within" in outcome.report.verdict
+    assert "standard deviation" in outcome.report.verdict
 
 
 def test_a_short_log_and_an_order_of_two(tmp_path: Path) -> None:

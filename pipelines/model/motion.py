@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import InputRejected
+from pipelines.errors import InputRejected, UsageError
 from pipelines.log.derive import derived_by
 from pipelines.log.doctor.faults import Mask
 from pipelines.log.doctor.segments import Usable, long_blocks, usable
@@ -41,6 +41,7 @@ _END = 1024
 _LEAD = 2  # missing samples at the very start that are predicted from what comes after
 _BEYOND = 5.0  # usual deviations: no cap below it, however still a joint stands
 _CUTOFF_HZ = 100.0  # of the zero-phase filter where no bandwidth is asked for
+_FASTEST = 0.4  # of the rate, its cut-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +194,11 @@ def _near_ends(lost: Mask, reach: int) -> Mask:
 
 def _differences(seen: Measured, how: Reconstruction) -> Tracker:
     """Central differences, of the samples or of what a zero-phase low-pass leaves of them: textbook rivals without deviations."""
+    lowest, highest = 1.0 / (seen.longest.size * seen.step), _FASTEST / seen.step
+    if how.method == "zero-phase" and not all(lowest <= hz <= highest for hz in how.bandwidth or ()):
+        raise UsageError("C02", "a cut-off whose period is longer than the log, or near half the rate", where="--bandwidth",
+                         remedy=f"choose between {lowest:.2g} and {highest:.3g} Hz")
+
     def central(y: Array) -> tuple[Array, Array | None]:
         dq, ddq = np.full_like(y, np.nan), np.full_like(y, np.nan)
         dq[1:-1] = (y[2:] - y[:-2]) / (2.0 * seen.step)
@@ -204,7 +210,7 @@ def _differences(seen: Measured, how: Reconstruction) -> Tracker:
 
         whole = y if np.isfinite(y).all() else _completed(seen, y)
         cutoff = _CUTOFF_HZ if how.bandwidth is None else max(how.bandwidth)
-        low_pass = design_low_pass(min(cutoff, 0.4 / seen.step), 1.0 / seen.step)
+        low_pass = design_low_pass(min(cutoff, highest), 1.0 / seen.step)
         return central(zero_phase(whole, low_pass) if len(y) > low_pass.padding else whole)
 
     return zero_phase_central if how.method == "zero-phase" else central

@@ -26,7 +26,7 @@ _LONGEST = 131072  # samples that a spectrum or a test of whiteness looks at
 class NoiseFloor:
     """What differs from period to period: nothing that repeats, be it modelled or not, is in it. Each (joints,)."""
 
-    periods: int  # averaged
+    periods: int  # compared
     left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
     position: Array  # [rad] standard deviation of one sample
     torque: Array  # [N m]

@@ -16,7 +16,9 @@ from pipelines.model.tuned import tuned_observers
 from pipelines.signal.observer import Observer
 from pipelines.signal.tuning import smoother_bandwidth
 
-__all__ = ["LogResult", "ObserverResult", "Place", "Series", "SmootherResult", "assess"]
+__all__ = ["ALARM", "LogResult", "ObserverResult", "Place", "Series", "SmootherResult", "assess", "coloured", "straying"]
+
+ALARM = 5e-4  # [rad] between measured and reconstructed position: Kostić et al. 2004, Fig. 10(a), stays below it
 
 _BUCKETS = 400  # of an envelope
 _WHITE = 3.0  # standard deviations
@@ -111,6 +113,17 @@ def assess(log: ExperimentLog, found: Reconstructed, how: Reconstruction, place:
         np.nanmax(np.abs(error), axis=0), np.sqrt(np.nanmean(error**2, axis=0)),
         np.abs(found.motion.dq[inside]).max(axis=0), np.abs(found.motion.ddq[inside]).max(axis=0), *quality.typical_std(found),
         quality.noise_floor(log, seen), _series(seen, found, error) if draw else None, derived)
+
+
+def straying(log: LogResult) -> tuple[int, ...]:
+    """Revolute joints, counted from 1, whose reconstructed position is further than `ALARM` from a measured one."""
+    pairs = zip(log.units, log.reconstruction_error_max.tolist(), strict=True)
+    return tuple(j for j, (unit, error) in enumerate(pairs, 1) if unit == "rad" and error > ALARM)
+
+
+def coloured(log: LogResult) -> tuple[int, ...]:
+    """Joints, counted from 1, whose innovations are so coloured that no stated standard deviation can be relied on."""
+    return tuple(j for j, words in enumerate(log.innovation_verdict, 1) if words.startswith("coloured"))
 
 
 def _inside(seen: Measured) -> npt.NDArray[np.intp]:

@@ -10,9 +10,9 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.doctor.faults import quantum
 from pipelines.log.doctor.segments import Usable
 from pipelines.log.experiment import Array
-from pipelines.signal.chain import ORDERS
+from pipelines.signal.chain import ORDERS, stationary
 from pipelines.signal.grid import Grid, lay_on, settle_late
-from pipelines.signal.observer import Observer, design
+from pipelines.signal.observer import BLOCK, Observer, design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import sigma_for_bandwidth, tune_jerk, tune_smoother
 
@@ -21,6 +21,11 @@ __all__ = ["METHODS", "Observers", "Reconstruction", "encoder_resolution", "tune
 METHODS = ("smoother", "observer", "central-differences", "zero-phase")
 _FALLBACK_RESOLUTION = 1e-6  # [rad] where neither description nor samples show a step: far below any encoder
 _ROUNDS = 3  # of tuning a wandering clock: noise that lateness makes goes down by about 1/30 a round
+_FORGOTTEN = 7.0  # time constants after which a start is forgotten to about 1/1000
+_LATEST = 32768  # samples by which an observer must have forgotten its start, however long the log
+_NOTHING = 1e4  # tracking index from which nothing is filtered by far, the largest that tuning tries
+_FASTEST = 0.49  # of the rate, the bandwidth that is named as the highest; below half of it any is taken
+_ROUNDING = 0.1  # of a bound: what is printed of it is accepted
 _BRIDGE_HZ = 100.0  # of the observer that bridges missing samples before anything is tuned
 
 
@@ -78,26 +83,32 @@ class Observers:
 
 
 def tuned_observers(good: Usable, y: Array, grid: Grid, step: float, how: Reconstruction) -> Observers:
-    """The observers for `y` (samples, joints), tuned on the rows of `grid`; lateness of its clock taken off where that is real."""
+    """The observers for `y` (samples, joints), tuned on the rows of `grid`; lateness of its clock taken off where that is real.
+
+    Raises:
+        UsageError: C02, a jerk level or a bandwidth that settles later than the log ends, or filters nothing by far.
+    """
     rows, resolution = y[grid.first:grid.last], encoder_resolution(good)
-    found = _tuned(lay_on(rows, grid), step, resolution, how)
+    units = tuple("rad" if joint.revolute else "m" for joint in good.log.robot.joints)
+    found = _tuned(lay_on(rows, grid), step, resolution, how, units)
     late = grid.lateness(step)
     for _ in range(_ROUNDS if late.any() else 0):
         moved = settle_late(rows, grid, late, smooth(lay_on(rows, grid), found.smoothing).states)
-        other = _tuned(moved, step, resolution, how)
+        other = _tuned(moved, step, resolution, how, units)
         if other.smoothing.noise_variance.sum() > 0.9 * found.smoothing.noise_variance.sum():
             break
         found = other
     return found
 
 
-def _tuned(laid: Array, step: float, resolution: Array, how: Reconstruction) -> Observers:
+def _tuned(laid: Array, step: float, resolution: Array, how: Reconstruction, units: tuple[str, ...]) -> Observers:
     try:
         causal = tune_jerk(laid, step, resolution, how.order)
     except InputRejected:  # no stretch without a missing sample is long enough
         laid = _bridged(laid, step, resolution, how.order)
         causal = tune_jerk(laid, step, resolution, how.order)
     sigma, joints = causal.jerk_std, laid.shape[1]
+    _refuse_far(how, causal.noise_variance, step, len(laid), units)
     if how.jerk_std is not None:
         sigma = np.broadcast_to(np.array(how.jerk_std), joints)
     elif how.bandwidth is not None:
@@ -108,6 +119,31 @@ def _tuned(laid: Array, step: float, resolution: Array, how: Reconstruction) -> 
     both = tune_smoother(laid, step, resolution, how.order)
     # noise with a pattern passes for motion in cross-validation: never more jerk than looking ahead asks for
     return Observers(observer, design(step, np.minimum(both.jerk_std, sigma), both.noise_variance, how.order))
+
+
+def _refuse_far(how: Reconstruction, variance: Array, step: float, samples: int, units: tuple[str, ...]) -> None:
+    """C02 for a jerk level or bandwidth that no log of so many samples can be reconstructed with, and which ones can."""
+    asked, name = (how.jerk_std, "--jerk-std") if how.jerk_std is not None else (how.bandwidth, "--bandwidth")
+    if asked is None:
+        return
+    samples = min(max(samples, 2 * BLOCK), _LATEST)
+    bounds = np.multiply.outer(_tracking_bounds(how.order, samples), np.sqrt(variance) / step**how.order)  # (2, joints)
+    if how.bandwidth is not None:
+        bounds = np.minimum([design(step, sigma, variance, how.order).bandwidth_hz for sigma in bounds], _FASTEST / step)
+    for j, (value, low, high) in enumerate(zip(np.broadcast_to(np.array(asked), len(units)), *bounds, strict=True)):
+        unit, top = ("Hz", 0.5 / step) if how.bandwidth is not None else (f"{units[j]}/s^{how.order}", np.inf)
+        if not (1.0 - _ROUNDING) * low <= value <= (1.0 + _ROUNDING) * high or value >= top:
+            why = (f"settles later than the {samples * step:.3g} s there are" if value < low else
+                   "is half the rate or more" if how.bandwidth is not None else "filters nothing at all")
+            raise UsageError("C02", f"{value:g} {unit} for joint {j + 1}: that {why}", where=name,
+                             remedy=f"choose between {low:.3g} and {high:.3g} {unit}, or leave it to be found from the data")
+
+
+def _tracking_bounds(order: int, samples: int) -> Array:
+    """Lowest and highest Λ = σ T^n / √R whose observer forgets its start within `samples`, and still filters."""
+    index = np.geomspace(1e-16, _NOTHING, 401)
+    radius = np.abs(stationary(order, index).poles).max(axis=1)
+    return np.asarray(index[-np.log(radius) * samples >= _FORGOTTEN][[0, -1]])
 
 
 def _bridged(laid: Array, step: float, resolution: Array, order: int) -> Array:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.motion_result import LogResult, ObserverResult, Series
+from pipelines.model.motion_result import ALARM, LogResult, ObserverResult, Series, coloured, straying
 from pipelines.report.figures import Array, joint_axes, joint_size
 from pipelines.report.motion_figures import draw_banded, draw_bode, draw_density
-from pipelines.report.report import Figure, Report, Section, Table
+from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import joint_signal_figure
 from pipelines.report.style import format_number
 from pipelines.signal.observer import design
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["motion_report"]
 
-_PAPER = 5e-4  # [rad] what Kostić et al. 2004, Fig. 10(a), calls good enough
 _METHODS = {"smoother": "the Kalman smoother, which knows later samples too",
             "observer": "the Kalman observer, as a controller could",
             "central-differences": "central differences",
@@ -29,18 +28,57 @@ _METHODS = {"smoother": "the Kalman smoother, which knows later samples too",
 
 def motion_report(logs: Sequence[LogResult]) -> Report:
     """Verdict, key figures, one section a log."""
-    worst = max(logs, key=lambda log: float(log.reconstruction_error_max.max()))
-    error, joint = float(worst.reconstruction_error_max.max()), int(worst.reconstruction_error_max.argmax()) + 1
-    near = error <= _PAPER
+    far, doubtful = [log for log in logs if straying(log)], [log for log in logs if coloured(log)]
     which = "The motion of the log" if len(logs) == 1 else f"The motion of {len(logs)} logs"
-    unit = worst.units[joint - 1]
-    verdict = (f"{which} is reconstructed by {_METHODS[worst.method]}; it stays within {format_number(error, 2)} {unit} of what "
-               f"the encoders measured{'' if len(logs) == 1 else f' (worst: {worst.name}, joint {joint})'}, "
-               f"{'below' if near else 'above'} the {format_number(_PAPER)} rad that the paper calls good enough.")
+    said = (f"{which} is reconstructed by {_METHODS[logs[0].method]}", _known(logs), *_whiteness(logs, doubtful),
+            *_alarm(logs, far))
+    known = not all(np.isnan(log.speed_std).all() for log in logs)
+    tone: Tone = "attention" if far or doubtful else "good" if known else "neutral"
     sections = [_explanation(logs), *(_log_section(log, i) for i, log in enumerate(logs) if log.series is not None)]
     if more := [log.name for log in logs if log.series is None]:
         sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
-    return Report("Reconstructed motion", verdict, "good" if near else "attention", _key_figures(logs), tuple(sections))
+    return Report("Reconstructed motion", "; ".join(said) + ".", tone, _key_figures(logs), tuple(sections))
+
+
+def _known(logs: Sequence[LogResult]) -> str:
+    """How well speed and acceleration are known, worst joint of each unit."""
+    parts = []
+    for unit in dict.fromkeys(unit for log in logs for unit in log.units):
+        pairs = [(log.speed_std[j], log.acceleration_std[j]) for log in logs for j, own in enumerate(log.units) if own == unit]
+        speed, acceleration = (_largest(np.array(values)) for values in zip(*pairs, strict=True))
+        if speed is not None:
+            parts.append(f"speed to {format_number(speed, 2)} {unit}/s and acceleration to {format_number(acceleration, 2)} "
+                         f"{unit}/s^2")
+    if not parts:
+        return "how well speed and acceleration are known, this method cannot say"
+    return f"it knows {' and '.join(parts)} (standard deviation, worst joint)"
+
+
+def _whiteness(logs: Sequence[LogResult], doubtful: Sequence[LogResult]) -> tuple[str, ...]:
+    if np.isnan(np.concatenate([log.speed_std for log in logs])).all():
+        return ()  # nothing is stated that whiteness could support
+    if doubtful:
+        where = f"joint {_listed(coloured(doubtful[0]))}" + ("" if len(logs) == 1 else f" of {doubtful[0].name}")
+        more = f" and in {len(doubtful) - 1} more logs" if len(doubtful) > 1 else ""
+        return (f"that holds only where the innovations are white, and those of {where}{more} are coloured",)
+    words = {text.split(":")[0].split(",")[0] for log in logs for text in log.innovation_verdict}
+    if words == {"none"}:
+        return ("no joint moves, so nothing tells whether that holds",)
+    return (f"the innovations are {'nearly white' if 'nearly white' in words else 'white'}, so that holds",)
+
+
+def _alarm(logs: Sequence[LogResult], far: Sequence[LogResult]) -> tuple[str, ...]:
+    if not far:
+        return ()
+    worst = max(far, key=lambda log: max(log.reconstruction_error_max[j - 1] for j in straying(log)))
+    joint = max(straying(worst), key=lambda j: float(worst.reconstruction_error_max[j - 1]))
+    return (f"joint {joint}{'' if len(logs) == 1 else f' of {worst.name}'} strays "
+            f"{format_number(float(worst.reconstruction_error_max[joint - 1]), 2)} rad from what its encoder measured, more than "
+            f"the {format_number(ALARM)} rad that the paper calls good enough",)
+
+
+def _listed(joints: Sequence[int]) -> str:
+    return ", ".join(map(str, joints))
 
 
 def _key_figures(logs: Sequence[LogResult]) -> Table:
@@ -56,26 +94,32 @@ def _largest(values: Array) -> float | None:
 
 
 def _explanation(logs: Sequence[LogResult]) -> Section:
-    coloured = sum(any(words.startswith("coloured") for words in log.innovation_verdict) for log in logs)
+    doubtful = sum(bool(coloured(log)) for log in logs)
     text = ["The observer takes each joint for a chain of integrators that random jerk drives. The encoder's resolution and its "
             "samples say how noisy it is; the jerk is the one that predicts the next sample best, unless it was asked for. The "
             "paper's rule, the largest jerk of the reference, is a first guess and filters hardly at all."]
     if logs[0].smoother is not None:
         text.append("The smoother sees both sides of a sample and needs far less jerk. Near the ends of a log and over long gaps "
                     "it takes the observer's, because there it has to look ahead as well.")
-    if coloured:
-        text.append(f"In {coloured} of {len(logs)} logs the observer's innovations, what each sample adds to its prediction, are "
-                    "coloured: see the first section below.")
+    if doubtful:
+        text.append(f"In {doubtful} of {len(logs)} logs the observer's innovations, what each sample adds to its prediction, are "
+                    "coloured: the sections below say of which joints. The standard deviations stated hold only where they are "
+                    "white.")
     return Section("How it was done", tuple(text))
 
 
 def _log_section(log: LogResult, number: int) -> Section:
     assert log.series is not None
     floor = log.noise_floor
-    text = [f"Innovations of joint {j + 1}: {words}." for j, words in enumerate(log.innovation_verdict)] if number == 0 else []
+    text = [f"Innovations of joint {j + 1}: {words}." for j, words in enumerate(log.innovation_verdict)]
+    text = text if number == 0 or coloured(log) else []
+    if (doubtful := coloured(log)) and not np.isnan(log.speed_std).all():
+        text.append("A stated standard deviation holds only where the innovations are white: do not rely on those of joint "
+                    f"{_listed(doubtful)}.")
     if floor is not None:
         left_out = f" (left out: period {', '.join(map(str, floor.left_out))})" if floor.left_out else ""
-        text.append(f"{floor.periods} periods were averaged; what differs between them is the noise floor in the table{left_out}.")
+        text.append(f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
+                    "The motion is no average of them.")
     return Section(f"Log {log.name}", tuple(text), _tables(log), tuple(_figures(log, log.series, number == 0)))
 
 

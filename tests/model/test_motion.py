@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -201,6 +202,29 @@ def test_asked_for_is_what_is_done() -> None:
 def test_settings_that_do_not_fit_are_refused(how: Reconstruction) -> None:
     with pytest.raises(UsageError, match="C02"):
         reconstruct(good_log(), how)
+
+
+@pytest.mark.parametrize("method", ["smoother", "observer"])
+@pytest.mark.parametrize("order", [2, 3, 4])
+@pytest.mark.parametrize(("name", "value"), [("jerk_std", 1e-12), ("jerk_std", 1e14), ("bandwidth", 0.001), ("bandwidth", 500.0)])
+def test_settings_far_from_any_log_are_refused_with_the_range(method: str, order: int, name: str, value: float) -> None:
+    """Settling later than the log ends, or filtering nothing: C02 names the range in the option's unit, and its ends do work."""
+    log = rows(good_log(), slice(0, 1000))
+    with pytest.raises(UsageError, match="C02 --") as refused:
+        reconstruct(log, Reconstruction(method, order, **{name: (value,)}))  # type: ignore[arg-type]
+    unit = "Hz" if name == "bandwidth" else rf"rad/s\^{order}"
+    found = re.search(rf"between (\S+) and (\S+) {unit}", str(refused.value))
+    assert found is not None
+    low, high = (float(end) for end in found.groups())
+    assert low < high
+    for end in (low, high):
+        assert np.isfinite(reconstruct(log, Reconstruction(method, order, **{name: (end,) * 3})).motion.dq).all()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("hz", [0.001, 500.0])
+def test_a_zero_phase_cut_off_fits_the_log(hz: float) -> None:
+    with pytest.raises(UsageError, match=r"C02 --bandwidth.* Hz"):
+        reconstruct(good_log(), Reconstruction("zero-phase", bandwidth=(hz,)))
 
 
 def derived(log: ExperimentLog, how: Reconstruction) -> ExperimentLog:
