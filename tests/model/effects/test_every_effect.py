@@ -21,6 +21,8 @@ FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
 
 every_effect = pytest.mark.parametrize("kind", all_effects(), ids=lambda kind: kind.name)
 
+every_friction_law = pytest.mark.parametrize("kind", [kind for kind in all_effects() if kind.friction], ids=lambda kind: kind.name)
+
 
 @pytest.fixture(scope="module")
 def arm() -> Arm:
@@ -175,11 +177,9 @@ def test_apply_goes_around_what_it_is_given(kind: type[Effect], arm: Arm, motion
     np.testing.assert_array_equal(shifted, arm.torque(motion) + 1.0)
 
 
-@every_effect
+@every_friction_law
 def test_friction_takes_power(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """What claims to be friction is dissipative column by column, odd in speed, and nothing at rest."""
-    if not kind.friction:
-        pytest.skip("not a law of friction")
     effect = placed(kind)
     power = effect.columns(motion, arm) * motion.dq[..., None]
     assert power.min() >= 0
