@@ -16,6 +16,7 @@ from pipelines.fit.identifiability import hard_to_see
 from pipelines.log.atomic import write_file
 from pipelines.log.canonical import digest_of
 from pipelines.log.derive import derive, recording
+from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, model_text, read_model
@@ -28,7 +29,7 @@ from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
 from pipelines.model.estimation.result import Result
-from pipelines.model.motion import Reconstructed
+from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.tuned import Reconstruction
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report
@@ -38,6 +39,7 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 FITTED = ("excitation", "free")
 _COURSES = 3  # logs drawn
+_FEWEST_BLOCKS = 2
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         NothingMatched: C06, no log to fit.
-        UsageError: C02, logs of several robots, or a model of another one.
-        InputRejected: T04, no stretch of a log can be used; D14, a log that is fitted shall judge as well.
+        UsageError: C02, settings that do not fit, logs of several robots, or a model of another one.
+        InputRejected: the doctor rejects a log: its first reason; T04, no stretch of a log can be used; T08, too few
+            equations are left; D14, a log that is fitted shall judge as well.
     """
     identify, validate = _chosen(inputs, settings.allow_same)
     given = _friction_of(inputs.material, identify[0])
@@ -89,12 +92,32 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                               rotor_inertia=settings.rotor_inertia, symmetric=settings.symmetric)
     recipe = Recipe(settings.reconstruction, settings.filter, settings.decimate, settings.min_speed,
                     None if given is None else given.friction_torque)
-    fitted = fit_logs(identify, columns, recipe, settings.weighted)
-    judged = judge(fitted, validate, settings.blocks)
+    if settings.blocks < _FEWEST_BLOCKS:
+        raise UsageError("C02", f"{settings.blocks} blocks", where="--blocks", remedy="give 2 or more")
+    for log in (*identify, *validate):
+        settings.reconstruction.check(log.n_joints)
+        recipe.check(log)
+    motions, said = _examined(identify, settings.reconstruction)
+    judges, said_too = _examined(validate, settings.reconstruction)
+    fitted = fit_logs(motions, columns, recipe, settings.weighted)
+    judged = judge(fitted, judges, settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
-    result = _result(fitted, judged, arm, settings)
+    result = replace(_result(fitted, judged, arm, settings), doctor=(*said, *said_too))
     return result if not settings.compare else replace(
-        result, comparison=compare(identify, validate, columns, fitted, settings.blocks))
+        result, comparison=compare(fitted, judged, settings.blocks, settings.weighted))
+
+
+def _examined(logs: list[ExperimentLog], how: Reconstruction) -> tuple[Motions, tuple[Check, ...]]:
+    """The motion of every log, and what the doctor says of it; of what the logs do not show, D09, the estimate itself knows."""
+    motions, said = [], []
+    for log in logs:
+        subject = Subject(recording(log))
+        checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
+        if reject := next((check for check in checks if check.level == "reject"), None):
+            raise reject.as_error()
+        motions.append((log, reconstruct(log, how, subject.good)))
+        said += checks
+    return tuple(motions), tuple(said)
 
 
 def _friction_of(model: Arm | None, log: ExperimentLog) -> Arm | None:
@@ -169,7 +192,7 @@ def _sources(motions: Motions) -> tuple[Source, ...]:
 
 
 def _checks(result: Result) -> tuple[Check, ...]:
-    found = []
+    found = list(result.doctor)
     if result.unresolved:
         found.append(Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True,
                               remedy="move the joints concerned further and faster, in more postures"))
@@ -199,4 +222,4 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("estimate-bps", "Estimate the base parameter set", Settings, compute, report, read, write,
-              lambda result, check: int(check and bool(_checks(result))), _checks)
+              lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks)

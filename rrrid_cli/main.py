@@ -124,6 +124,9 @@ def reconstruct(
 def estimate_bps(
     logs: LogPaths, common: Common,
     method: Annotated[str | None, typer.Option(help="Motion by smoother, observer, zero-phase or central-differences.")] = None,
+    order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
+    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint.")] = None,
+    bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
     filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
     decimate: Annotated[int | None, typer.Option(help="Keep every so-manieth sample. [four a period of the low-pass]")] = None,
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint.")] = None,
@@ -137,7 +140,9 @@ def estimate_bps(
     from pipelines.estimate_bps import STAGE
 
     _go(STAGE, tuple(logs), common, {
-        "method": method, "filter": filter, "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "blocks": blocks,
+        "method": method, "order": order, "jerk_std": numbers(jerk_std, "--jerk-std"),
+        "bandwidth": numbers(bandwidth, "--bandwidth"), "filter": filter,
+        "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "blocks": blocks,
         "symmetric": symmetric, "weighted": False if unweighted else None, "model": model, "allow_same": allow_same,
         "compare": False if common.no_report else None})
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,15 +14,19 @@ import pytest
 
 from pipelines import estimate_bps, reconstruct
 from pipelines.errors import InputRejected, NothingMatched, UsageError
+from pipelines.log.doctor.checks import check_log
 from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log, write_log
+from pipelines.log.files import Opened, open_log, write_log
 from pipelines.log.model_file import model_text, read_model
 from pipelines.log.results import read_series
 from pipelines.log.robot import format_robot
-from pipelines.stage import Outcome, Request, run_stage
+from pipelines.model.estimation.compare import Compared
+from pipelines.report.bps_report import bps_report
+from pipelines.stage import Inputs, Outcome, Request, run_stage
 from tests.cli.test_cli import rrrid
+from tests.fault_table import FAULTS
 from tests.faulty import dropped, spiky
-from tests.healthy import changed, with_signal
+from tests.healthy import changed, good_log, with_signal
 from tests.model.estimation.experiments import arm, experiment, truth
 
 Settings = estimate_bps.Settings
@@ -92,10 +98,15 @@ def test_derived_torques_add_up(good: ExperimentLog, tmp_path: Path) -> None:
 # --- what the logs do not show ------------------------------------------------------------------------------------------
 
 
+def _of_elbow(log: ExperimentLog) -> ExperimentLog:
+    """A free motion: of an excitation every joint has to move, and an encoder that does not is dead, D04."""
+    return replace(log, experiment="free")
+
+
 def test_a_log_of_one_joint_names_what_it_cannot_show(tmp_path: Path) -> None:
     """D09: only the elbow moves. No number for what is not seen, gate 1, and the same again as null in the JSON."""
     only = np.array([0.0, 0.0, 1.0])
-    out = stage(tmp_path, experiment(0, moving=only), check=True)
+    out = stage(tmp_path, _of_elbow(experiment(0, moving=only)), check=True)
     assert out.exit_code == 1
     assert any(check.code == "RRID-D09" and check.gate for check in out.checks)
     printed = {p["name"]: p for p in json.loads((out.folder / "result.json").read_text())["parameters"]}
@@ -226,12 +237,13 @@ def test_the_balance_of_power_finds_a_spoilt_acceleration(good: ExperimentLog, t
 
 
 def test_the_default_wins_held_out(samples: Path, tmp_path: Path) -> None:
-    """The table of four ways to reconstruct: none explains the held-out sample log better than the default."""
+    """The table of four ways to reconstruct: none explains the held-out sample log better than the default, but for a trifle."""
     request = Request((samples / "rrr-closed-form",), out=tmp_path / "out", no_report=True)
     result = run_stage(estimate_bps.STAGE, request, Settings()).result
     assert [c.method for c in result.comparison if c.used] == ["smoother"]
     errors = {c.method: c.validate for c in result.comparison}
-    assert errors["smoother"] == min(errors.values()), errors
+    assert errors["smoother"] < 1.01 * min(errors.values()), errors
+    assert errors["smoother"] < 0.5 * errors["observer"]
     assert result.held_out == "logs"
 
 
@@ -278,7 +290,7 @@ def test_the_command_line(good: ExperimentLog, held_out: ExperimentLog, tmp_path
     write_log(tmp_path / "judge/a.h5", held_out)
     nothing = rrrid("estimate-bps", "judge", "--out", "o", cwd=tmp_path)
     assert (nothing.returncode, "RRID-C06" in nothing.stderr, nothing.stdout) == (5, True, "")
-    write_log(tmp_path / "still/a.h5", experiment(0, moving=np.array([0.0, 0.0, 1.0])))
+    write_log(tmp_path / "still/a.h5", _of_elbow(experiment(0, moving=np.array([0.0, 0.0, 1.0]))))
     gate = rrrid("estimate-bps", "still", "--out", "o1", "--no-report", "--check", cwd=tmp_path)
     assert gate.returncode == 1
     assert "no sample shows p1" in gate.stdout
@@ -289,3 +301,129 @@ def test_the_command_line(good: ExperimentLog, held_out: ExperimentLog, tmp_path
     assert json.loads(given.stdout)["friction"] == "given"
     missing = rrrid("estimate-bps", "good", "--out", "o3", "--model", "nowhere.json", cwd=tmp_path)
     assert (missing.returncode, "RRID-C04" in missing.stderr) == (2, True)
+
+
+# --- what the doctor says -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("row", [fault.row for fault in FAULTS])
+def test_every_fault_ends_in_words(row: str, tmp_path: Path) -> None:
+    """Whatever the doctor can meet: an estimate, a gate under --check, or a rejection; never a crash."""
+    fault = next(fault for fault in FAULTS if fault.row == row)
+    log = replace(fault.make(good_log()), role="identify")
+    if retold := log.experiment not in estimate_bps.FITTED:  # what is wrong with a friction log may be right of an excitation
+        log = replace(log, experiment="excitation")
+    opened = Opened(tmp_path / "a.h5", "", log, ())
+    result = None
+    with contextlib.suppress(InputRejected):  # which ends in exit 3; anything else fails here
+        result = estimate_bps.compute(Inputs((opened,), label="logs"), Settings(compare=False))
+    if result is not None:
+        assert fault.level != "reject" or retold
+        assert estimate_bps.STAGE.exit_code(result, False) == 0
+        gates = [check for check in check_log(log) if check.gate and check.code != "RRID-D09"]  # D09 is for all logs together
+        assert {(check.code, check.message) for check in gates} <= {(c.code, c.message) for c in estimate_bps.STAGE.checks(result)}
+        assert estimate_bps.STAGE.exit_code(result, True) == 1 or not gates
+
+
+def test_the_doctor_is_asked(good: ExperimentLog, tmp_path: Path) -> None:
+    """T07, less than a period: rejected. D05, a flat top: said, and exit 1 under --check."""
+    with pytest.raises(InputRejected) as refused:
+        stage(tmp_path / "short", replace(good, period=20.0))
+    assert refused.value.code == "RRID-T07"
+    (limited,) = [fault.make(good_log()) for fault in FAULTS if fault.row == "D05 limit"]
+    clipped = stage(tmp_path / "clipped", limited, check=True)
+    assert any(check.code == "RRID-D05" and check.gate for check in clipped.checks)
+    assert clipped.exit_code == 1
+    assert stage(tmp_path / "clipped", limited).exit_code == 0
+    constant = changed(good, "tau", (slice(None), 1), 0.3)
+    with pytest.raises(InputRejected, match="constant"):
+        stage(tmp_path / "constant", constant)
+
+
+def test_torque_that_saturates_throughout_is_rejected(good: ExperimentLog, tmp_path: Path) -> None:
+    """D05: no equation is left where the filter spreads clipped samples over everything."""
+    with pytest.raises(InputRejected) as refused:
+        stage(tmp_path, with_signal(good, tau=np.clip(good.tau, -0.5, 0.5)))
+    assert refused.value.exit_code == 3
+
+
+# --- settings -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("settings", "where"), [
+    ({"min_speed": (0.1, 0.2)}, "--min-speed"), ({"min_speed": (-1.0,)}, "--min-speed"),
+    ({"min_speed": (math.nan,)}, "--min-speed"), ({"min_speed": (math.inf,)}, "--min-speed"),
+    ({"decimate": 0}, "--decimate"), ({"decimate": -3}, "--decimate"), ({"filter": 0.0}, "--filter"),
+    ({"filter": -1.0}, "--filter"), ({"filter": 500.0}, "--filter"), ({"filter": math.nan}, "--filter"),
+    ({"blocks": 1}, "--blocks"), ({"blocks": 0}, "--blocks"), ({"order": 7}, "--order")])
+def test_settings_have_bounds(settings: dict[str, object], where: str, good: ExperimentLog, tmp_path: Path) -> None:
+    with pytest.raises(UsageError) as refused:
+        stage(tmp_path, good, settings=replace(SYMMETRIC, **settings))  # type: ignore[arg-type]
+    assert (refused.value.code, refused.value.where, refused.value.exit_code) == ("RRID-C02", where, 2)
+
+
+@pytest.mark.parametrize("settings", [{"decimate": 500}, {"decimate": 100000}, {"filter": 0.01}, {"min_speed": (100.0,)}])
+def test_too_few_equations_are_rejected(settings: dict[str, object], good: ExperimentLog, tmp_path: Path) -> None:
+    with pytest.raises(InputRejected) as refused:
+        stage(tmp_path, good, settings=replace(SYMMETRIC, **settings))  # type: ignore[arg-type]
+    assert refused.value.code in ("RRID-T04", "RRID-T08")
+    assert refused.value.remedy
+
+
+def test_options_of_the_observer(good: ExperimentLog, tmp_path: Path) -> None:
+    """--order, --jerk-std and --bandwidth reach the reconstruction, as with `reconstruct`."""
+    write_log(tmp_path / "logs/a.h5", good)
+    for number, options in enumerate((["--order", "3", "--bandwidth", "30,40,50"], ["--jerk-std", "1000"])):
+        made = rrrid("estimate-bps", "logs", "--out", f"o{number}", "--no-report", *options, cwd=tmp_path)
+        assert made.returncode == 0, made.stderr
+    about = [json.loads((tmp_path / f"o{number}/provenance.json").read_text())["settings"] for number in (0, 1)]
+    assert (about[0]["order"], about[0]["bandwidth"], about[1]["jerk_std"]) == (3, [30, 40, 50], [1000])
+    wrong = rrrid("estimate-bps", "logs", "--out", "o", "--bandwidth", "1,2", cwd=tmp_path)
+    assert (wrong.returncode, "RRID-C02" in wrong.stderr) == (2, True)
+
+
+# --- side by side -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("min_speed", [0.0, 0.5])
+@pytest.mark.parametrize("alone", [True, False])
+def test_all_ways_are_judged_by_the_same_equations(alone: bool, min_speed: float, good: ExperimentLog, held_out: ExperimentLog,
+                                                   tmp_path: Path) -> None:
+    settings = replace(SYMMETRIC, compare=True, min_speed=(min_speed,))
+    result = stage(tmp_path, *((good,) if alone else (good, held_out)), settings=settings).result
+    assert len({c.equations for c in result.comparison}) == 1
+    assert result.comparison[0].equations > 0
+
+
+def _compared(**errors: float) -> tuple[Compared, ...]:
+    return tuple(Compared(name, False, error, error, 9, (1.0,), (0.1,), "") for name, error in errors.items())
+
+
+def test_the_report_names_the_best_way(good: ExperimentLog, tmp_path: Path) -> None:
+    result = stage(tmp_path, good).result
+
+    def said(**errors: float) -> str:
+        section = bps_report(replace(result, comparison=_compared(**errors))).sections[-1]
+        assert section.text[0] in section.tables[0].caption
+        return section.text[0]
+
+    assert "observer explains the torque best" in said(smoother=0.05, observer=0.04)
+    assert said(smoother=0.0401, observer=0.04) == "Held out, there is no difference worth speaking of."
+    assert "between observer and smoother" in said(smoother=0.0401, observer=0.04, other=0.05)
+
+
+def test_the_verdict_names_the_worst_joint_and_what_is_small(good: ExperimentLog, tmp_path: Path) -> None:
+    result = stage(tmp_path, good).result
+    plain = replace(result, relative_error={"identify": 0.05, "validate": 0.05},
+                    torque_rms={**result.torque_rms, "validate": (1.0, 1.0, 1.0)},
+                    torque_signal_rms={**result.torque_signal_rms, "validate": (20.0, 20.0, 20.0)})
+    assert bps_report(plain).tone == "good"
+    assert "worst joint" not in bps_report(plain).verdict
+    bad = replace(plain, torque_rms={**plain.torque_rms, "validate": (1.0, 1.0, 12.2)})
+    assert f"{result.joints[2]} 61 %" in bps_report(bad).verdict
+    assert bps_report(bad).tone == "attention"
+    small = tuple(replace(p, value=0.5, std=1.0, visible=True) if k < 2 else replace(p, value=10.0, std=1.0, visible=True)
+                  for k, p in enumerate(result.parameters))
+    report = bps_report(replace(plain, parameters=small))
+    assert f"{len(small) - 2} of {len(small)} parameters are clearly visible, 2 known to be small" in report.verdict
+    assert [row[3] for row in report.sections[0].tables[0].rows][:3] == ["known to be small", "known to be small", "clearly"]

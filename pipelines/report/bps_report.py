@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pipelines.model.estimation.compare import Compared
+from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
 from pipelines.report.bps import convergence_figure, torque_figure
 from pipelines.report.report import Report, Section, Table, Tone
@@ -10,6 +12,9 @@ from pipelines.report.style import with_std
 __all__ = ["bps_report"]
 
 _GOOD = 0.1  # relative torque error that is worth calling good
+_SURE = 3.0  # standard deviations: a value that is clearly visible
+_STANDS_OUT = 2.0  # times the overall relative error: a joint worth naming
+_ALIKE = 0.02  # of the better error: less is no difference worth speaking of
 
 
 def bps_report(result: Result) -> Report:
@@ -22,16 +27,36 @@ def bps_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     error = result.relative_error["validate"]
-    return "bad" if result.unresolved or result.physically_consistent is False else "good" if error < _GOOD else "attention"
+    return "bad" if result.unresolved or result.physically_consistent is False else \
+        "good" if error < _GOOD and not _worst_joint(result) else "attention"
+
+
+def _worst_joint(result: Result) -> str:
+    """The joint that the model explains far worse than the rest, "joint_5 61 %"; empty where there is none."""
+    pairs = zip(result.torque_rms["validate"], result.torque_signal_rms["validate"], strict=True)
+    errors = [left / whole if whole > 0.0 else 0.0 for left, whole in pairs]
+    worst = max(range(len(errors)), key=errors.__getitem__)
+    return f"{result.joints[worst]} {100 * errors[worst]:.2g} %" if (
+        errors[worst] > _STANDS_OUT * result.relative_error["validate"]) else ""
+
+
+def _seen(p: Estimated) -> str:
+    """"clearly", "known to be small" (its deviation is small beside its like), "barely", or "no"."""
+    if p.value is None or p.std is None:
+        return "no"
+    return "barely" if not p.visible else "clearly" if abs(p.value) > _SURE * p.std else "known to be small"
 
 
 def _verdict(result: Result) -> str:
     judged = "held-out logs" if result.held_out == "logs" else "held-out blocks of the fitted logs, for none has role validate,"
     if result.unresolved:
         return f"These logs do not determine the model: {result.unresolved}."
-    shown = sum(p.visible for p in result.parameters)
-    text = (f"{shown} of {len(result.parameters)} parameters are clearly visible; the model explains the torque of {judged} "
-            f"to {100 * result.relative_error['validate']:.2g} %.")
+    seen = [_seen(p) for p in result.parameters]
+    small, worst = seen.count("known to be small"), _worst_joint(result)
+    text = (f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
+            f"{f', {small} known to be small' if small else ''}; the model explains the torque of {judged} "
+            f"to {100 * result.relative_error['validate']:.2g} %"
+            f"{f', that of the worst joint less well: {worst}' if worst else ''}.")
     return text if result.physically_consistent is not False else f"{text} No links that could exist have these parameters."
 
 
@@ -51,7 +76,7 @@ def _parameter_section(result: Result) -> Section:
     known = any(p.known is not None for p in result.parameters)
     columns = ("parameter", "value ± std", "unit", "seen", "stands for", *(("from the described links",) if known else ()))
     rows = [(p.name, "not determined" if p.value is None or p.std is None else with_std(p.value, p.std), p.unit,
-             "clearly" if p.visible else "barely" if p.value is not None else "no", p.combination, *((p.known,) if known else ()))
+             _seen(p), p.combination, *((p.known,) if known else ()))
             for p in result.parameters]
     tones: tuple[Tone, ...] = tuple(
         "good" if p.visible else "bad" if p.value is None else "attention" for p in result.parameters)
@@ -93,15 +118,30 @@ def _balance_words(result: Result) -> tuple[str, ...]:
     if result.balance.agree:
         return (f"The balance of power, which needs no acceleration, gives the same parameters: {largest}.",)
     return (f"The balance of power, which needs no acceleration, gives other parameters: {largest}. Either the reconstructed "
-            f"acceleration is spoilt, or position and torque are not of the same instant.",)
+            f"acceleration is spoilt, or position and torque are not of the same instant, or the model lacks an effect.",)
+
+
+def _winner(comparison: tuple[Compared, ...]) -> str:
+    """Which way explains best what was held out."""
+    ranked = sorted((c for c in comparison if c.value), key=lambda c: c.validate)
+    if len(ranked) < 2:
+        return "Only one way gives an estimate." if ranked else "No way gives an estimate."
+    best = ranked[0]
+    near = [c.method for c in ranked[1:] if c.validate <= (1.0 + _ALIKE) * best.validate]
+    if len(near) == len(ranked) - 1:
+        return "Held out, there is no difference worth speaking of."
+    if near:
+        return f"Held out, there is no difference worth speaking of between {best.method} and {', '.join(near)}; the rest is worse."
+    return f"Held out, {best.method} explains the torque best."
 
 
 def _comparison_section(result: Result) -> Section:
     rows = tuple((c.method, 100 * c.identify, 100 * c.validate, c.failed or ("used here" if c.used else ""))
                  for c in result.comparison)
-    errors = Table(("motion by", "fitted [%]", "held out [%]", ""), rows, "Relative torque error on the same equations.")
+    errors = Table(("motion by", "fitted [%]", "held out [%]", ""), rows,
+                   f"Relative torque error on the same equations. {_winner(result.comparison)}")
     good = [c for c in result.comparison if c.value]
     values = tuple((p.name, *(with_std(c.value[k], c.std[k]) for c in good))
                    for k, p in enumerate(result.parameters[:len(good[0].value) if good else 0]))
     beside = Table(("parameter", *(c.method for c in good)), values, "The same parameters, value ± std.")
-    return Section("Four ways to reconstruct the motion", (), (errors, beside) if good else (errors,))
+    return Section("Four ways to reconstruct the motion", (_winner(result.comparison),), (errors, beside) if good else (errors,))

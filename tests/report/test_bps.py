@@ -30,7 +30,9 @@ def page(result: Result) -> str:
 def test_a_good_estimate_is_called_good(result: Result) -> None:
     report = bps_report(result)
     assert report.tone == "good"
-    assert f"{sum(p.visible for p in result.parameters)} of {len(result.parameters)} parameters" in report.verdict
+    clear = [p for p in result.parameters if p.visible and p.value is not None and p.std is not None and abs(p.value) > 3.0 * p.std]
+    small = sum(p.visible for p in result.parameters) - len(clear)
+    assert f"{len(clear)} of {len(result.parameters)} parameters are clearly visible, {small} known to be small" in report.verdict
     assert "for none has role validate" in report.verdict  # blocks were held out, and that is said
     assert "gives the same parameters" in page(result)
 
@@ -53,6 +55,7 @@ def test_impossible_links_and_a_balance_that_differs_are_said(result: Result) ->
     assert bps_report(wrong).tone == "bad"
     assert "No links that could exist" in bps_report(wrong).verdict
     assert "gives other parameters" in page(wrong)
+    assert "or the model lacks an effect" in page(wrong)
 
 
 def test_names_from_logs_are_inert(result: Result) -> None:

@@ -7,18 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.errors import InputRejected
+from pipelines.errors import InputRejected, UsageError
 from pipelines.fit.least_squares import Errors
 from pipelines.fit.statistics import gather
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.estimation.estimate import Estimate, Stacked, by_blocks, estimate, power_of
-from pipelines.model.estimation.regression import Columns, Conditioning, LogEquations, condition
+from pipelines.model.estimation.regression import Columns, Conditioning, LogEquations, Rows, condition
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge"]
+__all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of"]
 
 Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
+
+_FEWEST = 200  # equations of a fit: ten a parameter of the RRR arm with friction
+_FEWEST_OF_JOINT = 20
+_MOSTLY = 0.01  # of the samples saturated: that is why none is left
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,19 @@ class Recipe:
     decimation: int | None = None
     min_speed: tuple[float, ...] = (0.0,)
     known: Callable[[Motion], Array] | None = None  # torque (samples, joints) [N m] that is subtracted: of a given friction
+
+    def check(self, log: ExperimentLog) -> None:
+        """C02: what no log of this rate and so many joints can be done with."""
+        if len(self.min_speed) not in (1, log.n_joints):
+            raise UsageError("C02", f"{len(self.min_speed)} values for {log.n_joints} joints", where="--min-speed",
+                             remedy="give one, or one a joint")
+        if not all(0.0 <= speed < np.inf for speed in self.min_speed):
+            raise UsageError("C02", "a speed that is no number from zero up", where="--min-speed", remedy="give 0 or more [rad/s]")
+        if self.decimation is not None and self.decimation < 1:
+            raise UsageError("C02", f"every {self.decimation}th sample", where="--decimate", remedy="give 1 or more")
+        if self.cutoff_hz is not None and not 0.0 < self.cutoff_hz < 0.5 / log.sample_time:
+            raise UsageError("C02", f"a low-pass at {self.cutoff_hz:g} Hz for {log.name}, sampled at {1.0 / log.sample_time:g} Hz",
+                             where="--filter", remedy="give a frequency above 0 and below half the rate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,35 +72,59 @@ class Judged:
     motions: Motions
 
 
-def fit_logs(logs: Sequence[ExperimentLog], columns: Columns, recipe: Recipe, weighted: bool = True) -> Fitted:
-    """Fit `logs`; the cut-off, where it is not given, is the highest that any of them asks for, and the same for all."""
-    motions = tuple((log, reconstruct(log, recipe.how)) for log in logs)
+def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
+    return tuple((log, reconstruct(log, how)) for log in logs)
+
+
+def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool = True,
+             rows: Sequence[Rows] | None = None) -> Fitted:
+    """Fit the logs; the cut-off, where it is not given, is the highest that any of them asks for, and the same for all.
+
+    Raises:
+        UsageError: C02, a recipe that does not fit them.
+        InputRejected: T04, a log without a stretch that can be used; T08, too few equations.
+    """
+    for log, _ in motions:
+        recipe.check(log)
     if recipe.cutoff_hz is None:
         asked = [_condition(log, found, recipe, columns).cutoff_hz for log, found in motions]
         known = [cutoff for cutoff in asked if cutoff is not None]
         recipe = replace(recipe, cutoff_hz=max(known) if known else None)
-    equations = [equations_of(log, found, recipe, columns) for log, found in motions]
+    equations = equations_of(motions, recipe, columns, rows)
+    _enough(equations, motions[0][0])
     found = estimate(equations, columns, weighted)
-    return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, motions, recipe, columns))
+    return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, equations))
 
 
-def judge(fitted: Fitted, logs: Sequence[ExperimentLog], blocks: int) -> Judged:
-    """Held-out errors: on `logs`, or on contiguous blocks of the fitted ones where there are none."""
+def _enough(equations: Sequence[LogEquations], log: ExperimentLog) -> None:
+    counts = np.sum([one.counts for one in equations], axis=0)
+    j = int(np.argmin(counts))
+    if counts[j] < _FEWEST_OF_JOINT:
+        raise InputRejected("T08", f"{counts[j]} equations of joint {j + 1} are left", where=log.source or log.name,
+                            remedy="lower --min-speed or --decimate, or record longer")
+    if counts.sum() < _FEWEST:
+        raise InputRejected("T08", f"{counts.sum()} equations are left, too few for a fit", where=log.source or log.name,
+                            remedy="lower --decimate, filter higher with --filter, or record longer")
+
+
+def judge(fitted: Fitted, motions: Motions, blocks: int, rows: Sequence[Rows] | None = None) -> Judged:
+    """Held-out errors: on other logs, or on contiguous blocks of the fitted ones where there are none."""
     found = fitted.estimate
-    if not logs:
+    if not motions:
         errors = by_blocks(found.equations, blocks, found.solution.weights)
-        return Judged(_of_whole_torque(errors, fitted.motions, fitted.recipe, found.columns), "blocks", ())
-    motions = tuple((log, reconstruct(log, fitted.recipe.how)) for log in logs)
-    equations = [equations_of(log, motion, fitted.recipe, found.columns) for log, motion in motions]
-    errors = power_of(equations, found.beta)
-    return Judged(_of_whole_torque(errors, motions, fitted.recipe, found.columns), "logs", motions)
+        fitted_to = [one for one in found.equations.logs if isinstance(one, LogEquations)]
+        return Judged(_of_whole_torque(errors, fitted_to), "blocks", ())
+    for log, _ in motions:
+        fitted.recipe.check(log)
+    equations = equations_of(motions, fitted.recipe, found.columns, rows)
+    return Judged(_of_whole_torque(power_of(equations, found.beta), equations), "logs", motions)
 
 
-def _of_whole_torque(found: Errors, motions: Motions, recipe: Recipe, columns: Columns) -> Errors:
+def _of_whole_torque(found: Errors, equations: Sequence[LogEquations]) -> Errors:
     """The same residual beside the whole torque, where a known part had been subtracted from it."""
-    if recipe.known is None:
+    if all(one.known is None for one in equations):
         return found
-    whole = gather(Stacked([equations_of(log, motion, replace(recipe, known=None), columns) for log, motion in motions]))
+    whole = gather(Stacked([replace(one, known=None) for one in equations]))
     counts = np.maximum(whole.counts, 1)
     return replace(found, signal_rms=np.sqrt(whole.power / counts),
                    relative_error=float(np.sqrt(np.sum(np.square(found.rms) * counts) / whole.power.sum())))
@@ -94,15 +135,25 @@ def _condition(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns
     return condition(found.motion, 1.0 / log.sample_time, recipe.cutoff_hz, recipe.decimation, slow)
 
 
-def equations_of(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns) -> LogEquations:
-    """The equations of one log.
+def equations_of(motions: Motions, recipe: Recipe, columns: Columns, rows: Sequence[Rows] | None = None) -> list[LogEquations]:
+    """The equations of every log; of the samples in `rows` where those are given.
 
     Raises:
-        InputRejected: T04, every stretch of it is too short for the low-pass.
+        InputRejected: T04, every stretch of a log is too short for the low-pass, or spoilt.
     """
+    return [_of_log(log, found, recipe, columns, None if rows is None else rows[i]) for i, (log, found) in enumerate(motions)]
+
+
+def _of_log(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns, rows: Rows | None) -> LogEquations:
     how = _condition(log, found, recipe, columns)
-    equations = LogEquations(columns, found, how, held=log.torque != "measured", known=recipe.known)
+    equations = LogEquations(columns, found, how, held=log.torque != "measured", known=recipe.known, chosen=rows)
     if not equations.runs:
         raise InputRejected("T04", f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz",
                             where=log.source or log.name, remedy="filter higher with --filter, or record longer")
+    if equations.rows.out.all():
+        saturated = bool(found.good.saturated.any(axis=1).mean() > _MOSTLY)
+        raise InputRejected("D05" if saturated else "T04", "no sample is left: "
+                            f"{'saturated torque' if saturated else 'what is missing or spoilt'} touches every one",
+                            where=log.source or log.name,
+                            remedy="drive it more gently" if saturated else "'rrrid inspect' shows what is wrong; record again")
     return equations

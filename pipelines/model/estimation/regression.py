@@ -24,7 +24,7 @@ from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.rrr import ACTING, RRR
 from pipelines.signal.filters import LowPass, centre_hold, centre_samples, choose_decimation, design_low_pass, zero_phase
 
-__all__ = ["Column", "Columns", "Conditioning", "LogEquations", "condition"]
+__all__ = ["Column", "Columns", "Conditioning", "LogEquations", "Rows", "condition"]
 
 # time, and of each joint: columns, torque, and which of its equations count (None: all)
 _Piece = tuple[Array, tuple[Array, ...], tuple[Array, ...], tuple[npt.NDArray[np.bool_], ...] | None]
@@ -139,6 +139,18 @@ def _highest_frequency(motion: Motion, rate: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
+class Rows:
+    """Which samples of the mended log make equations."""
+
+    out: npt.NDArray[np.bool_]  # (samples,) none: spoilt, vague, or so near to it that the low-pass spreads it here
+    slow: npt.NDArray[np.bool_]  # (samples, joints) none of this joint
+
+    def __and__(self, other: Rows) -> Rows:
+        """Samples that make equations in both."""
+        return Rows(self.out | other.out, self.slow | other.slow)
+
+
+@dataclass(frozen=True, eq=False)
 class LogEquations:
     """The equations of one log. Iterable as often as needed."""
 
@@ -147,6 +159,7 @@ class LogEquations:
     conditioning: Conditioning
     held: bool  # the torque is a held command: centre it
     known: Callable[[Motion], Array] | None = None  # torque (samples, joints) [N m] that is subtracted: of a given friction
+    chosen: Rows | None = None  # instead of the log's own choice: the same for several ways to reconstruct
 
     def __iter__(self) -> Iterator[Block]:
         for run in self.runs:
@@ -157,6 +170,30 @@ class LogEquations:
         """Stretches without a gap that outlast the low-pass."""
         shortest = 8 if self.conditioning.low_pass is None else 2 * self.conditioning.low_pass.padding
         return tuple(run for run in self.found.good.runs if run.stop - run.start > shortest)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The samples that make equations."""
+        if self.chosen is not None:
+            return self.chosen
+        good = self.found.good
+        spoilt = (good.missing | good.spikes | good.saturated) | self._unknown
+        touched = np.asarray(spoilt.any(axis=1))
+        out, cutoff = np.ones(len(touched), dtype=bool), self.conditioning.cutoff_hz
+        reach = 2 if cutoff is None else int(np.ceil(_TOUCHED / (cutoff * good.log.sample_time)))
+        for run in self.runs:
+            count = np.cumsum(np.concatenate([np.zeros(reach + 1), touched[run], np.zeros(reach)]))
+            out[run] = count[2 * reach + 1:] > count[:-2 * reach - 1]
+        return Rows(out, np.abs(self.found.motion.dq[good.kept]) < np.array(self.conditioning.min_speed))
+
+    @cached_property
+    def counts(self) -> npt.NDArray[np.intp]:
+        """(joints,) about how many equations there are of each joint, before any is made."""
+        every, found = self.conditioning.decimation, np.zeros(self.rows.slow.shape[1], dtype=np.intp)
+        for run in self.runs:
+            thin = slice(run.start, run.stop, every)
+            found += np.sum(~self.rows.out[thin, None] & ~self.rows.slow[thin], axis=0)
+        return found
 
     def times(self) -> Array:
         """The time of every equation [s]."""
@@ -188,7 +225,7 @@ class LogEquations:
 
     def _conditioned(self, wide: slice, first: int, last: int, phase: int) -> _Piece:
         how = self.conditioning
-        motion, tau, bad = self._stretch(wide)
+        motion, tau = self._stretch(wide)
         rows, _ = self.columns.rows(motion)
         known = None if self.known is None else self.known(motion)
         begin = 0
@@ -202,8 +239,8 @@ class LogEquations:
             stacks = [zero_phase(s, how.low_pass) for s in stacks]
         inside = np.arange(wide.start + begin, wide.start + begin + len(stacks[0]))
         chosen = np.flatnonzero((inside >= first + phase) & (inside < last) & ((inside - first - phase) % how.decimation == 0))
-        keep = chosen[~bad[chosen + begin]]
-        slow = np.abs(motion.dq[keep + begin]) < np.array(how.min_speed)
+        keep = chosen[~self.rows.out[wide][chosen + begin]]
+        slow = self.rows.slow[wide][keep + begin]
         parts = [np.where(slow[:, j, None], 0.0, s[keep]) for j, s in enumerate(stacks)]
         return (motion.t[keep + begin], tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts),
                 tuple(np.ascontiguousarray(p[:, -1]) for p in parts), tuple(~slow.T) if slow.any() else None)
@@ -216,21 +253,22 @@ class LogEquations:
         std = self.found.std[2]
         return np.asarray(std > _VAGUE * np.nanmedian(std, axis=0))
 
-    def _stretch(self, wide: slice) -> tuple[Motion, Array, npt.NDArray[np.bool_]]:
-        """Motion and torque with what is spoilt bridged by straight lines, and the samples the filter spreads that over."""
+    @cached_property
+    def _unknown(self) -> npt.NDArray[np.bool_]:
+        """(samples, joints) of the mended log: no motion, or a vague one."""
+        kept, motion = self.found.good.kept, self.found.motion
+        return np.asarray(~np.isfinite(motion.q + motion.dq + motion.ddq)[kept] | self._vague[kept])
+
+    def _stretch(self, wide: slice) -> tuple[Motion, Array]:
+        """Motion and torque with what is spoilt bridged by straight lines."""
         good, motion = self.found.good, _part(self.found, wide)
         tau = good.log.tau[wide]
         spoilt = (good.missing | good.spikes | good.saturated)[wide]
-        unknown = ~np.isfinite(motion.q + motion.dq + motion.ddq) | self._vague[good.kept[wide]]
-        touched: npt.NDArray[np.bool_] = np.asarray((spoilt | unknown).any(axis=1))
-        if not touched.any():
-            return motion, tau, touched
+        unknown = self._unknown[wide]
+        if not (spoilt | unknown).any():
+            return motion, tau
         q, dq, ddq = (_bridged(x, unknown) for x in (motion.q, motion.dq, motion.ddq))
-        cutoff = self.conditioning.cutoff_hz
-        reach = 2 if cutoff is None else int(np.ceil(_TOUCHED / (cutoff * good.log.sample_time)))
-        count = np.cumsum(np.concatenate([np.zeros(reach + 1), touched, np.zeros(reach)]))
-        spread: npt.NDArray[np.bool_] = np.greater(count[2 * reach + 1:], count[:-2 * reach - 1])
-        return Motion(motion.t, q, dq, ddq), _bridged(tau, spoilt), spread
+        return Motion(motion.t, q, dq, ddq), _bridged(tau, spoilt)
 
 
 def _bridged(x: Array, bad: npt.NDArray[np.bool_]) -> Array:

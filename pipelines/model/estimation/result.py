@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from pipelines.errors import Check
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
@@ -41,5 +42,6 @@ class Result:
     convergence: Array  # (counts, parameters)
     convergence_std: Array
     courses: tuple[Course, ...]
+    doctor: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False, kw_only=True)  # of the logs, but "ok"
     model: ModelFile = field(metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)

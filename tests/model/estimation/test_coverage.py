@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
-from pipelines.model.estimation.logs import Recipe, fit_logs
+from pipelines.model.estimation.logs import Recipe, fit_logs, motions_of
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.tuned import Reconstruction
 from tests.model.estimation.experiments import arm, experiment, truth
@@ -21,7 +21,7 @@ def deviations() -> tuple[list[str], Array]:
     names = [column.name for column in columns.names]
     rows = []
     for seed in SEEDS:
-        found = fit_logs([experiment(seed)], columns, Recipe(Reconstruction())).estimate
+        found = fit_logs(motions_of([experiment(seed)], Reconstruction()), columns, Recipe(Reconstruction())).estimate
         rows.append((found.beta - truth(names)) / found.std)
     return names, np.array(rows)
 

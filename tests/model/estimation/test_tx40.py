@@ -14,7 +14,7 @@ from pipelines.import_log import STAGE, Settings
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.estimation.estimate import Estimate
-from pipelines.model.estimation.logs import Fitted, Recipe, equations_of, fit_logs
+from pipelines.model.estimation.logs import Fitted, Recipe, equations_of, fit_logs, motions_of
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
@@ -33,7 +33,7 @@ def tx40(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> ExperimentLo
 
 
 def fitted(log: ExperimentLog, recipe: Recipe, *, rotor: bool, weighted: bool = False) -> Fitted:
-    return fit_logs([log], nominal_columns(log.robot, rotor_inertia=rotor), recipe, weighted)
+    return fit_logs(motions_of([log], recipe.how), nominal_columns(log.robot, rotor_inertia=rotor), recipe, weighted)
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def independent(tx40: ExperimentLog, published: Fitted, shared: Path) -> Indepen
     table[:, joints, 66 + joints] = motion.dq
     table[:, joints, 72 + joints] = 1.0
     sos = butter(4, CUTOFF, fs=5000.0, output="sos")
-    equations = equations_of(tx40, found, published.recipe, published.estimate.columns)
+    equations = equations_of(((tx40, found),), published.recipe, published.estimate.columns)[0]
     at = np.searchsorted(motion.t, equations.times())
     A, y = (sosfiltfilt(sos, x, axis=0)[at] for x in (table, tx40.tau))
     slow = np.abs(motion.dq[at]) < SLOW
