@@ -15,6 +15,7 @@ import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NoReturn
 
 from pipelines.errors import InputRejected, RrridError, UsageError, did_you_mean
 
@@ -110,9 +111,9 @@ class _Reader:
         self.path, self.fail, self.where = path, fail, where
         if not isinstance(table, Mapping):
             self.wrong(path or "the robot description", "must be a table")
-        self.table: Mapping[str, object] = table  # type: ignore[assignment]
+        self.table: Mapping[str, object] = table
 
-    def wrong(self, key: str, what: str, code: str = "C02", remedy: str = "correct the robot description") -> None:
+    def wrong(self, key: str, what: str, code: str = "C02", remedy: str = "correct the robot description") -> NoReturn:
         place = f"{self.path}.{key}" if self.path and key != self.path else key
         raise self.fail(code, f"robot description, {place}: {what}", where=self.where, remedy=remedy)
 
@@ -138,7 +139,7 @@ class _Reader:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.wrong(key, "must be a number" if key in self.table else "is missing")
         try:
-            number = float(value)  # type: ignore[arg-type]
+            number = float(value)
         except OverflowError:  # an integer of hundreds of digits
             number = math.inf
             infinite = False
@@ -153,6 +154,10 @@ class _Reader:
             self.wrong(key, f"must be a list of {size} numbers")
         inner = _Reader({f"{key}[{i}]": entry for i, entry in enumerate(entries)}, self.path, self.fail, self.where)
         return tuple(inner.number(k, infinite=infinite) for k in inner.table)
+
+    def vector(self, key: str) -> Vector:
+        x, y, z = self.numbers(key, 3)
+        return x, y, z
 
 
 def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> RobotDescription:
@@ -181,18 +186,16 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     joints = table.get("joint")
     if not isinstance(joints, list) or not joints:
         top.wrong("joint", "there must be at least one [[joint]]")
-    gravity = top.numbers("gravity", 3)
-    tool = kinematics.numbers("tool", 3) if "tool" in kinematics.table else (0.0, 0.0, 0.0)
     return RobotDescription(
         name=top.text("name"),
-        gravity=gravity,  # type: ignore[arg-type]
+        gravity=top.vector("gravity"),
         convention=convention,
         joints=tuple(_joint(_Reader(j, f"joint[{i + 1}]", fail, str(where)), convention)
-                     for i, j in enumerate(joints)),  # type: ignore[arg-type]
-        tool=tool,  # type: ignore[arg-type]
+                     for i, j in enumerate(joints)),
+        tool=kinematics.vector("tool") if "tool" in kinematics.table else (0.0, 0.0, 0.0),
         urdf_text=kinematics.text("urdf_text") if convention == "urdf" else None,
         tip_link=kinematics.text("tip_link") if "tip_link" in kinematics.table else None,
-        drive=_drive(table.get("drive"), len(joints), fail, str(where)),  # type: ignore[arg-type]
+        drive=_drive(table.get("drive"), len(joints), fail, str(where)),
     )
 
 
@@ -231,7 +234,8 @@ def _geometric(read: _Reader, convention: str) -> dict[str, float]:
 
 def _link(read: _Reader) -> LinkParameters:
     read.only(_LINK_KEYS)
-    return LinkParameters(read.number("mass", low=0.0), read.numbers("com", 3), read.numbers("inertia", 6))  # type: ignore[arg-type]
+    xx, yy, zz, xy, xz, yz = read.numbers("inertia", 6)
+    return LinkParameters(read.number("mass", low=0.0), read.vector("com"), (xx, yy, zz, xy, xz, yz))
 
 
 def _drive(table: object, n: int, fail: type[RrridError], where: str) -> Drive | None:

@@ -34,7 +34,7 @@ def motion_report(logs: Sequence[LogResult]) -> Report:
             *_alarm(logs, far))
     known = not all(np.isnan(log.speed_std).all() for log in logs)
     tone: Tone = "attention" if far or doubtful else "good" if known else "neutral"
-    sections = [_explanation(logs), *(_log_section(log, i) for i, log in enumerate(logs) if log.series is not None)]
+    sections = [_explanation(logs), *(_log_section(log, log.series, i) for i, log in enumerate(logs) if log.series is not None)]
     if more := [log.name for log in logs if log.series is None]:
         sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
     return Report("Reconstructed motion", "; ".join(said) + ".", tone, _key_figures(logs), tuple(sections))
@@ -108,8 +108,7 @@ def _explanation(logs: Sequence[LogResult]) -> Section:
     return Section("How it was done", tuple(text))
 
 
-def _log_section(log: LogResult, number: int) -> Section:
-    assert log.series is not None
+def _log_section(log: LogResult, series: Series, number: int) -> Section:
     floor = log.noise_floor
     text = [f"Innovations of joint {j + 1}: {words}." for j, words in enumerate(log.innovation_verdict)]
     text = text if number == 0 or coloured(log) else []
@@ -120,7 +119,7 @@ def _log_section(log: LogResult, number: int) -> Section:
         left_out = f" (left out: period {', '.join(map(str, floor.left_out))})" if floor.left_out else ""
         text.append(f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
                     "The motion is no average of them.")
-    return Section(f"Log {log.name}", tuple(text), _tables(log), tuple(_figures(log, log.series, number == 0)))
+    return Section(f"Log {log.name}", tuple(text), _tables(log), tuple(_figures(log, series, number == 0)))
 
 
 def _tables(log: LogResult) -> tuple[Table, ...]:

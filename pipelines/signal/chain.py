@@ -43,11 +43,6 @@ class Stationary:
     posterior: Array  # (I - k c) P, in the form that stays positive
 
     @property
-    def innovation_variance(self) -> Array:
-        """S = P_11 + R in units of R."""
-        return 1.0 / self.remainder
-
-    @property
     def settled(self) -> int:
         """Samples after which a start, a gap or an end is forgotten to 1e-16."""
         radius = float(np.abs(self.poles).max())

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.log.files import write_log
-from tests.cli.test_cli import rrrid
+from tests.cli.commands import rrrid
 from tests.healthy import good_log
 from tests.log.logs import small_log
 

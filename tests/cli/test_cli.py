@@ -6,10 +6,6 @@ import json
 import os
 import resource
 import shutil
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import h5py
@@ -17,26 +13,9 @@ import numpy as np
 import pytest
 
 from pipelines.log.files import open_log, write_log
+from tests.cli.commands import REPO, rrrid
 from tests.healthy import good_log, with_signal
 from tests.log.logs import small_log
-
-RRRID = (sys.executable, "-m", "rrrid_cli.main")
-REPO = Path(__file__).resolve().parents[2]
-
-
-def rrrid(*words: object, cwd: Path, **more: object) -> subprocess.CompletedProcess[str]:
-    """Run the command in `cwd`, as a fresh process without a terminal."""
-    environment = os.environ | {"PYTHONPATH": str(REPO)}
-    environment |= more.pop("env", {})  # type: ignore[arg-type]
-    return subprocess.run([*RRRID, *map(str, words)], capture_output=True, text=True, cwd=cwd, check=False, timeout=120,
-                          stdin=subprocess.DEVNULL, env=environment, **more)  # type: ignore[call-overload, no-any-return]
-
-
-@pytest.fixture
-def logs(tmp_path: Path) -> Path:
-    """A folder `logs` with one good log."""
-    write_log(tmp_path / "logs/a.h5", small_log())
-    return tmp_path
 
 
 def test_a_command_leaves_a_folder_and_says_where(logs: Path) -> None:
@@ -175,92 +154,6 @@ def test_chosen_joints_are_converted(logs: Path) -> None:
     assert rrrid("import", "x", "--joints", "1", cwd=logs).returncode == 2
 
 
-def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path) -> None:
-    """What nobody foresaw ends in 70, one line, and a file to report; --debug shows the traceback."""
-    code = ("import sys, pipelines.convert as c; from rrrid_cli import main; from dataclasses import replace\n"
-            "c.STAGE = replace(c.STAGE, compute=lambda inputs, settings: 1 / 0)\nsys.argv = ['rrrid', *sys.argv[1:]]\nmain.entry()")
-    environment = os.environ | {"PYTHONPATH": str(REPO), "TMPDIR": str(logs)}
-    done = subprocess.run([sys.executable, "-c", code, "convert", "logs"], capture_output=True, text=True, cwd=logs,
-                          env=environment, check=False)
-    assert done.returncode == 70
-    assert done.stderr.count("\n") == 1
-    (crash,) = logs.glob("rrrid-crash-*.txt")
-    assert "ZeroDivisionError" in crash.read_text()
-    assert crash.name in done.stderr
-    assert not (logs / "runs").exists()
-
-
-@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_cleanly(tmp_path: Path, number: signal.Signals, exit_code: int) -> None:
-    """P06: Ctrl-C and SIGTERM end within 5 s with their code, no half-written folder, no orphan."""
-    for i in range(60):
-        write_log(tmp_path / f"logs/{i}.h5", small_log(samples=20_000, seed=i))
-    environment = os.environ | {"PYTHONPATH": str(REPO)}
-    with subprocess.Popen([*RRRID, "convert", "logs", "--to", "csv", "-v"], cwd=tmp_path, env=environment, text=True,
-                          stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True) as process:
-        assert process.stderr is not None
-        while "writing csv/1" not in process.stderr.readline():
-            assert process.poll() is None
-        began = time.monotonic()
-        process.send_signal(number)
-        said = process.stderr.read()
-    assert process.returncode == exit_code
-    assert time.monotonic() - began < 5
-    assert "Traceback" not in said
-    assert [p.name for p in (tmp_path / "runs/rrr-tue/logs").iterdir()] == []
-    with pytest.raises(ProcessLookupError):
-        os.killpg(process.pid, 0)
-
-
-def test_a_closed_pipe_is_no_error(logs: Path) -> None:
-    """`rrrid … --json | head -1` does not complain that its reader has left."""
-    line = f"{' '.join(RRRID)} convert logs --json | head -c 1"
-    done = subprocess.run(["bash", "-c", f"set -o pipefail; {line}"], capture_output=True, text=True, cwd=logs, check=False,
-                          env=os.environ | {"PYTHONPATH": str(REPO)})
-    assert "Traceback" not in done.stderr
-    assert "BrokenPipe" not in done.stderr
-
-
-def test_strange_paths_work(tmp_path: Path) -> None:
-    """C07: spaces, letters of any alphabet and a newline in a path; a path too long for the system is an error of ours."""
-    folder = tmp_path / "Prüf stand\n№ 1"
-    write_log(folder / "ä ö.h5", small_log(name="µ"))
-    done = rrrid("convert", folder, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 1
-    done = rrrid("convert", "x" * 300, cwd=tmp_path)
-    assert done.returncode in (2, 6)
-    assert "Traceback" not in done.stderr
-
-
-def test_hostile_names_reach_no_terminal(tmp_path: Path) -> None:
-    """X09: escape sequences and markup in a log's texts come out as harmless characters."""
-    write_log(tmp_path / "logs/a.h5", small_log(name="\x1b]0;owned\x07[/bold]$a_{", robot_name="../../\x1b[31mrobot"))
-    done = rrrid("convert", "logs", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "\x1b" not in done.stdout + done.stderr
-    assert all(p.is_relative_to(tmp_path / "runs") for p in tmp_path.rglob("provenance.json"))
-
-
-def test_archives_are_not_opened(tmp_path: Path) -> None:
-    """X12: a zip of logs is not unpacked; what can be read is said."""
-    import zipfile
-
-    with zipfile.ZipFile(tmp_path / "logs.zip", "w") as archive:
-        archive.writestr("../../evil.h5", "x")
-    done = rrrid("convert", "logs.zip", cwd=tmp_path)
-    assert done.returncode in (2, 3)
-    assert "neither HDF5 nor Parquet" in done.stderr
-
-
-def test_no_home_no_terminal_no_display(logs: Path) -> None:
-    """P13: HOME missing and read-only, no DISPLAY, a dumb terminal: the command works and says nothing else."""
-    (logs / "home").mkdir(mode=0o555)
-    for home in (logs / "home", Path("/nonexistent")):
-        done = rrrid("convert", "logs", "--out", "out", cwd=logs, env={"HOME": str(home), "TERM": "dumb", "DISPLAY": ""})
-        assert (done.returncode, done.stderr) == (0, "")
-
-
 def test_help_is_quick(tmp_path: Path) -> None:
     """`rrrid --help` needs at most 200 ms of CPU: the least of several runs, for other work on the machine only adds to it."""
     def cpu() -> float:
@@ -297,20 +190,6 @@ def test_a_pattern_that_the_shell_left_is_expanded(logs: Path) -> None:
     assert (logs / "runs/rrr-tue/logs/convert").is_dir()
 
 
-def test_an_unreadable_log_is_exit_6(logs: Path) -> None:
-    """F13: the parser leaves it to rrrid to say what may not be read. The superuser, who may all, is told he may not."""
-    code = ("import os, runpy, sys\n"
-            "import rrrid_cli.main, pipelines.convert, h5py, pipelines.log.hdf5\n"
-            "may = os.access\n"
-            "os.access = lambda path, mode: (mode != os.R_OK or not str(path).endswith('a.h5')) and may(path, mode)\n"
-            "sys.argv = ['rrrid', 'convert', 'logs/a.h5']\n"
-            "rrrid_cli.main.entry()")
-    done = subprocess.run([sys.executable, "-c", code], cwd=logs, env=os.environ | {"PYTHONPATH": str(REPO)}, text=True,
-                          capture_output=True, check=False, timeout=60)
-    assert done.returncode == 6
-    assert done.stderr == "rrrid: RRID-F13 logs/a.h5: permission denied. Change its permissions.\n"
-
-
 def test_all_bad_files_are_named(logs: Path) -> None:
     """One bad file of a folder is exit 3, and the others are named with it: nobody mends them one run at a time."""
     for name in ("b", "c"):
@@ -321,14 +200,6 @@ def test_all_bad_files_are_named(logs: Path) -> None:
     assert done.stderr.startswith("rrrid: RRID-F06 logs/b.h5: neither HDF5 nor Parquet; "
                                   "2 more cannot be used: c.h5 (RRID-F06), d.h5 (RRID-F01). ")
     assert not (logs / "out").exists()
-
-
-def test_an_unwritable_place_is_named_as_it_was_given(logs: Path) -> None:
-    """Exit 6 names --out, never the hidden folder that was to become it."""
-    done = rrrid("convert", "logs", "--out", "/proc/mine", cwd=logs)
-    assert done.returncode == 6
-    assert " /proc/mine: " in done.stderr
-    assert "rrrid-tmp" not in done.stderr
 
 
 def test_what_is_made_of_own_output_stands_beside_it(logs: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 from pipelines.errors import Interrupted, RrridError
 from pipelines.log.files import hash_file, write_log
 from pipelines.log.guard import Answer, guarded
-from tests.cli.test_cli import REPO, RRRID
+from tests.cli.commands import REPO, RRRID
 from tests.log.logs import small_log
 
 RUNS = 15
