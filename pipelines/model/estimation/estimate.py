@@ -1,8 +1,7 @@
 """Estimate base parameters and friction from the equations of several logs.
 
-    found = estimate(identify, columns)             fit, covariance, what is visible
-    judged = held_out(found, validate)              the same numbers on logs that were not fitted
-    apart = by_blocks(identify_equations, blocks)   where there are none: every block judged by the others
+    found = estimate(identify, columns)     fit, covariance, what is visible
+    found.convergence()                     how the parameters settled
 
 Kostić et al. 2004, eq. (12)-(15): the equations of all logs stacked, joints weighted by their own residual.
 """
@@ -20,15 +19,15 @@ from pipelines.fit.convergence import Convergence, convergence
 from pipelines.fit.covariance import Robust, robust_covariance
 from pipelines.fit.equations import Block, split
 from pipelines.fit.identifiability import Unresolved, condition_number, typical_size, unresolved, visible
-from pipelines.fit.least_squares import Errors, Solution, errors, fit, solve
-from pipelines.fit.statistics import Gram, Statistics, gather, gather_growing
+from pipelines.fit.least_squares import Solution, fit
+from pipelines.fit.statistics import Statistics, gather, gather_growing
 from pipelines.model.estimation.regression import Columns
 
-__all__ = ["Estimate", "Stacked", "by_blocks", "estimate", "power_of"]
+__all__ = ["Estimate", "Stacked", "estimate"]
 
 Array = npt.NDArray[np.float64]
 
-_KEPT_IN_MEMORY = 64 << 20  # [B] of conditioned equations; longer ones are made again at every pass
+_KEPT_IN_MEMORY = 4 << 20  # [B] of conditioned equations; longer ones are made again at every pass
 _PARTS = 40  # of the convergence series
 
 
@@ -47,8 +46,10 @@ class Stacked:
         for log in self.logs:
             for block in log:
                 size += sum(v.nbytes for v in block.values)
-                if self._kept is not None and size <= _KEPT_IN_MEMORY:
+                if size <= _KEPT_IN_MEMORY:
                     kept.append(block)
+                else:
+                    kept.clear()
                 yield block
         self._kept = kept if size <= _KEPT_IN_MEMORY else None
 
@@ -107,37 +108,3 @@ def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool =
     fitted = fit(stacked, weights=weights, gram=gram)
     robust = robust_covariance(stacked, fitted.solution, fitted.statistics.longest)
     return Estimate(columns, fitted.solution, robust, fitted.statistics, stacked)
-
-
-def power_of(logs: Sequence[Iterable[Block]], beta: Array) -> Errors:
-    """How β explains the equations of other logs."""
-    return errors(gather(Stacked(logs)), beta)
-
-
-def by_blocks(equations: Iterable[Block], blocks: int, weights: Array) -> Errors:
-    """Contiguous blocks held out once each: every one explained by parameters that the others gave.
-
-    No sample is read more than once: the statistics of the rest are the sum of the other blocks' statistics.
-    """
-    parts = [gather([part]) for part in _cut(list(equations), blocks)]
-    rss, total = np.zeros(len(weights)), _sum(parts)
-    for i, part in enumerate(parts):
-        rest = _sum([other for j, other in enumerate(parts) if j != i])
-        rss += part.rss(solve(rest, weights=weights).beta)
-    counts = np.maximum(total.counts, 1)
-    return Errors(np.sqrt(rss / counts), np.sqrt(total.power / counts), float(np.sqrt(rss.sum() / total.power.sum())),
-                  total.counts, total.samples)
-
-
-def _cut(equations: list[Block], blocks: int) -> list[Block]:
-    """At least `blocks` stretches of about equal length, none across the border of a log."""
-    total = sum(block.samples for block in equations)
-    size = max(1, -(-total // blocks))
-    return [part for block in equations for part in split([block], -(-block.samples // max(1, round(block.samples / size))))]
-
-
-def _sum(parts: Sequence[Gram]) -> Gram:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total

@@ -9,9 +9,10 @@ import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.fit.least_squares import Errors
-from pipelines.fit.statistics import gather
+from pipelines.fit.statistics import Triangles, gather
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.estimation.estimate import Estimate, Stacked, by_blocks, estimate, power_of
+from pipelines.model.estimation.blocks import Stretches, by_blocks, by_stretches
+from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
 from pipelines.model.estimation.regression import Columns, Conditioning, LogEquations, Rows, condition
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
@@ -22,6 +23,7 @@ Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
 _FEWEST = 200  # equations of a fit: ten a parameter of the RRR arm with friction
 _FEWEST_OF_JOINT = 20
+_STRETCHES = 20  # of held-out logs, to see how far errors scatter
 _MOSTLY = 0.01  # of the samples saturated: that is why none is left
 
 
@@ -57,6 +59,7 @@ class Fitted:
     motions: Motions
     recipe: Recipe  # with the cut-off that was used
     errors: Errors  # on the logs that were fitted
+    weighted: bool  # joints by their own residual
 
     @property
     def cutoff_hz(self) -> float | None:
@@ -69,7 +72,9 @@ class Judged:
 
     errors: Errors
     by: str  # "logs" | "blocks"
+    stretches: Stretches  # of time, in order
     motions: Motions
+    equations: tuple[LogEquations, ...]  # that judge; none of other logs where blocks of the fitted ones do
 
 
 def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
@@ -93,7 +98,7 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
     equations = equations_of(motions, recipe, columns, rows)
     _enough(equations, motions[0][0])
     found = estimate(equations, columns, weighted)
-    return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, equations))
+    return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, equations), weighted)
 
 
 def _enough(equations: Sequence[LogEquations], log: ExperimentLog) -> None:
@@ -111,13 +116,15 @@ def judge(fitted: Fitted, motions: Motions, blocks: int, rows: Sequence[Rows] | 
     """Held-out errors: on other logs, or on contiguous blocks of the fitted ones where there are none."""
     found = fitted.estimate
     if not motions:
-        errors = by_blocks(found.equations, blocks, found.solution.weights)
         fitted_to = [one for one in found.equations.logs if isinstance(one, LogEquations)]
-        return Judged(_of_whole_torque(errors, fitted_to), "blocks", ())
+        apart = by_blocks(found.equations, found.statistics.samples, blocks, max(one.guard for one in fitted_to),
+                          triangles=isinstance(found.statistics, Triangles), weighted=fitted.weighted)
+        return Judged(_of_whole_torque(apart.errors, fitted_to), "blocks", apart, (), ())
     for log, _ in motions:
         fitted.recipe.check(log)
     equations = equations_of(motions, fitted.recipe, found.columns, rows)
-    return Judged(_of_whole_torque(power_of(equations, found.beta), equations), "logs", motions)
+    apart = by_stretches(Stacked(equations), sum(one.samples for one in equations), max(blocks, _STRETCHES), found.beta)
+    return Judged(_of_whole_torque(apart.errors, equations), "logs", apart, motions, tuple(equations))
 
 
 def _of_whole_torque(found: Errors, equations: Sequence[LogEquations]) -> Errors:

@@ -34,6 +34,7 @@ _BLOCK = 32768  # samples of the log worked on at once
 _SETTLE = 10.0  # periods of the cut-off after which a fourth-order low-pass has forgotten to 1e-10
 _VAGUE = 2.0  # times the usual standard deviation of the acceleration
 _TOUCHED = 1.0  # periods of the cut-off to either side over which one bad sample spreads
+_MEMORY = 0.05  # [s] of the smoother, where no low-pass has a longer one
 
 
 @dataclass(frozen=True)
@@ -194,6 +195,20 @@ class LogEquations:
             thin = slice(run.start, run.stop, every)
             found += np.sum(~self.rows.out[thin, None] & ~self.rows.slow[thin], axis=0)
         return found
+
+    @property
+    def samples(self) -> int:
+        """Moments that make equations of any joint."""
+        every, end = self.conditioning.decimation, int(self.held)
+        return int(sum(np.sum(~self.rows.out[run.start:run.stop][end:run.stop - run.start - end][-end % every::every])
+                       for run in self.runs))
+
+    @property
+    def guard(self) -> int:
+        """Equations apart, from which on two share no noise: a low-pass spreads a sample's to both sides."""
+        how, step = self.conditioning, self.found.good.log.sample_time
+        reach = _MEMORY if how.cutoff_hz is None else 2.0 * _TOUCHED / how.cutoff_hz
+        return int(np.ceil(reach / (step * how.decimation)))
 
     def times(self) -> Array:
         """The time of every equation [s]."""
