@@ -30,6 +30,7 @@ from pipelines.model.estimation.outcome import Direction, course, parameters, va
 from pipelines.model.estimation.outcome import torques as torque_parts
 from pipelines.model.estimation.result import Result
 from pipelines.model.motion import Reconstructed, reconstruct
+from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report
@@ -61,6 +62,7 @@ class Settings:
     compare: bool = True  # the four ways to reconstruct, side by side
     model: str | None = None  # a model file; its friction is subtracted instead of fitted
     allow_same: bool = False  # one recording may be fitted and judged by
+    allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
 
     @property
     def reconstruction(self) -> Reconstruction:
@@ -83,7 +85,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     Raises:
         NothingMatched: C06, no log to fit.
         UsageError: C02, settings that do not fit, logs of several robots, or a model of another one.
-        InputRejected: the doctor rejects a log: its first reason; T04, no stretch of a log can be used; T08, too few
+        InputRejected: the doctor rejects a log: its first reason; S13, S14, S15, T06, torque and motion of a log do not belong
+            together; T04, no stretch of a log can be used; T08, too few
             equations are left; D14, a log that is fitted shall judge as well.
     """
     identify, validate = _chosen(inputs, settings.allow_same)
@@ -97,8 +100,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
         recipe.check(log)
-    motions, said = _examined(identify, settings.reconstruction)
-    judges, said_too = _examined(validate, settings.reconstruction)
+    motions, said = _examined(identify, settings)
+    judges, said_too = _examined(validate, settings)
     fitted = fit_logs(motions, columns, recipe, settings.weighted)
     judged = judge(fitted, judges, settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
@@ -107,7 +110,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         result, comparison=compare(fitted, judged, settings.blocks, settings.weighted))
 
 
-def _examined(logs: list[ExperimentLog], how: Reconstruction) -> tuple[Motions, tuple[Check, ...]]:
+def _examined(logs: list[ExperimentLog], settings: Settings) -> tuple[Motions, tuple[Check, ...]]:
     """The motion of every log, and what the doctor says of it; of what the logs do not show, D09, the estimate itself knows."""
     motions, said = [], []
     for log in logs:
@@ -115,8 +118,11 @@ def _examined(logs: list[ExperimentLog], how: Reconstruction) -> tuple[Motions, 
         checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
         if reject := next((check for check in checks if check.level == "reject"), None):
             raise reject.as_error()
-        motions.append((log, reconstruct(log, how, subject.good)))
-        said += checks
+        against = mismatches(subject)
+        if not settings.allow_mismatch and (gate := next((check for check in against if check.gate), None)):
+            raise replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch").as_error()
+        motions.append((log, reconstruct(log, settings.reconstruction, subject.good)))
+        said += [*checks, *against]
     return tuple(motions), tuple(said)
 
 

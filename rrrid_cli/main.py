@@ -135,6 +135,7 @@ def estimate_bps(
     unweighted: Annotated[bool, typer.Option("--unweighted", help="All joints alike, as eq. (15).")] = False,
     model: Annotated[str | None, typer.Option(help="Model whose friction is subtracted instead of fitted.")] = None,
     allow_same: AllowSame = None,
+    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Fit torque that looks misplaced.")] = None,
 ) -> None:
     """Estimate base parameters and friction by least squares, with their uncertainty."""
     from pipelines.estimate_bps import STAGE
@@ -144,6 +145,7 @@ def estimate_bps(
         "bandwidth": numbers(bandwidth, "--bandwidth"), "filter": filter,
         "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "blocks": blocks,
         "symmetric": symmetric, "weighted": False if unweighted else None, "model": model, "allow_same": allow_same,
+        "allow_mismatch": allow_mismatch,
         "compare": False if common.no_report else None})
 
 

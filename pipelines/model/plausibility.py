@@ -24,7 +24,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 
-__all__ = ["excitation_condition", "plausibility", "plausibility_findings"]
+__all__ = ["excitation_condition", "mismatches", "plausibility", "plausibility_findings"]
 
 _DOUBLED = 3.0  # 2² - 1: growth of the squared residual when the residual doubles
 _SURE = 5.0  # standard deviations
@@ -42,6 +42,24 @@ def plausibility(subject: Subject) -> tuple[Check, ...]:
 
 def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
     """The same, and which of these questions the log leaves open, and why."""
+    evidence = _evidence(subject)
+    if not isinstance(evidence, Evidence):
+        return evidence
+    misplaced = _misplaced(evidence)
+    return misplaced or (*_fitting(evidence), *_excited(evidence))
+
+
+def mismatches(subject: Subject) -> tuple[Check, ...]:
+    """What S13, S14, S15 and T06 have against one log, for a stage that fits it: checks other than "ok"."""
+    evidence = _evidence(subject)
+    if not isinstance(evidence, Evidence):
+        return ()
+    found = _misplaced(evidence) or _fitting(evidence)
+    return tuple(check for check in found if isinstance(check, Check) and check.level != "ok")
+
+
+def _evidence(subject: Subject) -> Evidence | tuple[NotTested, ...]:
+    """The torque rows of a log; or why there are none."""
     log = subject.log
     if not subject.sampled or not subject.good.time.known:
         return ()
@@ -55,11 +73,17 @@ def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
     body = rigid_body(log.robot)
     if motion is None or len(motion.t) < 4 * (len(body.parameters) + 4):
         return _open(subject, f"too short for the {len(body.parameters) + 4} numbers that explain a joint's torque")
-    evidence = Evidence(subject, body, motion)
-    swapped = torque_columns(evidence) or position_columns(evidence) or encoder_scale(evidence)
-    if swapped:
-        return tuple(swapped)  # nothing else can be said of columns that are in the wrong place
-    return (*_explained(evidence), *_signs(evidence), *_ratios(evidence), *_clock(evidence), *_excited(evidence))
+    return Evidence(subject, body, motion)
+
+
+def _misplaced(e: Evidence) -> tuple[Check, ...]:
+    """Columns in the wrong place, or an angle in the wrong scale: nothing else can be said of such a log."""
+    return tuple(torque_columns(e) or position_columns(e) or encoder_scale(e))
+
+
+def _fitting(e: Evidence) -> tuple[Check | NotTested, ...]:
+    """S13, S14, S15 and T06 of a log whose columns are in their places."""
+    return (*_explained(e), *_signs(e), *_ratios(e), *_clock(e))
 
 
 def _open(subject: Subject, reason: str) -> tuple[NotTested, ...]:

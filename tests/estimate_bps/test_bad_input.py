@@ -113,6 +113,30 @@ def test_every_fault_ends_in_words(row: str, tmp_path: Path) -> None:
         assert estimate_bps.STAGE.exit_code(result, True) == 1 or not gates
 
 
+@pytest.mark.parametrize("row", ["S13 tau", "S13 q", "S14", "S14 all", "S15 torque", "S15 encoder", "T06 drift"])
+@pytest.mark.parametrize("role", ["identify", "validate"])
+def test_torque_of_another_motion_gives_no_parameters(role: str, row: str, tmp_path: Path) -> None:
+    """Swapped joints, a flipped sign, a wrong scale, a clock apart: said before any number, in a log that judges as well."""
+    fault = next(fault for fault in FAULTS if fault.row == row)
+    log = replace(fault.make(good_log()), role=role, name="wrong", experiment="excitation")
+    logs = (log,) if role == "identify" else (replace(good_log(2), role="identify", name="right"), log)
+    with pytest.raises(InputRejected, match=fault.says) as refused:
+        stage(tmp_path, *logs)
+    assert (refused.value.code, refused.value.exit_code) == (f"RRID-{row[:3]}", 3)
+    assert "wrong" in refused.value.where
+    assert "--allow-mismatch" in refused.value.remedy
+
+
+def test_a_mismatch_may_be_fitted_on_purpose(tmp_path: Path) -> None:
+    """--allow-mismatch: the estimate says it and fails --check; an arm built otherwise than described is not locked out."""
+    write_log(tmp_path / "logs/a.h5", with_signal(good_log(), tau=good_log().tau * [1.0, -1.0, 1.0]))
+    command = ("estimate-bps", "logs", "--out", "o", "--no-report", "--check")
+    refused = rrrid(*command, cwd=tmp_path)
+    assert (refused.returncode, "RRID-S14" in refused.stderr, (tmp_path / "o").exists()) == (3, True, False)
+    allowed = rrrid(*command, "--allow-mismatch", cwd=tmp_path)
+    assert (allowed.returncode, "RRID-S14" in allowed.stdout + allowed.stderr) == (1, True), allowed.stderr
+
+
 def test_the_doctor_is_asked(good: ExperimentLog, tmp_path: Path) -> None:
     """T07, less than a period: rejected. D05, a flat top: said, and exit 1 under --check."""
     with pytest.raises(InputRejected) as refused:
