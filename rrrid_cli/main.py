@@ -5,6 +5,7 @@ Heavy modules are imported inside the commands: `rrrid --help` answers at once.
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import sys
@@ -16,7 +17,7 @@ import typer
 
 from pipelines.errors import Interrupted, RrridError, UsageError
 from rrrid_cli.console import Teller, say_error, say_outcome
-from rrrid_cli.options import Common, LogPaths, StageCommand, numbers, with_common
+from rrrid_cli.options import Common, LogPaths, StageCommand, StageGroup, numbers, with_common
 from rrrid_cli.usage import WrongUsage, as_error
 
 __all__ = ["app", "entry"]
@@ -26,7 +27,8 @@ AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One record
 
 STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps")
 
-app = typer.Typer(name="rrrid", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
+                  pretty_exceptions_enable=False, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
                   help="Identify robot arms from logs: what the simulation gets wrong, why, and how much better it can be.")
 
@@ -239,7 +241,7 @@ def _call(words: list[str]) -> None:
         typer.Exit: done, with the exit code.
         UsageError: C01, an unknown option or command; C02, an argument is missing or has the wrong form.
     """
-    command = typer.main.get_command(app)
+    command = typer.main.get_command(_with_only(words[0]) if words else app)
     try:
         with command.make_context("rrrid", list(words)) as context:
             command.invoke(context)
@@ -248,6 +250,15 @@ def _call(words: list[str]) -> None:
             print(problem.format_message(), file=sys.stderr)
             raise typer.Exit(2) from None
         raise as_error(problem) from None
+
+
+def _with_only(word: str) -> typer.Typer:
+    """The application with the one command that is called for; with all of them where `word` is none, for a hint."""
+    named = [command for command in app.registered_commands
+             if word == (command.name or getattr(command.callback, "__name__", None))]
+    narrow = copy.copy(app)
+    narrow.registered_commands = named or app.registered_commands
+    return narrow
 
 
 def _deaf() -> None:

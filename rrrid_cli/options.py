@@ -12,8 +12,9 @@ from typing import Annotated, Any
 import typer
 
 from pipelines.errors import UsageError
+from rrrid_cli.conversion import plainly
 
-__all__ = ["Common", "LogPaths", "StageCommand", "numbers", "with_common"]
+__all__ = ["Common", "LogPaths", "StageCommand", "StageGroup", "numbers", "with_common"]
 
 LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
                                                   readable=False)]  # rrrid says it better: exit 6, RRID-F13
@@ -67,8 +68,18 @@ def _path(words: str, *names: str) -> Any:
     return typer.Option(*names, help=words, readable=False)
 
 
+class StageGroup(typer.core.TyperGroup):
+    """All commands together, with --help and --version."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return plainly(super().get_params(ctx))
+
+
 class StageCommand(typer.core.TyperCommand):
     """A command whose help ends in what --set takes. The stage is imported for its own help alone."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return plainly(super().get_params(ctx))
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         from rrrid_cli.settings import known_options
