@@ -24,6 +24,7 @@ from pipelines.log.derive import derived_by
 from pipelines.log.doctor.faults import Mask
 from pipelines.log.doctor.segments import Usable, long_blocks, usable
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.order_statistics import distinct
 from pipelines.model.rigid.body import Motion
 from pipelines.model.tuned import METHODS, Observers, Reconstruction, encoder_resolution, tuned_observers
 from pipelines.signal.grid import Grid, Tracker, grids, on_grid
@@ -163,7 +164,7 @@ def _padded(observer: Observer, filter_: Callable[[Array, Indices | None], Track
         lead = present.argmax(axis=0)
         lead[lead <= _LEAD] = 0
         lead[present.sum(axis=0) <= order] = len(y)  # fewer samples than states: the joint is not known here
-        for first in np.unique(lead[lead < len(y)]).tolist():
+        for first in distinct(lead[lead < len(y)]).tolist():
             joints = np.flatnonzero(lead == first)
             whole = len(joints) == y.shape[1]
             track = filter_(y[first:], None) if whole else filter_(y[first:, joints], joints)

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from pipelines.log import limits
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.limits import ABSURD, GAP_LIMIT, GAP_TICKS, sentinels
+from pipelines.log.order_statistics import distinct, median, quantile
 
 __all__ = ["GAP_LIMIT", "Mask", "TimeBase", "jumps", "lagged_speed", "missing", "quantum", "saturated",
            "spikes", "time_base", "torque_limit"]
@@ -68,8 +69,8 @@ def time_base(log: ExperimentLog) -> TimeBase:
         return TimeBase("s", 1.0, False, nominal, undefined, np.flatnonzero(interval < 0.0), none,
                         np.flatnonzero(interval == 0.0), none, np.zeros(0), none, 0, 0.0, 0.0, False)
     unit, scale, is_rate = _time_unit(t, forward, nominal)
-    median = float(np.median(forward)) * scale
-    tick = nominal if unit and not is_rate else median
+    typical = float(median(forward)) * scale
+    tick = nominal if unit and not is_rate else typical
     with np.errstate(over="ignore", invalid="ignore"):
         ticks = interval * scale / tick
     same = np.flatnonzero(interval == 0.0)
@@ -77,21 +78,21 @@ def time_base(log: ExperimentLog) -> TimeBase:
     gaps = np.flatnonzero(ticks > GAP_TICKS)
     rms, worst = limits.jitter(ticks)
     late = limits.late(ticks, rms)
-    return TimeBase(unit, scale, is_rate, median, undefined, np.flatnonzero(interval < 0.0), same[exact], same[~exact],
+    return TimeBase(unit, scale, is_rate, typical, undefined, np.flatnonzero(interval < 0.0), same[exact], same[~exact],
                     gaps, interval[gaps] * scale, late, int(np.sum(np.rint(ticks[late]) - 1)), rms, worst, True)
 
 
 def _time_unit(t: Array, forward: Array, nominal: float) -> tuple[str, float, bool]:
     """What unit makes the steps of `t` the nominal sample time: (unit, seconds per unit, sample_time is a rate)."""
-    median, mean = float(np.median(forward)), float(np.mean(forward))
-    if any(abs(step / nominal - 1.0) < 0.1 for step in (median, mean)):
+    typical, mean = float(median(forward)), float(np.mean(forward))
+    if any(abs(step / nominal - 1.0) < 0.1 for step in (typical, mean)):
         return "s", 1.0, False
-    if median < nominal and abs(median * nominal - 1.0) < 0.02:
+    if typical < nominal and abs(typical * nominal - 1.0) < 0.02:
         return "s", 1.0, True
     units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-    if median == 1.0 and bool(np.all(np.rint(forward) == forward)):
+    if typical == 1.0 and bool(np.all(np.rint(forward) == forward)):
         units["samples"] = nominal
-    fits = {unit: factor for unit, factor in units.items() if abs(median * factor / nominal - 1.0) < 0.02}
+    fits = {unit: factor for unit, factor in units.items() if abs(typical * factor / nominal - 1.0) < 0.02}
     if not fits or max(fits.values()) > 1.02 * min(fits.values()):
         return "", 1.0, False
     unit = next(iter(fits))
@@ -110,7 +111,7 @@ def missing(x: Array) -> Mask:
 
 def quantum(x: Array) -> float | None:
     """The step in which `x` (samples,) was counted, or None where no step is visible."""
-    values = np.unique(x[np.isfinite(x)])
+    values = distinct(x[np.isfinite(x)])
     if values.size < 20:
         return None
     steps = np.diff(values)
@@ -118,7 +119,7 @@ def quantum(x: Array) -> float | None:
     if steps.size < 19:
         return None
     # the smallest ten: one alone may be a rounding error of the recording
-    step = float(np.median(np.partition(steps, 9)[:10]))
+    step = float(median(np.partition(steps, 9)[:10]))
     counts = steps[steps < 1000 * step] / step
     return step if float(np.mean(np.abs(counts - np.rint(counts)) < 0.05)) > 0.98 else None
 
@@ -159,7 +160,7 @@ def spikes(x: Array, smooth: bool, floor: Array) -> Mask:
         # a kink, as at a hard stop, continues one of its sides
         alone = np.minimum(np.abs(x[middle] - left), np.abs(x[middle] - right)) > 0.6 * off
         with np.errstate(invalid="ignore"):
-            limit = np.maximum(4.0 * np.quantile(off, 0.99, axis=0), floor)
+            limit = np.maximum(4.0 * quantile(off, 0.99), floor)
             candidate = (off > limit) & alone & (np.abs(left - right) < 0.4 * off) & (spread < 0.4 * off)
         found[middle] |= candidate & _stands_out_locally(off, candidate)
     return found
@@ -171,7 +172,7 @@ def _stands_out_locally(off: Array, candidate: Mask) -> Mask:
     around = np.clip(row[:, None] + np.concatenate([np.arange(-29, -4), np.arange(5, 30)]), 0, len(off) - 1)
     values = np.where(np.isfinite(near := off[around, column[:, None]]), near, 0.0)
     result = np.zeros_like(candidate)
-    result[row, column] = off[row, column] > 4.0 * np.quantile(values, 0.9, axis=1) if row.size else False
+    result[row, column] = off[row, column] > 4.0 * quantile(values, 0.9, axis=1) if row.size else False
     return result
 
 
@@ -232,10 +233,10 @@ def jumps(q: Array) -> tuple[Mask, Array]:
     if len(step) < 8:
         return np.zeros(step.shape, dtype=bool), np.zeros(step.shape)
     padded = np.pad(step, ((3, 3), (0, 0)), mode="edge")
-    around = np.median(np.stack([padded[k:k + len(step)] for k in (0, 1, 2, 4, 5, 6)]), axis=0)
+    around = median(np.stack([padded[k:k + len(step)] for k in (0, 1, 2, 4, 5, 6)]))
     excess = step - around
     excess = np.where(np.isfinite(excess), excess, 0.0)
-    usual = np.quantile(np.abs(excess), 0.99, axis=0)
+    usual = quantile(np.abs(excess), 0.99)
     with np.errstate(invalid="ignore"):
         jump = np.abs(excess) > np.maximum(30.0 * usual, 0.02)
         ahead = np.pad(excess, ((0, 2), (0, 0)))  # a glitch comes back within two samples; a jump stays

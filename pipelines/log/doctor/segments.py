@@ -31,6 +31,7 @@ from pipelines.log.doctor.faults import (
 from pipelines.log.doctor.stop import emergency_stop
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.limits import GAP_LIMIT, GAP_TICKS, SHORTEST
+from pipelines.log.order_statistics import quantile
 
 __all__ = ["SHORTEST", "Usable", "unwrapped", "usable"]
 
@@ -101,7 +102,7 @@ def _torque_floor(log: ExperimentLog) -> Array:
     """(joints,) [N m] 5 % of the range, 1 % of the limit, and what one encoder step does through the controller."""
     with np.errstate(invalid="ignore"):
         finite = np.where(np.isfinite(log.tau), log.tau, 0.0)
-    low, high = np.quantile(finite, (0.01, 0.99), axis=0) if len(finite) else np.zeros((2, log.n_joints))
+    low, high = (quantile(finite, share) if len(finite) else np.zeros(log.n_joints) for share in (0.01, 0.99))
     limit = torque_limit(log)
     floor = np.maximum(0.05 * (high - low), np.where(np.isfinite(limit), 0.01 * limit, 0.0))
     control = log.controller

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from pipelines.log.doctor.faults import Mask, lagged_speed
 from pipelines.log.experiment import ExperimentLog
+from pipelines.log.order_statistics import median, quantile
 
 __all__ = ["emergency_stop"]
 
@@ -27,7 +28,7 @@ def _lost_reference(log: ExperimentLog) -> tuple[int, str] | None:
     error = np.abs(log.q - log["q_ref"])
     measured = np.isfinite(error)
     spread = np.std(np.where(np.isfinite(log["q_ref"]), log["q_ref"], 0.0), axis=0)
-    usual = np.median(np.where(measured, error, 0.0), axis=0)
+    usual = median(np.where(measured, error, 0.0))
     lost = (error > np.maximum(np.maximum(0.05, 0.25 * spread), 8.0 * usual)) | ~measured
     starts = _start_of_last_run(lost & measured.any(axis=0))
     joint = int(starts.argmin())
@@ -43,7 +44,7 @@ def _power_cut(log: ExperimentLog, shortest: int) -> tuple[int, str] | None:
     start = int(_start_of_last_run((log.tau == 0.0).all(axis=1)[:, None])[0])
     speed = np.abs(lagged_speed(log.q, log.sample_time))
     speed = np.where(np.isfinite(speed), speed, 0.0)
-    usual = np.quantile(speed, 0.75, axis=0)
+    usual = quantile(speed, 0.75)
     before = speed[max(0, start - shortest):start]
     moving = ((before.max(axis=0, initial=0.0) > 0.3 * usual) & (usual > 0)).any()
     return (start, "all torques drop to zero while the arm moves") if moving and log.experiment != "friction" else None

@@ -10,6 +10,7 @@ from pipelines.fit.consistency import physical_consistency
 from pipelines.fit.equations import Block
 from pipelines.fit.least_squares import solve
 from pipelines.fit.statistics import gather
+from pipelines.log.order_statistics import median
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.logs import Fitted
 from pipelines.model.motion import Reconstructed
@@ -108,7 +109,7 @@ def _balances(fitted: Fitted, found: Reconstructed, run: slice, held: bool) -> B
         tau = np.vstack([tau[:1], 0.5 * (tau[1:] + tau[:-1])])
     if fitted.recipe.known is not None:
         tau = tau - fitted.recipe.known(whole)
-    size = max(2, round(_WINDOW / float(np.median(np.diff(whole.t)))))
+    size = max(2, round(_WINDOW / float(median(np.diff(whole.t)))))
     ends = np.arange(size, len(rows) - size, size)
     if len(ends) < 3 * len(columns.names) or not (np.isfinite(tau).all() and np.isfinite(q + whole.dq).all()):
         return None

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.equations import Block
+from pipelines.log.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Array, Motion, RigidBody
@@ -266,7 +267,8 @@ class LogEquations:
         if self.found.std is None:
             return np.zeros(self.found.motion.q.shape, dtype=bool)
         std = self.found.std[2]
-        return np.asarray(std > _VAGUE * np.nanmedian(std, axis=0))
+        usual = np.array([median(column[~np.isnan(column)]) for column in std.T])
+        return np.asarray(std > _VAGUE * usual)
 
     @cached_property
     def _unknown(self) -> npt.NDArray[np.bool_]:
