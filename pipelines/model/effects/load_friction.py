@@ -1,0 +1,67 @@
+"""Friction that grows with the torque that the joint carries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["LoadFriction"]
+
+
+@dataclass(frozen=True)
+class LoadFriction(Effect):
+    """τ = µ |τ_0| tanh(w v), with τ_0 the torque of the joint without it: Coulomb friction Fc + µ |τ_0|."""
+
+    sharpness: float = 100.0  # w [s/rad]
+
+    name = "load_friction"
+    title = "Friction that grows with load"
+    parameters = (
+        Quantity("mu", "1", 0.0, 0.5, "friction per unit of transmitted torque"),
+        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
+    )
+    signature = "Friction that grows with the torque the joint carries and changes sign with the direction of motion."
+    explanation = "Teeth and bearings are pressed together by the torque that passes them, and rub in proportion."
+    remedy = "Compensate it with the predicted torque; check the lubrication of the gear."
+    experiment = "Move the joint at one speed in both directions under three loads: three postures, or payloads."
+    twins = ("torque_gain", "position_friction")
+    friction = True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, np.abs(self.own(arm.torque(motion))) * np.tanh(self.sharpness * self.own(motion.dq)))
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
+            yield replace(self, sharpness=sharpness)
+
+    def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
+        """Under the load that the joint carries at rest."""
+        still = np.zeros((1, arm.n_joints))
+        load = float(self.own(arm.torque(Motion(np.zeros(1), still, still, still)))[0])
+        return np.asarray(values["mu"] * abs(load) * np.tanh(values["sharpness"] * dq))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        """The load is the torque of everything inside it, other effects included."""
+        tau = predict(motion, arm) if predict is not None else arm.torque(motion)
+        own, side = self.own(tau), np.tanh(values["sharpness"] * self.own(motion.dq))
+        tau[:, self._index] = own + values["mu"] * np.abs(own) * side
+        return tau
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """What the drive applies, τ, is the load τ_0 and the friction it causes: τ_0 = τ/(1 + µ sign(τ) tanh(w v)).
+
+        Solved for the load, because the load holds the acceleration that is being computed.
+        """
+        def applied(command: Array, motion: Motion, _: Array) -> Array:
+            left = command.copy()
+            side = np.sign(self.own(command)) * np.tanh(values["sharpness"] * self.own(motion.dq))
+            left[..., self._index] = self.own(command) / (1.0 + values["mu"] * side)
+            return left
+
+        return Hooks(actuator=applied)

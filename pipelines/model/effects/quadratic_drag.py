@@ -1,0 +1,31 @@
+"""Quadratic drag: a torque that grows with the square of speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["QuadraticDrag"]
+
+
+@dataclass(frozen=True)
+class QuadraticDrag(Effect):
+    """τ = c v |v|."""
+
+    name = "quadratic_drag"
+    title = "Quadratic drag"
+    parameters = (Quantity("coefficient", "N m s^2/rad^2", 0.0, 10.0, "torque at unit speed"),)
+    signature = "A torque that grows with the square of speed, against the motion."
+    explanation = "Windage, and oil that is churned by gears or fills a bearing."
+    remedy = "Compensate it in the feed-forward; check the oil level."
+    experiment = "Move the joint in both directions at seven to ten constant speeds up to the highest it allows."
+    twins = ("stribeck", "concave_friction", "viscous")
+    friction = True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        v = self.own(motion.dq)
+        return self.on_own_row(arm, v * np.abs(v))

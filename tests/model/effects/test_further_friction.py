@@ -1,0 +1,103 @@
+"""Friction laws beside equation (10): each against a solution of its own equation by other means."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pipelines.model.effects.asymmetric_friction import AsymmetricFriction
+from pipelines.model.effects.load_friction import LoadFriction
+from pipelines.model.effects.position_friction import PositionFriction
+from pipelines.model.effects.presliding import Presliding
+from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_model import synthetic_arm
+
+
+def swinging(hz: float = 0.7, samples: int = 4001) -> Motion:
+    """Joint 2 swings with two frequencies and reverses many times; the others rest."""
+    t = np.linspace(0.0, 4.0, samples)
+    w = 2 * np.pi * hz
+    q, dq, ddq = (np.zeros((samples, 3)) for _ in range(3))
+    q[:, 1] = 0.3 * np.sin(w * t) + 0.05 * np.sin(5.3 * w * t)
+    dq[:, 1] = 0.3 * w * np.cos(w * t) + 0.05 * 5.3 * w * np.cos(5.3 * w * t)
+    ddq[:, 1] = -0.3 * w**2 * np.sin(w * t) - 0.05 * (5.3 * w) ** 2 * np.sin(5.3 * w * t)
+    return Motion(t, q, dq, ddq)
+
+
+def bristles(motion: Motion, distance: float) -> Array:
+    """du/dt = (v - |v| u)/x_c, by an adaptive integrator over the true speed."""
+    w = 2 * np.pi * 0.7
+
+    def rate(t: float, u: Array) -> Array:
+        v = 0.3 * w * np.cos(w * t) + 0.05 * 5.3 * w * np.cos(5.3 * w * t)
+        return np.asarray((v - abs(v) * u) / distance)
+
+    solved = solve_ivp(rate, (0.0, 4.0), [0.0], t_eval=motion.t, rtol=1e-9, atol=1e-11, max_step=2e-3)
+    return np.asarray(solved.y[0])
+
+
+@pytest.mark.parametrize("distance", [0.003, 0.03, 0.2])
+@pytest.mark.parametrize("time", [0.0, 2e-3])
+def test_presliding_solves_its_differential_equation(distance: float, time: float) -> None:
+    """Dahl and LuGre along a motion with reversals. Between the samples a turning point is missed by a T²/8 of travel at most,
+    there and back."""
+    motion, arm = swinging(), synthetic_arm()
+    u = bristles(motion, distance)
+    v = motion.dq[:, 1]
+    expected = 2.0 * (u + time * (v - np.abs(v) * u) / distance)
+    found = Presliding(2).torque(motion, arm, {"amplitude": 2.0, "distance": distance, "damping_time": time})[:, 1]
+    missed = 2.0 * np.abs(motion.ddq).max() * 1e-3**2 / 8.0 / distance
+    assert np.abs(found - expected).max() < (missed + 1e-4) * np.abs(expected).max()
+
+
+def test_presliding_starts_again_from_where_it_was() -> None:
+    """A pause changes nothing: bristles stay bent."""
+    motion, arm = swinging(), synthetic_arm()
+    stop = np.concatenate([np.arange(1500), np.full(300, 1500), np.arange(1500, 4001)])
+    paused = Motion(np.arange(len(stop)) * 1e-3, motion.q[stop], motion.dq[stop], motion.ddq[stop])
+    whole, halted = (Presliding(2, distance=0.02).columns(m, arm)[:, 1, 0] for m in (motion, paused))
+    np.testing.assert_allclose(np.delete(halted, np.arange(1500, 1800)), whole, atol=1e-12)
+
+
+@pytest.mark.parametrize("time", [0.0, 1e-3])
+def test_presliding_simulates_as_it_fits(time: float) -> None:
+    """The state of the forward simulation, stepped along the motion, gives the torque of the fit."""
+    motion, arm = swinging(), synthetic_arm()
+    values = {"amplitude": 1.5, "distance": 0.05, "damping_time": time}
+    hooks = Presliding(2).simulate(arm, values)
+    assert hooks.load is not None
+    assert hooks.rate is not None
+    z, loads = np.zeros((1, hooks.states)), []
+    for k in range(len(motion.t)):
+        now = Motion(motion.t[[k]], motion.q[[k]], motion.dq[[k]], motion.ddq[[k]])
+        loads.append(hooks.load(now, z)[0, 1])
+        z = z + 1e-3 * hooks.rate(now, np.zeros((1, 3)), z)
+    assert np.abs(np.array(loads) - Presliding(2).torque(motion, arm, values)[:, 1]).max() < 0.04
+
+
+def test_load_friction_of_the_simulation_is_that_of_the_log() -> None:
+    """What the drive gives, less what friction takes, is the load: forward and inverse form are one."""
+    motion, arm = swinging(), synthetic_arm()
+    values = {"mu": 0.2, "sharpness": 80.0}
+    logged = LoadFriction(2).apply(motion, arm, values)
+    hooks = LoadFriction(2).simulate(arm, values)
+    assert hooks.actuator is not None
+    carried = hooks.actuator(logged, motion, np.zeros((len(motion.t), 0)))
+    np.testing.assert_allclose(carried, arm.torque(motion), rtol=1e-12, atol=1e-12)
+
+
+def test_position_friction_is_a_wave_along_the_turn() -> None:
+    """Amplitude, order and phase mean A sin(k q + φ) against the direction of motion."""
+    motion, arm = swinging(), synthetic_arm()
+    found = PositionFriction(2).torque(motion, arm, {"amplitude": 0.7, "order": 3.0, "phase": 0.4, "sharpness": 50.0})[:, 1]
+    expected = 0.7 * np.sin(3.0 * motion.q[:, 1] + 0.4) * np.tanh(50.0 * motion.dq[:, 1])
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_asymmetric_friction_adds_half_to_each_side() -> None:
+    """Fc + ½ ΔFc one way, Fc - ½ ΔFc the other, likewise Fv."""
+    values = {"coulomb_difference": 0.6, "viscous_difference": 0.2, "sharpness": 500.0}
+    forth, back = AsymmetricFriction(1).curve(np.array([2.0, -2.0]), synthetic_arm(), values)
+    assert forth == pytest.approx(0.3 + 0.2)
+    assert back == pytest.approx(0.3 + 0.2)
