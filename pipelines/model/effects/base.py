@@ -29,7 +29,7 @@ import numpy as np
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["ArmModel", "Effect", "Hooks", "Predict", "Quantity", "Values"]
+__all__ = ["ArmModel", "Effect", "Hooks", "Predict", "Quantity", "SpeedCurve", "Values"]
 
 Values = Mapping[str, float]
 
@@ -82,12 +82,26 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class SpeedCurve:
+    """A torque that depends on the speed of its own joint alone: τ = constant + viscous v + Σ height tanh(sharpness v).
+
+    What has this form the simulation computes for all joints at once, and for one robot without any array.
+    """
+
+    constant: float = 0.0  # [N m]
+    viscous: float = 0.0  # [N m s/rad]
+    heights: tuple[float, ...] = ()  # [N m]
+    sharpnesses: tuple[float, ...] = ()  # [s/rad]
+
+
+@dataclass(frozen=True)
 class Hooks:
     """How an effect enters the forward simulation. What is left out changes nothing.
 
     The first axis of every array holds replicas, so that many simulations run at once. `states` numbers of memory each
-    replica keeps; `rate` moves them in continuous time, `update` once per control sample (a delay line). The motion
-    handed in is the true one with ddq zero: what multiplies acceleration goes to `inertia` or `arm`.
+    replica keeps, zero or `start` at the start; `rate` moves them in continuous time, `update` once per control sample
+    (a delay line): after `sensor` was asked, before the command acts. The motion handed in is the true one with ddq
+    zero: what multiplies acceleration goes to `inertia` or `arm`.
     """
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
@@ -96,6 +110,7 @@ class Hooks:
     inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)
     arm: ArmModel | None = None  # the arm as it truly is
     states: int = 0
+    start: Callable[[Motion, Array], Array] | None = None  # motion and torque at the first sample -> states
     rate: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> d(states)/dt
     update: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> next states
 
@@ -173,6 +188,10 @@ class Effect(ABC):
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """How it enters the forward simulation; by default as a load."""
         return Hooks(load=lambda motion, _: self.torque(motion, arm, values))
+
+    def speed_curve(self, values: Values) -> SpeedCurve | None:
+        """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
+        return None
 
     def own(self, signal: Array) -> Array:
         """Column of its own joint, (samples,)."""

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Coulomb"]
@@ -42,6 +42,9 @@ class Coulomb(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, np.tanh(self.sharpness * self.own(motion.dq)))
+
+    def speed_curve(self, values: Values) -> SpeedCurve:
+        return SpeedCurve(heights=(values["level"],), sharpnesses=(values["sharpness"],))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ThreeSigmoid"]
@@ -47,6 +47,10 @@ class ThreeSigmoid(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)
         return self.on_own_row(arm, np.tanh(self.w1 * v), np.tanh(self.w2 * v), np.tanh(self.w3 * v), v)
+
+    def speed_curve(self, values: Values) -> SpeedCurve:
+        return SpeedCurve(viscous=values["b"], heights=tuple(values[f"f{k}"] for k in (1, 2, 3)),
+                          sharpnesses=tuple(values[f"w{k}"] for k in (1, 2, 3)))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """w1 > w2 > w3 on a geometric grid between the fastest and the slowest speeds that this motion holds."""

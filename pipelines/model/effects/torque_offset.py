@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueOffset"]
@@ -27,3 +27,6 @@ class TorqueOffset(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, np.ones(len(motion.t)))
+
+    def speed_curve(self, values: Values) -> SpeedCurve:
+        return SpeedCurve(constant=values["offset"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Viscous"]
@@ -26,3 +26,6 @@ class Viscous(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self.own(motion.dq))
+
+    def speed_curve(self, values: Values) -> SpeedCurve:
+        return SpeedCurve(viscous=values["coefficient"])

@@ -1,0 +1,42 @@
+"""The simulation of an arm model: closed-loop forward dynamics with friction and effects, many replicas at once.
+
+    experiment = Experiment.of_log(log)                    references, controller and encoders of a log
+    simulated = simulate(arm, experiment, noise, seeds=range(10))
+    simulated.q, simulated.tau                             (replicas, samples, joints): what each replica would have logged
+
+    windows = simulate_windows(Plant.of(arm), motion, tau, …)      where the controller is unknown
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pipelines.model.arm import Arm
+from pipelines.model.rigid.body import Array
+from pipelines.model.simulation.accuracy import Step, choose_step
+from pipelines.model.simulation.experiment import Experiment
+from pipelines.model.simulation.plant import Plant
+from pipelines.model.simulation.run import Noise, Simulated, run
+from pipelines.model.simulation.windows import Windows, simulate_windows
+
+__all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "run", "simulate", "simulate_windows"]
+
+
+def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds: Iterable[int] = (0,), p: Array | None = None,
+             steps: int | None = None) -> Simulated:
+    """What `arm` would have logged in `experiment`, once for each seed.
+
+    Args:
+        noise: of drives and encoders; none where left out.
+        p: (replicas, parameters) base parameters of each replica, where they differ.
+        steps: of the integrator, a sample; by default as few as `choose_step` allows.
+
+    Raises:
+        InputRejected: D17, the arm runs away, or no step is small enough.
+        ValueError: p does not fit the arm or the seeds.
+    """
+    seeds = tuple(seeds)
+    if p is not None and len(p) != len(seeds):
+        raise ValueError(f"p has {len(p)} rows for {len(seeds)} seeds")
+    plant = Plant.of(arm, p)
+    return run(plant, experiment, choose_step(plant, experiment, noise).per_sample if steps is None else steps, noise, seeds)

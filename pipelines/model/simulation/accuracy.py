@@ -1,0 +1,99 @@
+"""Choose the integrator's step: as large as its error allows, which is a tenth of what different noise does.
+
+The error is measured, not guessed: stretches of the experiment are run with m and 2m steps a sample, without noise and without
+quantisation, whose flips would hide it; two runs with different noise say what may be wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.errors import InputRejected
+from pipelines.model.rigid.body import Array
+from pipelines.model.simulation.experiment import Experiment
+from pipelines.model.simulation.plant import Plant
+from pipelines.model.simulation.run import Noise, run
+
+__all__ = ["Step", "choose_step"]
+
+_STRETCH = 0.4  # [s] length of a stretch that is tried
+_SHARE = 0.1  # of the noise difference that the step may cause
+_CANDIDATES = (1, 2, 4, 8, 16, 32, 64)  # steps a sample
+_AMPLE = 8  # steps a sample, where noise is what matters
+_UNHEARD = 1e-9  # [rad] tolerance where nothing is random and nothing counts steps
+
+
+@dataclass(frozen=True)
+class Step:
+    """How many integrator steps a sample, and what that was judged by. Arrays per joint."""
+
+    per_sample: int
+    error: Array  # [rad] rms, largest of the stretches, measured by halving
+    noise: Array  # [rad] rms difference of two runs with different noise
+    allowed: Array  # [rad]
+
+
+def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None) -> Step:
+    """The fewest Runge-Kutta steps a sample whose error is at most a tenth of the difference that noise makes.
+
+    Raises:
+        InputRejected: D17, the arm runs away however small the step, or the step would be too small to be of use.
+    """
+    one = plant if plant.p.ndim == 1 else replace(plant, p=plant.p[0])
+    stretches = [experiment.part(first, samples) for first, samples in _stretches(experiment)]
+    random = _noise_difference(one, stretches, noise or Noise.none(experiment.n_joints))
+    counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two counts that have nothing to do with each other
+    allowed = np.maximum(_SHARE * np.maximum(random, counted), _UNHEARD)
+    calm = [_without_steps(stretch) for stretch in stretches]
+    coarse = _positions(one, calm, _CANDIDATES[0])
+    for steps, finer in zip(_CANDIDATES, (*_CANDIDATES[1:], 2 * _CANDIDATES[-1]), strict=True):
+        fine = _positions(one, calm, finer)
+        error = _rms(coarse, fine)
+        if (error <= allowed).all():
+            return Step(steps, error, random, allowed)
+        coarse = fine
+    raise InputRejected("D17", f"with {_CANDIDATES[-1]} steps a sample the simulation still is {error.max():.2g} rad off",
+                        remedy="friction that changes sign within a very small speed needs a lower sharpness")
+
+
+def _stretches(experiment: Experiment) -> list[tuple[int, int]]:
+    """The first one, where the arm starts, and the one in which joints reverse most often, where friction turns over."""
+    length = min(experiment.n_samples, max(2, round(_STRETCH / experiment.sample_time)))
+    reversals = (np.diff(np.signbit(experiment.dq_ref), axis=0) != 0).sum(axis=1)
+    inside = np.convolve(reversals, np.ones(length))[length - 1:len(reversals)]
+    busiest = int(np.argmax(inside)) if len(inside) else 0
+    return [(0, length)] if busiest == 0 else [(0, length), (busiest, length)]
+
+
+def _without_steps(experiment: Experiment) -> Experiment:
+    """The same with ideal encoders and commands of any fineness."""
+    controller = replace(experiment.controller, torque_resolution=None)
+    return replace(experiment, controller=controller, resolution=np.zeros(experiment.n_joints))
+
+
+def _positions(plant: Plant, stretches: list[Experiment], steps: int) -> list[Array]:
+    """True positions (samples, joints) of each stretch; not a number where the arm runs away: the step is too large then."""
+    found = []
+    for stretch in stretches:
+        try:
+            with np.errstate(all="ignore"):
+                found.append(run(plant, stretch, steps).true_q[0])
+        except (InputRejected, OverflowError):
+            found.append(np.full(stretch.q_ref.shape, np.nan))
+    return found
+
+
+def _noise_difference(plant: Plant, stretches: list[Experiment], noise: Noise) -> Array:
+    """Rms difference [rad] (joints,) of two runs with different noise."""
+    if not (noise.torque.any() or noise.position.any()):
+        return np.zeros(len(noise.torque))
+    some, others = ([run(plant, stretch, _AMPLE, noise, (seed,)).true_q[0] for stretch in stretches] for seed in (1, 2))
+    return _rms(some, others)
+
+
+def _rms(some: list[Array], others: list[Array]) -> Array:
+    """The largest rms difference of any pair (joints,); infinite where one of them ran away."""
+    each = np.array([np.sqrt(np.mean((a - b) ** 2, axis=0)) for a, b in zip(some, others, strict=True)])
+    return np.asarray(np.where(np.isfinite(each), each, np.inf).max(axis=0))

@@ -1,0 +1,147 @@
+"""The controller of an experiment, sample by sample, for many replicas: laws (23)-(27) of Kostić et al. 2004.
+
+    pd               τ = -Kp ē - Kd dē - Ki ∫e + v                                       eq. (23)
+    pd+feedforward   the same, and the chosen parts of the model's torque on the reference   eq. (24)
+    computed-torque  τ = D(q̄) r + c(q̄, dq̄) + h(q̄) + τ_f(dq̄),  r = ddq_r - Kp ē - Kd dē - Ki ∫e + v      eq. (25)-(27)
+    open-loop        the logged torque on the joints it drives; the others are held by pd
+
+e = q - q_r. ē and dē come from the observer, eq. (20)-(21), which filters e and starts with zero error, or are e itself and its
+backward difference.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.simulation.experiment import Experiment
+
+__all__ = ["Controlling"]
+
+
+class Controlling:
+    """The memory of the controllers of all replicas: observer, integral, delayed command. Joints first, replicas last."""
+
+    def __init__(self, experiment: Experiment, replicas: int) -> None:
+        n = experiment.n_joints
+        self._experiment = experiment
+        law = experiment.controller
+        zeros = np.zeros((n, 1))
+        self._kp, self._kd, self._ki = (zeros if gain is None else gain[:, None] for gain in (law.kp, law.kd, law.ki))
+        self._integrating = bool(self._ki.any())
+        self._integral = np.zeros((n, replicas))
+        self._estimate = _estimator(experiment, replicas)
+        self._feedforward = _feedforward(experiment)
+        self._waiting: Array | None = None  # of a delayed command
+        self._limit = None if law.output_limit is None else law.output_limit[:, None]
+        self._resolution = _steps(law.torque_resolution)
+
+    def command(self, k: int, q: Array) -> Array:
+        """The torque [N m] that is commanded at sample k, q (joints, replicas) being what the encoders then say."""
+        torque = self._limited(self._law(k, q))
+        if not self._experiment.controller.delay:
+            return torque
+        held, self._waiting = torque if self._waiting is None else self._waiting, torque
+        return held
+
+    def _law(self, k: int, q: Array) -> Array:
+        experiment = self._experiment
+        error = q - experiment.q_ref[k][:, None]
+        e, de = self._estimate(k, error)
+        feedback = -self._kp * e
+        feedback -= self._kd * de
+        if self._integrating:
+            self._integral += experiment.sample_time * error
+            feedback -= self._ki * self._integral
+        if experiment.v is not None:
+            feedback += experiment.v[k][:, None]
+        if experiment.controller.law == "computed-torque":
+            return self._linearising(k, e, de, feedback)
+        if self._feedforward is not None:
+            feedback += self._feedforward[k][:, None]
+        if experiment.driven is not None and experiment.tau is not None:
+            feedback[experiment.driven] = experiment.tau[k, experiment.driven][:, None]
+        return feedback
+
+    def _linearising(self, k: int, e: Array, de: Array, feedback: Array) -> Array:
+        experiment = self._experiment
+        assert experiment.feedforward_arm is not None  # Experiment.of_log refuses the law without it
+        r = experiment.ddq_ref[k][:, None] + feedback
+        t: Array = np.full(e.shape[1], experiment.start_time + k * experiment.sample_time)
+        now = Motion(t, (experiment.q_ref[k][:, None] + e).T, (experiment.dq_ref[k][:, None] + de).T,
+                     np.ascontiguousarray(r.T))
+        return np.ascontiguousarray(_parts(experiment, now).T)
+
+    def _limited(self, torque: Array) -> Array:
+        """After quantisation, as the log has it."""
+        if self._limit is not None:
+            torque = np.clip(torque, -self._limit, self._limit)
+        if self._resolution is not None:
+            step, inverse = self._resolution
+            torque = np.rint(torque * inverse) * step
+        return torque
+
+
+def _steps(resolution: Array | None) -> tuple[Array, Array] | None:
+    """Steps of the command and their inverse (joints, 1); a joint without steps gets ones too fine to see."""
+    if resolution is None or not resolution.any():
+        return None
+    step = np.where(resolution > 0.0, resolution, 1e-12)[:, None]
+    return step, 1.0 / step
+
+
+def _feedforward(experiment: Experiment) -> Array | None:
+    """The model's torque on the reference [N m] (N, n), eq. (24); it does not depend on what the arm does."""
+    law = experiment.controller
+    if law.law != "pd+feedforward" or not law.feedforward:
+        return None
+    t = experiment.start_time + experiment.sample_time * np.arange(experiment.n_samples)
+    return _parts(experiment, Motion(t, experiment.q_ref, experiment.dq_ref, experiment.ddq_ref))
+
+
+def _parts(experiment: Experiment, motion: Motion) -> Array:
+    """The parts of the controller's model that the log names; all of them for computed torque that names none."""
+    assert experiment.feedforward_arm is not None
+    parts = experiment.feedforward_arm.nominal.torque_parts(motion)
+    named = experiment.controller.feedforward or ("friction", "inertia", "coriolis", "gravity")
+    return np.asarray(sum(getattr(parts, name) for name in named))
+
+
+class _Observer:
+    """x̂ = E x̂, then x̂ + k (e - c x̂); E of three integrators. Kostić et al. 2004, eq. (16), (20)."""
+
+    def __init__(self, gain: Array, sample_time: float, replicas: int) -> None:
+        n, h = len(gain), sample_time
+        self._transition = np.array([[1.0, h, h * h / 2.0], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
+        self._gain = np.ascontiguousarray(gain.T)[..., None]
+        self._state = np.zeros((3, n, replicas))
+        self._next = np.empty_like(self._state)
+        self._work = np.empty_like(self._state)
+
+    def __call__(self, k: int, error: Array) -> tuple[Array, Array]:
+        del k
+        state, ahead = self._state, self._next
+        np.matmul(self._transition, state.reshape(3, -1), out=ahead.reshape(3, -1))
+        np.multiply(self._gain, error - ahead[0], out=self._work)
+        np.add(ahead, self._work, out=state)
+        return state[0], state[1]
+
+
+class _BackwardDifference:
+    """dē = (e_k - e_{k-1})/T, zero at the first sample."""
+
+    def __init__(self, sample_time: float) -> None:
+        self._rate = 1.0 / sample_time
+        self._last: Array | None = None
+
+    def __call__(self, k: int, error: Array) -> tuple[Array, Array]:
+        del k
+        before, self._last = error if self._last is None else self._last, error
+        return error, (error - before) * self._rate
+
+
+def _estimator(experiment: Experiment, replicas: int) -> _Observer | _BackwardDifference:
+    law = experiment.controller
+    if law.velocity == "observer" and law.observer_gain is not None:
+        return _Observer(law.observer_gain, experiment.sample_time, replicas)
+    return _BackwardDifference(experiment.sample_time)

@@ -1,0 +1,162 @@
+"""The arm as a thing that moves: rigid body, friction and effects put together for many replicas.
+
+    plant = Plant.of(arm)
+    motion = plant.prepared(replicas)            with working memory
+    motion.accelerations(t, q, dq, states, command, out)
+
+Effects enter through their hooks, in the order in which they act; what is friction of one joint's speed alone is gathered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects.base import ArmModel, Hooks
+from pipelines.model.rigid.base import BaseArm
+from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.rigid.rrr import RRR
+from pipelines.model.simulation.chain import ManyChains
+from pipelines.model.simulation.friction import ManyCurves, stacked
+from pipelines.model.simulation.rrr import ManyRRR
+
+__all__ = ["MovingPlant", "Plant"]
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """What moves, in parts."""
+
+    body: RigidBody
+    p: Array  # (parameters,), or (replicas, parameters)
+    added: Array  # [kg m^2] (joints, joints) inertia of rotors
+    curves: ManyCurves
+    hooks: tuple[Hooks, ...]  # of all other effects
+    needed: Callable[[Motion], Array]  # torque that a motion at the start needs [N m], for memories that are not empty
+
+    @classmethod
+    def of(cls, arm: Arm, p: Array | None = None) -> Plant:
+        """`arm`, with its own base parameters or with `p` (replicas, parameters).
+
+        Raises:
+            ValueError: p has another shape.
+        """
+        if p is not None and (p.ndim != 2 or p.shape[1] != len(arm.p)):
+            raise ValueError(f"p has the shape {p.shape}, wanted is (replicas, {len(arm.p)})")
+        acting_on: ArmModel = Arm(arm.name, arm.body, arm.base)
+        curves, hooks, added = [], [], np.zeros((arm.n_joints, arm.n_joints))
+        for acting in (*arm.friction, *arm.effects):
+            curve = acting.effect.speed_curve(acting.values)
+            if curve is not None and acting.effect.joint is not None:
+                curves.append((acting.effect.joint - 1, curve))
+                continue
+            own = _hooks(acting, acting_on)
+            acting_on = acting_on if own.arm is None else own.arm
+            added = added if own.inertia is None else added + own.inertia
+            if any((own.load, own.actuator, own.sensor, own.states)):
+                hooks.append(own)
+        parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
+        return cls(acting_on.body, parameters, added, stacked(curves, arm.n_joints), tuple(hooks), arm.nominal.torque)
+
+    @property
+    def n_joints(self) -> int:
+        return self.body.robot.n_joints
+
+    @property
+    def plain(self) -> bool:
+        """Whether nothing but rigid body and friction moves it: no hook has to be asked on the way."""
+        return all(not any((hook.load, hook.actuator, hook.states)) for hook in self.hooks)
+
+    def prepared(self, replicas: int) -> MovingPlant:
+        return MovingPlant(self, replicas)
+
+
+def _hooks(acting: Acting, arm: ArmModel) -> Hooks:
+    return acting.effect.simulate(arm, acting.values)
+
+
+def _changed(p: Array, nominal: Array, true: Array) -> Array:
+    """Each replica's own parameters with the change that effects made to the nominal ones."""
+    if true.shape != nominal.shape:
+        raise ValueError("an effect changes the set of base parameters: replicas cannot have parameters of their own")
+    return np.asarray(p + (true - nominal))
+
+
+class MovingPlant:
+    """A plant with working memory for a number of replicas. Joints come first, replicas last."""
+
+    def __init__(self, plant: Plant, replicas: int) -> None:
+        self.plant, self.replicas = plant, replicas
+        self.rigid = _many(plant.body, plant.p, plant.added, replicas)
+        self.friction = plant.curves.prepared(replicas)
+        ends = np.cumsum([0, *(hook.states for hook in plant.hooks)]).tolist()
+        self.n_states = ends[-1]
+        self._hooked = [(hook, slice(a, b)) for hook, a, b in zip(plant.hooks, ends, ends[1:], strict=False)]
+        self._loaded = [(hook.load, own) for hook, own in self._hooked if hook.load]
+        self._driven = [(hook.actuator, own) for hook, own in self._hooked if hook.actuator]
+        self._left = np.empty((plant.n_joints, replicas))
+        self._zeros = np.zeros((replicas, plant.n_joints))
+
+    def motion(self, t: Array, q: Array, dq: Array) -> Motion:
+        return Motion(t, q.T, dq.T, self._zeros)
+
+    def accelerations(self, t: Array, q: Array, dq: Array, states: Array, command: Array, out: Array) -> None:
+        """ddq (joints, replicas) into `out`. t (replicas,), states (replicas, states), the rest (joints, replicas)."""
+        if self._loaded or self._driven:
+            command = self._through_effects(self.motion(t, q, dq), states, command)
+        self.friction.take_off(command, dq, self._left)
+        self.rigid.acceleration(q, dq, self._left, out)
+
+    def _through_effects(self, motion: Motion, states: Array, command: Array) -> Array:
+        torque = command.T
+        for actuator, own in self._driven:
+            torque = actuator(torque, motion, states[:, own])
+        for load, own in self._loaded:
+            torque = torque - load(motion, states[:, own])
+        return np.ascontiguousarray(torque.T)
+
+    def rates(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
+        """d(states)/dt (replicas, states)."""
+        out = np.zeros_like(states)
+        motion = self.motion(t, q, dq)
+        for hook, own in self._hooked:
+            if hook.rate:
+                out[:, own] = hook.rate(motion, command.T, states[:, own])
+        return out
+
+    def updated(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
+        """The states after a control sample was taken (replicas, states)."""
+        out = states.copy()
+        motion = self.motion(t, q, dq)
+        for hook, own in self._hooked:
+            if hook.update:
+                out[:, own] = hook.update(motion, command.T, states[:, own])
+        return out
+
+    def at_start(self, t: Array, q: Array, dq: Array) -> Array:
+        """The states (replicas, states) before the first sample."""
+        states = np.zeros((self.replicas, self.n_states))
+        motion = self.motion(t, q, dq)
+        for hook, own in self._hooked:
+            if hook.start:
+                states[:, own] = hook.start(motion, self.plant.needed(motion))
+        return states
+
+    def measured(self, q: Array, states: Array) -> Array:
+        """What the encoders see of q (joints, replicas), before they count it."""
+        seen = q.T
+        for hook, own in self._hooked:
+            if hook.sensor:
+                seen = hook.sensor(seen, states[:, own])
+        return seen.T
+
+
+def _many(body: RigidBody, p: Array, added: Array, replicas: int) -> ManyRRR | ManyChains:
+    if isinstance(body, RRR):
+        return ManyRRR(body, p, added, replicas)
+    if isinstance(body, BaseArm):
+        return ManyChains(body, p, added, replicas)
+    raise TypeError(f"no forward dynamics is known of a {type(body).__name__}")

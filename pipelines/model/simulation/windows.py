@@ -1,0 +1,105 @@
+"""Simulate short windows open loop, from where a smoother saw the arm: for logs whose controller nobody knows.
+
+Every window starts at the reconstructed position and speed and follows the logged torque; all windows run at once. Without
+feedback an error grows with the square of time, so that windows must be short, and their error is one of position after that
+time, no tracking error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.simulation.integrate import RungeKutta
+from pipelines.model.simulation.plant import Plant
+
+__all__ = ["Windows", "simulate_windows"]
+
+Mask = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
+
+_AT_ONCE = 256  # windows
+_TOLERANCE = 1e-7  # [rad] of the step
+_CANDIDATES = (1, 2, 4, 8, 16, 32, 64)
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Simulated motion over the windows, one behind the other; NaN in samples that no window covers."""
+
+    q: Array  # [rad] (samples, joints)
+    dq: Array  # [rad/s]
+    first: Indices  # sample at which each window starts
+    length: int  # samples
+    steps: int  # of the integrator, a sample
+
+
+def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: float, length: int,
+                     usable: Mask | None = None) -> Windows:
+    """Follow `tau` (samples, joints) from the state that `motion` has at the start of every window of `length` samples.
+
+    Args:
+        tau: held from each sample to the next.
+        usable: (samples,) where motion and torque are known without gaps; everywhere where left out.
+
+    Raises:
+        InputRejected: T08, no window fits; D17, the step would be too small to be of use.
+    """
+    good: Mask = np.asarray(np.isfinite(tau).all(axis=1) & np.isfinite(motion.q).all(axis=1))
+    if usable is not None:
+        good = good & usable
+    good[1:] &= np.abs(np.diff(motion.t) - sample_time) < 0.5 * sample_time
+    first = _starts(good, length)
+    if not len(first):
+        raise InputRejected("T08", f"no window of {length} samples is without a gap", remedy="ask for shorter windows")
+    tried = first[np.linspace(0, len(first) - 1, min(len(first), 32)).astype(int)]
+    steps = _steps(plant, motion, tau, sample_time, tried, length)
+    q, dq = np.full(motion.q.shape, np.nan), np.full(motion.q.shape, np.nan)
+    for begin in range(0, len(first), _AT_ONCE):
+        some = first[begin:begin + _AT_ONCE]
+        rows = (some[:, None] + np.arange(length)).ravel()
+        moved = _follow(plant, motion, tau, sample_time, some, length, steps)
+        q[rows], dq[rows] = (part.reshape(len(rows), -1) for part in np.split(moved, 2, axis=2))
+    return Windows(q, dq, first, length, steps)
+
+
+def _starts(good: Mask, length: int) -> Indices:
+    """First samples of windows of `length` good samples that follow one another without overlap."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8))).reshape(-1, 2)
+    return np.concatenate([np.zeros(0, dtype=np.intp), *(np.arange(a, b - length + 1, length) for a, b in edges.tolist())])
+
+
+def _steps(plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, length: int) -> int:
+    """The fewest steps a sample whose halving changes no position by more than the tolerance."""
+    coarse = None
+    for steps in (*_CANDIDATES, 2 * _CANDIDATES[-1]):
+        with np.errstate(all="ignore"):
+            fine = _follow(plant, motion, tau, sample_time, first, length, steps)[..., :tau.shape[1]]
+        if coarse is not None and np.abs(fine - coarse).max() <= _TOLERANCE:
+            return steps // 2
+        coarse = fine
+    raise InputRejected("D17", f"{_CANDIDATES[-1]} steps a sample do not settle the simulation",
+                        remedy="friction that changes sign within a very small speed needs a lower sharpness")
+
+
+def _follow(plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, length: int, steps: int) -> Array:
+    """q and dq (windows, length, 2 joints) of the windows that start at `first`."""
+    moving = plant.prepared(len(first))
+    integrator = RungeKutta(moving, sample_time, steps)
+    n = tau.shape[1]
+    state = np.ascontiguousarray(np.concatenate([motion.q[first], motion.dq[first]], axis=1).T)
+    t = motion.t[first].copy()
+    states = moving.at_start(t, state[:n], state[n:])
+    out = np.empty((length, 2 * n, len(first)))
+    for k in range(length):
+        out[k] = state
+        command = np.ascontiguousarray(tau[first + k].T)
+        if moving.n_states:
+            states = moving.updated(t, state[:n], state[n:], states, command)
+        states = integrator.advance(t, state, states, command)
+        t = t + sample_time
+    return np.ascontiguousarray(np.moveaxis(out, 2, 0))
