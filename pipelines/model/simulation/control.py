@@ -2,11 +2,12 @@
 
     pd               τ = -Kp ē - Kd dē - Ki ∫e + v                                       eq. (23)
     pd+feedforward   the same, and the chosen parts of the model's torque on the reference   eq. (24)
-    computed-torque  τ = D(q̄) r + c(q̄, dq̄) + h(q̄) + τ_f(dq̄),  r = ddq_r - Kp ē - Kd dē - Ki ∫e + v      eq. (25)-(27)
+    computed-torque  τ = D(q̄) r + c(q̄, dq̄) + h(q̄) + τ_f(dq_r),  r = -Kp ē - Kd dē - Ki ∫e + v           eq. (25)-(27)
     open-loop        the logged torque on the joints it drives; the others are held by pd
 
 e = q - q_r. ē and dē come from the observer, eq. (20)-(21), which filters e and starts with zero error, or are e itself and its
-backward difference.
+backward difference. q̄ = q_r + ē and dq̄ are the observer's wherever the log gives its gains. Friction is compensated at the
+speed of the reference: at the measured one it would chatter on a joint at rest.
 """
 
 from __future__ import annotations
@@ -31,8 +32,9 @@ class Controlling:
         self._integrating = bool(self._ki.any())
         self._integral = np.zeros((n, replicas))
         self._estimate = _estimator(experiment, replicas)
+        self._seen = _Observer.of(experiment, replicas) if law.law == "computed-torque" else None
         self._feedforward = _feedforward(experiment)
-        self._waiting: Array | None = None  # of a delayed command
+        self._waiting = np.repeat(experiment.tau0[:, None], replicas, axis=1)  # of a delayed command
         self._limit = None if law.output_limit is None else law.output_limit[:, None]
         self._resolution = _steps(law.torque_resolution)
 
@@ -41,13 +43,13 @@ class Controlling:
         torque = self._limited(self._law(k, q))
         if not self._experiment.controller.delay:
             return torque
-        held, self._waiting = torque if self._waiting is None else self._waiting, torque
+        held, self._waiting = self._waiting, torque
         return held
 
     def _law(self, k: int, q: Array) -> Array:
         experiment = self._experiment
         error = q - experiment.q_ref[k][:, None]
-        e, de = self._estimate(k, error)
+        e, de = self._estimate(error)
         feedback = -self._kp * e
         feedback -= self._kd * de
         if self._integrating:
@@ -56,30 +58,27 @@ class Controlling:
         if experiment.v is not None:
             feedback += experiment.v[k][:, None]
         if experiment.controller.law == "computed-torque":
-            return self._linearising(k, e, de, feedback)
+            return self._linearising(k, *(self._seen(error) if self._seen is not None else (e, de)), feedback)
         if self._feedforward is not None:
             feedback += self._feedforward[k][:, None]
         if experiment.driven is not None and experiment.tau is not None:
             feedback[experiment.driven] = experiment.tau[k, experiment.driven][:, None]
         return feedback
 
-    def _linearising(self, k: int, e: Array, de: Array, feedback: Array) -> Array:
+    def _linearising(self, k: int, e: Array, de: Array, r: Array) -> Array:
         experiment = self._experiment
-        assert experiment.feedforward_arm is not None  # Experiment.of_log refuses the law without it
-        r = experiment.ddq_ref[k][:, None] + feedback
-        t: Array = np.full(e.shape[1], experiment.start_time + k * experiment.sample_time)
+        t: Array = np.full(e.shape[1], experiment.start_time + k * experiment.sample_time, dtype=np.float64)
         now = Motion(t, (experiment.q_ref[k][:, None] + e).T, (experiment.dq_ref[k][:, None] + de).T,
                      np.ascontiguousarray(r.T))
-        return np.ascontiguousarray(_parts(experiment, now).T)
+        torque = _parts(experiment, now, _among(experiment.controller.feedforward, ("inertia", "coriolis", "gravity"))).T
+        return np.ascontiguousarray(torque if self._feedforward is None else torque + self._feedforward[k][:, None])
 
     def _limited(self, torque: Array) -> Array:
-        """After quantisation, as the log has it."""
-        if self._limit is not None:
-            torque = np.clip(torque, -self._limit, self._limit)
+        """After the controller's own quantisation and limit, as the log has it."""
         if self._resolution is not None:
             step, inverse = self._resolution
             torque = np.rint(torque * inverse) * step
-        return torque
+        return torque if self._limit is None else np.minimum(np.maximum(torque, -self._limit), self._limit)
 
 
 def _steps(resolution: Array | None) -> tuple[Array, Array] | None:
@@ -91,20 +90,25 @@ def _steps(resolution: Array | None) -> tuple[Array, Array] | None:
 
 
 def _feedforward(experiment: Experiment) -> Array | None:
-    """The model's torque on the reference [N m] (N, n), eq. (24); it does not depend on what the arm does."""
+    """The model's torque on the reference [N m] (N, n), eq. (24): it does not depend on what the arm does."""
     law = experiment.controller
-    if law.law != "pd+feedforward" or not law.feedforward:
+    named = {"pd+feedforward": law.feedforward or (), "computed-torque": _among(law.feedforward, ("friction",))}.get(law.law, ())
+    if not named:
         return None
-    t = experiment.start_time + experiment.sample_time * np.arange(experiment.n_samples)
-    return _parts(experiment, Motion(t, experiment.q_ref, experiment.dq_ref, experiment.ddq_ref))
+    t: Array = experiment.start_time + experiment.sample_time * np.arange(experiment.n_samples, dtype=np.float64)
+    return _parts(experiment, Motion(t, experiment.q_ref, experiment.dq_ref, experiment.ddq_ref), named)
 
 
-def _parts(experiment: Experiment, motion: Motion) -> Array:
-    """The parts of the controller's model that the log names; all of them for computed torque that names none."""
-    assert experiment.feedforward_arm is not None
+def _among(named: tuple[str, ...] | None, wanted: tuple[str, ...]) -> tuple[str, ...]:
+    """The `wanted` parts that the log names: all of them where it names none, for eq. (25) has them all."""
+    return wanted if named is None else tuple(part for part in wanted if part in named)
+
+
+def _parts(experiment: Experiment, motion: Motion, wanted: tuple[str, ...]) -> Array:
+    """Parts of the torque of the controller's own model (samples, joints) [N m]."""
+    assert experiment.feedforward_arm is not None  # Experiment.of_log refuses the law without it
     parts = experiment.feedforward_arm.nominal.torque_parts(motion)
-    named = experiment.controller.feedforward or ("friction", "inertia", "coriolis", "gravity")
-    return np.asarray(sum(getattr(parts, name) for name in named))
+    return np.asarray(np.sum([getattr(parts, name) for name in wanted], axis=0))
 
 
 class _Observer:
@@ -118,8 +122,12 @@ class _Observer:
         self._next = np.empty_like(self._state)
         self._work = np.empty_like(self._state)
 
-    def __call__(self, k: int, error: Array) -> tuple[Array, Array]:
-        del k
+    @classmethod
+    def of(cls, experiment: Experiment, replicas: int) -> _Observer | None:
+        gain = experiment.controller.observer_gain
+        return None if gain is None else cls(gain, experiment.sample_time, replicas)
+
+    def __call__(self, error: Array) -> tuple[Array, Array]:
         state, ahead = self._state, self._next
         np.matmul(self._transition, state.reshape(3, -1), out=ahead.reshape(3, -1))
         np.multiply(self._gain, error - ahead[0], out=self._work)
@@ -134,14 +142,11 @@ class _BackwardDifference:
         self._rate = 1.0 / sample_time
         self._last: Array | None = None
 
-    def __call__(self, k: int, error: Array) -> tuple[Array, Array]:
-        del k
+    def __call__(self, error: Array) -> tuple[Array, Array]:
         before, self._last = error if self._last is None else self._last, error
         return error, (error - before) * self._rate
 
 
 def _estimator(experiment: Experiment, replicas: int) -> _Observer | _BackwardDifference:
-    law = experiment.controller
-    if law.velocity == "observer" and law.observer_gain is not None:
-        return _Observer(law.observer_gain, experiment.sample_time, replicas)
-    return _BackwardDifference(experiment.sample_time)
+    observer = _Observer.of(experiment, replicas) if experiment.controller.velocity == "observer" else None
+    return _BackwardDifference(experiment.sample_time) if observer is None else observer

@@ -33,6 +33,7 @@ class Experiment:
     ddq_ref: Array  # [rad/s^2] (N, n)
     q0: Array  # [rad] (n,) true position at the first sample
     dq0: Array  # [rad/s] (n,)
+    tau0: Array  # [N m] (n,) what a controller with delay has commanded before the first sample
     resolution: Array  # [rad] (n,) of the encoders; 0 where they do not quantise
     v: Array | None = None  # (N, n) injected excitation
     tau: Array | None = None  # [N m] (N, n) torque of the joints that are driven open loop
@@ -73,9 +74,10 @@ class Experiment:
         driven, tau = _driven(log, controller)
         references = _references(log, driven)
         q0, dq0 = start if start is not None else _start(log, references)
+        tau0 = log.tau[0] if "tau" in log and np.isfinite(log.tau[0]).all() else np.zeros(log.n_joints)
         resolution = np.array([joint.encoder_resolution or 0.0 for joint in log.robot.joints])
         v = _whole(log, "v") if "v" in log else None
-        return cls(log.sample_time, float(log.t[0]), controller, *references, q0, dq0, resolution, v, tau, driven, model)
+        return cls(log.sample_time, float(log.t[0]), controller, *references, q0, dq0, tau0, resolution, v, tau, driven, model)
 
 
 def _place(log: ExperimentLog) -> str:
@@ -137,8 +139,7 @@ def _references(log: ExperimentLog, driven: npt.NDArray[np.bool_] | None) -> tup
     q_ref = _whole(log, "q_ref")
     dq_ref = _whole(log, "dq_ref") if "dq_ref" in log else np.gradient(q_ref, log.sample_time, axis=0)
     feedforward = log.controller is not None and bool(log.controller.feedforward)
-    computed = log.controller is not None and log.controller.law == "computed-torque"
-    if "ddq_ref" in log or feedforward or computed:
+    if "ddq_ref" in log or feedforward:
         return q_ref, dq_ref, _whole(log, "ddq_ref")
     return q_ref, dq_ref, np.zeros_like(q_ref)  # nothing asks for it
 

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
-from pipelines.model.arm import Acting, Arm
+from pipelines.model.arm import Arm
 from pipelines.model.effects.base import ArmModel, Hooks
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, Motion, RigidBody
@@ -46,14 +47,15 @@ class Plant:
         """
         if p is not None and (p.ndim != 2 or p.shape[1] != len(arm.p)):
             raise ValueError(f"p has the shape {p.shape}, wanted is (replicas, {len(arm.p)})")
-        acting_on: ArmModel = Arm(arm.name, arm.body, arm.base)
+        rigid, acting_on = Arm(arm.name, arm.body, arm.base), cast("ArmModel", arm.nominal)
         curves, hooks, added = [], [], np.zeros((arm.n_joints, arm.n_joints))
-        for acting in (*arm.friction, *arm.effects):
+        laws = [(law, True) for law in arm.friction]
+        for acting, friction in (*laws, *((effect, False) for effect in arm.effects)):
             curve = acting.effect.speed_curve(acting.values)
             if curve is not None and acting.effect.joint is not None:
                 curves.append((acting.effect.joint - 1, curve))
                 continue
-            own = _hooks(acting, acting_on)
+            own = acting.effect.simulate(rigid if friction else acting_on, acting.values)
             acting_on = acting_on if own.arm is None else own.arm
             added = added if own.inertia is None else added + own.inertia
             if any((own.load, own.actuator, own.sensor, own.states)):
@@ -74,10 +76,6 @@ class Plant:
         return MovingPlant(self, replicas)
 
 
-def _hooks(acting: Acting, arm: ArmModel) -> Hooks:
-    return acting.effect.simulate(arm, acting.values)
-
-
 def _changed(p: Array, nominal: Array, true: Array) -> Array:
     """Each replica's own parameters with the change that effects made to the nominal ones."""
     if true.shape != nominal.shape:
@@ -96,7 +94,8 @@ class MovingPlant:
         self.n_states = ends[-1]
         self._hooked = [(hook, slice(a, b)) for hook, a, b in zip(plant.hooks, ends, ends[1:], strict=False)]
         self._loaded = [(hook.load, own) for hook, own in self._hooked if hook.load]
-        self._driven = [(hook.actuator, own) for hook, own in self._hooked if hook.actuator]
+        # each effect acts around those before it: a command meets the last one first, a position reaches it last
+        self._driven = [(hook.actuator, own) for hook, own in reversed(self._hooked) if hook.actuator]
         self._left = np.empty((plant.n_joints, replicas))
         self._zeros = np.zeros((replicas, plant.n_joints))
 

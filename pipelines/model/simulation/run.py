@@ -80,7 +80,7 @@ def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = 
         t += experiment.sample_time
         if k % 64 == 0:
             _refuse_runaway(state, k, experiment)
-    times: Array = experiment.start_time + experiment.sample_time * np.arange(shape[0])
+    times: Array = experiment.start_time + experiment.sample_time * np.arange(shape[0], dtype=np.float64)
     _refuse_runaway(state, shape[0], experiment)
     q, tau, moved = (np.ascontiguousarray(np.moveaxis(x, 2, 0)) for x in (counted, commanded, motion))
     return Simulated(times, q, tau, moved[..., :n], moved[..., n:], steps)
