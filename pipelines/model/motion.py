@@ -29,9 +29,10 @@ from pipelines.model.rigid.body import Motion
 from pipelines.model.tuned import METHODS, Observers, Reconstruction, encoder_resolution, tuned_observers
 from pipelines.signal.grid import Grid, Tracker, grids, on_grid
 from pipelines.signal.observer import Observer, Track, observe
-from pipelines.signal.smoother import Smoother, smooth
+from pipelines.signal.smoother import Smoother, smooth, twicing_growth
 
-__all__ = ["METHODS", "Measured", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "measured", "reconstruct"]
+__all__ = ["METHODS", "Mean", "Measured", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "measured",
+           "reconstruct"]
 
 Indices = npt.NDArray[np.intp]
 Run = Callable[[Array], tuple[Array, Array]]
@@ -59,6 +60,15 @@ class Measured:
         return max(self.grids, key=lambda grid: grid.last - grid.first)
 
 
+@dataclass(frozen=True)
+class Mean:
+    """Which samples of a log are the mean of several periods; the rest are copies of them (`mean_period`)."""
+
+    first: int
+    last: int
+    periods: int  # in the mean
+
+
 @dataclass(frozen=True, eq=False)
 class Reconstructed:
     """Motion with its uncertainty, and the observer it came from."""
@@ -68,6 +78,7 @@ class Reconstructed:
     observers: Observers | None  # as tuned on the longest stretch; None where the method has none
     good: Usable  # which samples, stretches and masks
     derived: bool  # taken from the log instead of computed
+    mean: Mean | None = None  # where the log is the mean period of another
 
     def signals(self) -> dict[str, Array]:
         """What a derived log gets."""
@@ -136,8 +147,9 @@ def _filter(tuned: Observers, how: Reconstruction) -> Tracker:
     if how.method == "observer":
         return _padded(tuned.causal, lambda y, joints: observe(y, tuned.causal if joints is None else tuned.causal.pick(joints)))
     inner, outer = _smoother(tuned.smoothing), _smoother(tuned.causal)
-    if tuned.smoothing is tuned.causal:
+    if not tuned.twice:
         return inner
+    inner = _twice(inner, tuned.smoothing.order)
 
     def run(y: Array) -> tuple[Array, Array]:
         (states, std), (ends, ends_std) = inner(y), outer(y)
@@ -147,6 +159,19 @@ def _filter(tuned: Observers, how: Reconstruction) -> Tracker:
         return states, std
 
     return run
+
+
+def _twice(run: Run, order: int) -> Run:
+    """What `run` leaves of the samples goes through it once more, and is added. See `Observers`."""
+
+    def again(y: Array) -> tuple[Array, Array]:
+        states, std = run(y)
+        more, _ = run(y - states[0])
+        growth = np.ones(len(states))
+        growth[:order] = twicing_growth(order)
+        return states + more, std * growth[:, None, None]
+
+    return again
 
 
 def _smoother(observer: Observer) -> Run:

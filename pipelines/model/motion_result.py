@@ -12,7 +12,7 @@ from pipelines.log.results import NOT_STORED
 from pipelines.log.schema import joint_unit
 from pipelines.model import motion_quality as quality
 from pipelines.model.motion import Measured, Reconstructed, Reconstruction, measured
-from pipelines.model.tuned import tuned_observers
+from pipelines.model.tuned import Observers, tuned_observers
 from pipelines.signal.observer import Observer
 from pipelines.signal.tuning import smoother_bandwidth
 
@@ -108,7 +108,7 @@ def assess(log: ExperimentLog, found: Reconstructed, how: Reconstruction, place:
         log.name, place.source, place.file, how.method, log.n_samples, int(np.isnan(seen.y).any(axis=1).sum()),
         tuple(joint_unit("q", joint.revolute) for joint in log.robot.joints),
         _observer(observer, quality.paper_jerk(seen, found, how.order)),
-        _smoother(tuned.smoothing) if how.method == "smoother" else None,
+        _smoother(tuned) if how.method == "smoother" else None,
         white, correlation, tuple(_words(w, c) for w, c in zip(white.tolist(), correlation.tolist(), strict=True)),
         np.nanmax(np.abs(error), axis=0), np.sqrt(np.nanmean(error**2, axis=0)),
         np.abs(found.motion.dq[inside]).max(axis=0), np.abs(found.motion.ddq[inside]).max(axis=0), *quality.typical_std(found),
@@ -136,8 +136,9 @@ def _observer(observer: Observer, paper: Array) -> ObserverResult:
                           np.sqrt(observer.noise_variance), observer.jerk_std, paper)
 
 
-def _smoother(observer: Observer) -> SmootherResult:
-    return SmootherResult(observer.jerk_std, np.sqrt(observer.noise_variance), smoother_bandwidth(observer))
+def _smoother(tuned: Observers) -> SmootherResult:
+    own = tuned.smoothing
+    return SmootherResult(own.jerk_std, np.sqrt(own.noise_variance), smoother_bandwidth(own, tuned.twice))
 
 
 def _words(statistic: float, correlation: float) -> str:

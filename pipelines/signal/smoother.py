@@ -24,7 +24,7 @@ from pipelines.signal import segments as seg
 from pipelines.signal.observer import BLOCK, Observer, Start, Track, advance, block_starts, checked, chunks, filter_run
 from pipelines.signal.segments import Part, Piece, Prior, Run
 
-__all__ = ["Smoother", "smooth", "smooth_in_parts"]
+__all__ = ["Smoother", "smooth", "smooth_in_parts", "twicing_growth"]
 
 Array = npt.NDArray[np.float64]
 
@@ -130,6 +130,18 @@ def smooth_in_parts(read: Callable[[int, int], Array], samples: int, observer: O
             before = max(0, first - 2 * (first - before)) if short else before
             behind = min(samples, last + 2 * (behind - last)) if brief else behind
         yield first, smooth(y, own).states[:, first - before:last - before]
+
+
+def twicing_growth(order: int) -> Array:
+    """(order,) by what the standard deviation of each state grows where the smoother goes over what it left once more.
+
+    Twicing (Tukey 1977, Exploratory Data Analysis, p. 526) passes 1 - (1 - G)² where one pass gives G: what is left of a
+    motion is squared, and so is the bias. A prior of the chain and noise R leave, at frequency w and relative to R,
+    G + G² - G³ instead of G. With G = 1 / (1 + x^2n) and the derivative i weighing x^2i these are Beta functions:
+    the variance grows by 1 + a (1 - a) / 2 with a = (2 i + 1) / 2 n.
+    """
+    a = (2.0 * np.arange(order) + 1.0) / (2.0 * order)
+    return np.asarray(np.sqrt(1.0 + 0.5 * a * (1.0 - a)))
 
 
 def _smooth_part(smoother: Smoother, part: Part, prior: Prior, out: Array) -> list[Piece]:

@@ -72,13 +72,18 @@ def observer_bandwidth(observer: Observer) -> Array:
     return np.asarray(np.exp(low) / (2.0 * np.pi * observer.sample_time))
 
 
-def smoother_bandwidth(observer: Observer) -> Array:
-    """The same of the smoother that goes with it: Λ² N / (w^n + Λ² N) = 1/√2, see `sigma_for_bandwidth`. (channels,)"""
+def smoother_bandwidth(observer: Observer, twice: bool = False) -> Array:
+    """The same of the smoother that goes with it: G = Λ² N / (w^n + Λ² N) = 1/√2, see `sigma_for_bandwidth`. (channels,)
+
+    Args:
+        twice: where it goes over what it left once more: 1 - (1 - G)² = 1/√2.
+    """
     f = observer.filter
+    left = np.sqrt(1.0 - np.sqrt(0.5)) if twice else 1.0 - np.sqrt(0.5)  # 1 - G
     low, high = np.full(len(f.tracking_index), np.log(1e-12)), np.full(len(f.tracking_index), np.log(4.0))
     for _ in range(60):
         w = np.exp(0.5 * (low + high))
-        through = w**f.order <= (np.sqrt(2.0) - 1.0) * f.tracking_index**2 * f.numerator(w)
+        through = w**f.order <= left / (1.0 - left) * f.tracking_index**2 * f.numerator(w)
         low, high = np.where(through, np.log(w), low), np.where(through, high, np.log(w))
     return np.asarray(np.arcsin(np.minimum(np.exp(low / 2.0) / 2.0, 1.0)) / (np.pi * observer.sample_time))
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from pipelines.errors import InputRejected
 from pipelines.signal.kalman import Textbook
 from pipelines.signal.observer import Start, design, observe
-from pipelines.signal.smoother import Smoother, smooth, smooth_in_parts
+from pipelines.signal.smoother import Smoother, smooth, smooth_in_parts, twicing_growth
 from tests.signal.chains import assert_near, exact_smoother, swing, walk, with_gaps
 
 T, STEP = 1e-3, 1e-5
@@ -128,3 +129,17 @@ def test_a_log_longer_than_one_chunk() -> None:
     for run, reference in ((observe, book.filter), (smooth, book.smooth)):
         expected = reference(np.arange(50_000) * T, y[:, 0], mean, covariance).states
         assert_near(run(y, observer, start).states[:, :, 0].T, expected, 1e-8)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_a_second_pass_costs_what_it_says(order: int) -> None:
+    """Noise of one and bias of a random chain, over all frequencies: S (1 - G)⁴ + R (1 - (1 - G)²)² against S (1 - G)² + R G²."""
+    def variance(i: int, passes: int) -> float:
+        def density(x: float) -> float:
+            left = x ** (2 * order) / (1.0 + x ** (2 * order))  # 1 - G, with R = 1 and S = 1 / x^2n
+            return float(x ** (2 * i) * ((left**passes) ** 2 / x ** (2 * order) + (1.0 - left**passes) ** 2))
+
+        return float(quad(density, 0.0, 1.0)[0] + quad(density, 1.0, np.inf)[0])
+
+    found = [np.sqrt(variance(i, 2) / variance(i, 1)) for i in range(order)]
+    np.testing.assert_allclose(twicing_growth(order), found, rtol=1e-6)
