@@ -73,20 +73,20 @@ class ClosedForm:
         return q, *joint_rates(self.geometry, q, velocity, acceleration)
 
     def _obstacle(self, tip: Array) -> Obstacle | None:
-        """The first tip out of reach or nearer than `_NEAREST` to the border of the workspace, which is all singular."""
+        """The first tip out of reach; else the first nearer than `_NEAREST` to the border of the workspace, which is singular."""
         arm = self.geometry
+        status = inverse(arm, tip).status
+        if (out := np.flatnonzero(status >= Reach.INSIDE_CYLINDER)).size:
+            return Obstacle(int(out[0]), Reach(int(status[out[0]])).words)
         beyond = np.hypot(tip[:, 0], tip[:, 1]) - abs(arm.d)
         r = np.sqrt(np.maximum(beyond, 0.0) * (beyond + 2 * abs(arm.d)) + (tip[:, 2] - arm.d1)**2)
         room = {Reach.SHOULDER: beyond, Reach.ELBOW: np.minimum(r - abs(arm.a3 - arm.a2), arm.a2 + arm.a3 - r)}
-        near = np.flatnonzero(~(np.min(list(room.values()), axis=0) >= _NEAREST))
+        near = np.flatnonzero(np.minimum(*room.values()) < _NEAREST)
         if near.size == 0:
             return None
         k = int(near[0])
-        status = Reach(int(inverse(arm, tip[k:k + 1]).status[0]))
-        if status >= Reach.INSIDE_CYLINDER:
-            return Obstacle(k, status.words)
         kind = min(room, key=lambda reach: float(room[reach][k]))
-        return Obstacle(k, f"{room[kind][k] * 1e3:.1f} mm (limit {_NEAREST * 1e3:g} mm) from a posture that is {kind.words}")
+        return Obstacle(k, f"within {_NEAREST * 1e3:g} mm of a posture that is {kind.words}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,102 @@
+"""The speed of the tip: fast and slow phases, nothing beyond the pace, at rest in corners."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pipelines.errors import UsageError
+from pipelines.model.writing.path import Page, TipPath, lay_out
+from pipelines.model.writing.profile import Pace, TimeLaw, time_law
+from tests.model.writing.judge import OFFSETS, WEIGHTS
+
+PACES = (Pace(), Pace(slow=0.0), Pace(fast=2.0, slow=0.3, acceleration=20.0, jerk=2000.0), Pace(fast=0.05, slow=0.05))
+
+
+@pytest.fixture(scope="module")
+def path() -> TipPath:
+    return lay_out("RRRID 2004 S8", Page())
+
+
+@pytest.fixture(params=PACES, ids=range(len(PACES)))
+def pace(request: pytest.FixtureRequest) -> Pace:
+    chosen: Pace = request.param
+    return chosen
+
+
+def sampled(law: TimeLaw) -> np.ndarray:
+    """Times spread over all of the law, those of its phases among them."""
+    return np.unique(np.concatenate([np.linspace(-0.1, law.duration + 0.1, 20_001), law.start]))
+
+
+def test_the_whole_path_is_gone_once(path: TipPath, pace: Pace) -> None:
+    """From the beginning to the end, never backwards, every phase starting where the one before it ended."""
+    law = time_law(path, pace)
+    s = law.at(sampled(law))[0]
+    assert s[0] == 0.0
+    assert s[-1] == pytest.approx(path.length, abs=1e-12)
+    assert np.diff(s).min() >= -1e-12
+    ends = law.at(np.nextafter(law.start[1:-1], 0.0))[0]
+    assert np.abs(ends - law.s[1:]).max() <= 1e-12
+
+
+def test_speed_and_acceleration_are_derivatives(path: TipPath, pace: Pace) -> None:
+    """ds/dt and dv/dt by eighth-order differences, away from where a phase ends."""
+    law, h = time_law(path, pace), 2e-6
+    t = np.random.default_rng(3).uniform(0.0, law.duration, 3000)
+    t = t[np.abs(t[:, None] - law.start).min(axis=1) > 5 * h]
+    _, v, a = law.at(t)
+    there = [law.at(t + k * h) for k in OFFSETS]
+    slope, rise = (sum(w * x[i] for w, x in zip(WEIGHTS, there, strict=True)) / h for i in (0, 1))
+    assert np.abs(slope - v).max() <= 1e-8
+    assert np.abs(rise - a).max() <= 1e-6 * np.abs(a).max()
+
+
+def test_nothing_beyond_the_pace(path: TipPath, pace: Pace) -> None:
+    """Speed, acceleration along and across the path, and jerk stay within it; speed and acceleration are continuous."""
+    law = time_law(path, pace)
+    t = sampled(law)
+    _, v, a = law.at(t)
+    radius = np.array([piece.radius for piece in path.pieces])[law.piece[law.phase(t)]]
+    assert v.max() <= pace.fast * (1 + 1e-12)
+    assert np.abs(a).max() <= pace.acceleration * (1 + 1e-12)
+    assert (v**2 / radius).max() <= pace.acceleration * (1 + 1e-9)
+    assert np.abs(np.diff(a) / np.diff(t))[np.diff(t) > 1e-6].max() <= pace.jerk * (1 + 1e-6)
+    before, after = law.at(law.start - 1e-9), law.at(law.start + 1e-9)
+    assert max(np.abs(x - y).max() for x, y in zip(before, after, strict=True)) <= 3e-9 * max(pace.jerk, pace.fast)
+
+
+def test_at_rest_in_corners_and_slow_in_bends(path: TipPath, pace: Pace) -> None:
+    law = time_law(path, pace)
+    for k, joint in enumerate(path.joints):
+        last = int(np.flatnonzero(law.piece == k)[-1])
+        assert law.after[last] == (0.0 if joint == "corner" else pytest.approx(law.before[last + 1]))
+        assert law.after[last] <= pace.slow
+    assert law.before[0] == law.after[-1] == 0.0
+
+
+def test_fast_phases_are_as_fast_as_the_pace(path: TipPath) -> None:
+    """On a piece long enough the tip reaches the full speed and keeps it; on a short one it brakes as soon as it must."""
+    pace = Pace(fast=0.1)
+    law = time_law(path, pace)
+    reached = np.array([law.after[law.piece == k].max() for k in range(len(path.pieces))])
+    distance = 2 * 0.5 * 0.1 * max(1.875 * 0.1 / pace.acceleration, math.sqrt(10 / math.sqrt(3) * 0.1 / pace.jerk))
+    long = np.array([piece.length >= distance for piece in path.pieces])
+    assert (reached[long] == 0.1).all()
+    assert (reached[~long] < 0.1).all()
+    assert long.any()
+
+
+def test_a_faster_pace_takes_less_time(path: TipPath) -> None:
+    assert time_law(path, Pace(fast=0.8)).duration < time_law(path, Pace(fast=0.3)).duration
+    assert time_law(path, Pace(acceleration=12.0)).duration < time_law(path, Pace()).duration
+    assert time_law(path, Pace(slow=0.0)).duration > time_law(path, Pace(slow=0.1)).duration
+
+
+@pytest.mark.parametrize("wrong", [{"fast": 0.0}, {"slow": 0.7}, {"slow": -0.1}, {"acceleration": float("inf")},
+                                   {"jerk": float("nan")}])
+def test_impossible_paces_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(UsageError, match="pace"):
+        Pace(**wrong)
