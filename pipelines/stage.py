@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, InputRejected, RrridError, clean
 from pipelines.log.atomic import replace_folder, staging_folder, write_file
 from pipelines.log.files import PROVENANCE, Opened, expanded, find_logs, hash_file, open_log
@@ -219,7 +220,7 @@ def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: 
     if not request.no_report:
         from pipelines.report.render import write_report
 
-        footer = {"command": f"rrrid {stage.name}", "version": _version()}
+        footer = {"command": f"rrrid {stage.name}", "version": __version__}
         footer |= {f"input {path.name}": value[:16] for path, value in list(hashes.items())[:40]}
         write_report(tilde(report), folder, footer)
 
@@ -244,7 +245,7 @@ def _unchanged(hashes: dict[Path, str]) -> None:
 def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request, hashes: dict[Path, str], started: float) -> None:
     outputs = {path.relative_to(folder).as_posix(): hash_file(path) for path in sorted(folder.rglob("*")) if path.is_file()}
     about = {
-        "tool": "rrrid", "version": _version(), "command": stage.name,
+        "tool": "rrrid", "version": __version__, "command": stage.name,
         "settings": encode(settings)[0] if dataclasses.is_dataclass(settings) else {},
         "seed": getattr(settings, "seed", None),
         "options": {"strict": request.strict, "assume_units": request.assume_units, "robot": request.robot,
@@ -254,15 +255,6 @@ def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request,
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(started)), "duration": time.time() - started,
     }
     write_file(folder / PROVENANCE, lambda draft: _text(draft, json_text(tilde(about))))
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("rrrid")
-    except PackageNotFoundError:  # run from a folder, without an installation
-        return "not installed"
 
 
 def _libraries() -> dict[str, str]:

@@ -15,6 +15,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from pipelines import __version__
 from pipelines.errors import Interrupted, RrridError, UsageError
 from rrrid_cli.console import Teller, say_error, say_outcome
 from rrrid_cli.options import Common, LogPaths, StageCommand, StageGroup, numbers, with_common
@@ -25,7 +26,7 @@ __all__ = ["app", "entry"]
 TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
-STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps")
+STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps", "simulate")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
                   pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -35,9 +36,7 @@ app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_comple
 
 def _say_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        print(f"rrrid {version('rrrid')}")
+        print(f"rrrid {__version__}")
         raise typer.Exit
 
 
@@ -149,6 +148,28 @@ def estimate_bps(
         "symmetric": symmetric, "weighted": False if unweighted else None, "model": model, "allow_same": allow_same,
         "allow_mismatch": allow_mismatch,
         "compare": False if common.no_report else None})
+
+
+@app.command(cls=StageCommand)
+@with_common
+def simulate(
+    common: Common,
+    model: Annotated[str, typer.Argument(help="A model.json, or the name of a shipped one.", show_default=False)],
+    like: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to imitate, or a folder. Repeatable.")] = None,
+    fault: Annotated[list[str] | None, typer.Option(help="CAUSE:JOINT:NAME=VALUE,…: cogging:2:amplitude=0.1. Repeatable.")] = None,
+    replicas: Annotated[int | None, typer.Option(help="Simulations that differ in their noise. [1]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the first one's noise. [1]")] = None,
+    noise: Annotated[list[str] | None, typer.Option(help="Torque noise of the drives, std [N m]: one, or one a joint.")] = None,
+    windowed: Annotated[bool | None, typer.Option("--windowed", help="In short windows, though the controller is known.")] = None,
+    window: Annotated[float | None, typer.Option(help="Length of such a window [s]. [0.1]")] = None,
+    steps: Annotated[int | None, typer.Option(help="Integrator steps a sample. [as few as the error allows]")] = None,
+) -> None:
+    """Simulate a model as a log's experiment would have it, optionally with a fault."""
+    from pipelines.simulate import STAGE
+
+    _go(STAGE, tuple(like or ()), common, {
+        "model": model, "fault": tuple(fault or ()) or None, "replicas": replicas, "seed": seed,
+        "noise": numbers(noise, "--noise"), "windowed": windowed, "window": window, "steps": steps})
 
 
 @app.command()

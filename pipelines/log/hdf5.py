@@ -12,6 +12,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log import canonical, schema
+from pipelines.log.chunks import LEVEL, packed
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 
 __all__ = ["as_reals", "read_parts", "refuse_oversize", "write"]
@@ -22,6 +23,7 @@ _LONG_ATTRIBUTE = 1 << 20  # [B] a model.json in /controller is the longest a lo
 # A chunk of gzip cannot unpack to more than 1032 times its size, and `t` never repeats: no honest log comes near this.
 _LARGEST_RATIO = 1100
 _ALWAYS_ALLOWED = 64 << 20  # [B]
+_CHUNK = 65536  # samples
 
 
 def write(path: Path, log: ExperimentLog) -> None:
@@ -36,13 +38,25 @@ def write(path: Path, log: ExperimentLog) -> None:
         for name, attributes in groups.items():
             _write_attributes(file.create_group(name), attributes)
         file.create_dataset("robot", data=log.robot_text, dtype=h5py.string_dtype("utf-8"))
+        signals = file.create_group("signals")
         for name, signal in log.signals.items():
-            values = signal.values
-            chunks = None if values.size == 0 else (min(65536, len(values)),) + (1,) * (values.ndim - 1)
-            extra: dict[str, Any] = {} if chunks is None else {"chunks": chunks, "compression": "gzip", "compression_opts": 1,
-                                                               "shuffle": True, "fletcher32": True}
-            dataset = file.create_dataset(f"signals/{name}", data=values, dtype="<f8", track_times=False, **extra)
+            dataset = _write_samples(signals, name, signal.values)
             dataset.attrs["units"], dataset.attrs["long_name"] = signal.units, signal.long_name
+
+
+def _write_samples(signals: Any, name: str, values: Array) -> Any:
+    if values.size == 0:
+        return signals.create_dataset(name, data=values, dtype="<f8", track_times=False)
+    length = min(_CHUNK, len(values))
+    dataset = signals.create_dataset(name, shape=values.shape, dtype="<f8", chunks=(length,) + (1,) * (values.ndim - 1),
+                                     compression="gzip", compression_opts=LEVEL, shuffle=True, fletcher32=True, track_times=False)
+    for first in range(0, len(values), length):
+        rows = values[first:first + length]
+        for place in np.ndindex(values.shape[1:]):
+            column = np.zeros(length)  # the last chunk is as long as the others
+            column[:len(rows)] = rows[:, *place]
+            dataset.id.write_direct_chunk((first, *place), packed(column))
+    return dataset
 
 
 def _write_attributes(owner: Any, attributes: dict[str, object]) -> None:
