@@ -1,0 +1,78 @@
+"""Read a cause as it is written on the command line: "cogging:2", "cogging:2:amplitude=0.1,order=18", "gravity_tilt:angle=0.02".
+
+    acting = acting_cause("cogging:2:amplitude=0.1", robot.revolute)
+
+What is not given keeps its default: a non-linear number that of the effect, an amplitude zero. At least one number is given, for
+an effect of which all are zero does nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pipelines.errors import UsageError, did_you_mean
+from pipelines.model.arm import Acting
+from pipelines.model.effects import effect_names, find_effect
+from pipelines.model.effects.base import Effect
+
+__all__ = ["acting_cause"]
+
+
+def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") -> Acting:
+    """The cause that `text` names, with its numbers, on an arm whose joints are turning (`revolute`) or not.
+
+    Raises:
+        UsageError: C01, no such cause or parameter; C02, a joint or number that does not fit.
+    """
+    name, *rest = text.split(":")
+    if name not in effect_names():
+        raise UsageError("C01", f"'{name}' is not a cause{did_you_mean(name, effect_names())}", where=where,
+                         remedy=f"the causes are {', '.join(effect_names())}")
+    kind = find_effect(name)
+    joint, numbers = _place(text, kind, rest, len(revolute), where)
+    values = _values(text, kind, kind(joint=joint), numbers, where)
+    return Acting.of(kind(joint=joint), values, origin="assumed", revolute=joint is None or revolute[joint - 1])
+
+
+def _place(text: str, kind: type[Effect], rest: list[str], joints: int, where: str) -> tuple[int | None, str]:
+    """The joint, and the text of the numbers."""
+    belongs = f"write {kind.name}:JOINT:NAME=VALUE" if kind.scope == "joint" else f"write {kind.name}:NAME=VALUE"
+    numbers = rest.pop() if rest and "=" in rest[-1] else ""
+    wanted = 1 if kind.scope == "joint" else 0
+    if len(rest) != wanted:
+        what = "a joint" if wanted else "no joint, it belongs to the whole arm"
+        raise UsageError("C02", f"'{text}': {kind.name} takes {what}", where=where, remedy=belongs)
+    if not rest:
+        return None, numbers
+    if not (rest[0].isascii() and rest[0].isdigit()) or not 1 <= int(rest[0][:6]) <= joints:
+        raise UsageError("C02", f"'{rest[0]}' is no joint of this arm", where=where, remedy=f"give one of 1 to {joints}")
+    return int(rest[0]), numbers
+
+
+def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: str) -> dict[str, float]:
+    known = {quantity.name: quantity for quantity in kind.parameters}
+    values = {q.name: float(getattr(effect, q.name)) if q.shape else 0.0 for q in kind.parameters}
+    ranges = ", ".join(f"{q.name} {q.low:g} to {q.high:g} {q.unit}" for q in kind.parameters)
+    given = [part.partition("=") for part in numbers.split(",") if part.strip()]
+    if not given:
+        raise UsageError("C02", f"'{text}' does not say how strong it is", where=where, remedy=f"give some of {ranges}")
+    for name, _, number in given:
+        name = name.strip()
+        if name not in known:
+            raise UsageError("C01", f"{kind.name} has no parameter '{name}'{did_you_mean(name, known)}", where=where,
+                             remedy=f"its parameters are {', '.join(known)}")
+        values[name] = _number(number, name, where)
+        if not known[name].low <= values[name] <= known[name].high:
+            raise UsageError("C02", f"{name} = {values[name]:g} is out of range", where=where, remedy=f"it takes {ranges}")
+    return values
+
+
+def _number(text: str, name: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise UsageError("C02", f"{name}: '{text}' is not a number", where=where, remedy=f"write for example {name}=0.1")
+    return value

@@ -1,0 +1,78 @@
+"""What the figures of a simulated log show: lowest and highest sample of short stretches, spectra, how windows drift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.simulation.windows import Windows
+from pipelines.signal.spectra import welch
+
+__all__ = ["Course", "course"]
+
+_BUCKETS = 500  # of an envelope
+_SEGMENT = 2048  # samples of a spectrum
+_FEWEST = 64  # samples that make a spectrum
+
+Pair = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Course:
+    """Measured and simulated signals (points, joints); t has two points a stretch, its lowest and its highest sample."""
+
+    t: Array  # [s] (points,)
+    position: Array  # [rad] measured
+    position_simulated: Array
+    position_difference: Array  # simulated minus measured
+    speed: Array  # [rad/s] reconstructed
+    speed_simulated: Array
+    torque: Array | None  # [N m] commanded
+    torque_simulated: Array | None
+    torque_difference: Array | None
+    frequency: Array | None  # [Hz] (bins,) of the spectra; null for windows, whose difference begins anew with each
+    position_density: Array | None  # [rad²/Hz] (bins, joints) of the difference
+    torque_density: Array | None  # [N² m²/Hz]
+    elapsed: Array | None  # [s] since a window began
+    drift: Array | None  # [rad] rms of the position's difference by then (points, joints)
+
+
+def course(log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None, windows: Windows | None = None) -> Course:
+    """The series of one log; each pair is measured and simulated (samples, joints)."""
+    size = max(1, -(-log.n_samples // _BUCKETS))
+    first = np.arange(0, log.n_samples, size)
+    t = np.stack([log.t[first], log.t[np.minimum(first + size // 2, log.n_samples - 1)]], axis=1).ravel()
+    off = q[1] - q[0]
+    torque_off = None if tau is None else tau[1] - tau[0]
+    frequency, density = (None, None) if windows is not None else _spectrum(off, log.sample_time)
+    torque_density = None if torque_off is None or frequency is None else _spectrum(torque_off, log.sample_time)[1]
+    torques = (None, None, None) if tau is None else tuple(_envelope(x, size) for x in (*tau, tau[1] - tau[0]))
+    elapsed, drift = (None, None) if windows is None else _drift(off, windows, log.sample_time)
+    return Course(t, *(_envelope(x, size) for x in (*q, off, *dq)), *torques, frequency, density, torque_density, elapsed, drift)
+
+
+def _spectrum(x: Array, sample_time: float) -> tuple[Array, Array] | tuple[None, None]:
+    """Density of the longest stretch without a gap."""
+    known = np.isfinite(x).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8))).reshape(-1, 2)
+    start, stop = max(edges.tolist(), key=lambda edge: edge[1] - edge[0], default=(0, 0))
+    if stop - start < _FEWEST:
+        return None, None
+    found = welch(x[start:stop], 1.0 / sample_time, _SEGMENT)
+    return found.frequency, found.density
+
+
+def _drift(off: Array, windows: Windows, sample_time: float) -> tuple[Array, Array]:
+    rows = windows.first[:, None] + np.arange(windows.length)
+    return sample_time * np.arange(windows.length, dtype=np.float64), np.sqrt(np.mean(off[rows] ** 2, axis=0))
+
+
+def _envelope(x: Array, size: int) -> Array:
+    """(2 stretches, joints): lowest and highest of each `size` samples, NaN where there is none."""
+    first = np.arange(0, len(x), size)
+    low = np.minimum.reduceat(np.where(np.isnan(x), np.inf, x), first, axis=0)
+    high = np.maximum.reduceat(np.where(np.isnan(x), -np.inf, x), first, axis=0)
+    both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
+    return np.where(np.isfinite(both), both, np.nan)

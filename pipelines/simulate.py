@@ -1,0 +1,136 @@
+"""Simulate a model in the experiment of a log, optionally with a fault.
+
+Reads    a model file, and the logs to imitate: any but plans whose controller is not described
+Writes   logs/<name>.h5 or .parquet as the model would have produced them, result.json, result.h5, report.html
+Source   Kostić et al. 2004, eq. (4), (23)-(27); the classical Runge-Kutta method, its step chosen by halving
+
+A log that says what its controller did is simulated in closed loop: same controller, references, encoders. Any other is simulated
+in short windows, from the reconstructed state under the logged torque; windows make no log.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pipelines.errors import Check, NothingMatched, UsageError
+from pipelines.log.derive import recording
+from pipelines.log.doctor.checks import Subject, check_log
+from pipelines.log.files import Opened, write_log
+from pipelines.log.model_file import read_model
+from pipelines.log.results import encode
+from pipelines.model.arm import Arm
+from pipelines.model.named_cause import acting_cause
+from pipelines.model.simulation.imitate import How, Imitation, imitate
+from pipelines.report.report import Report
+from pipelines.report.simulation_report import simulation_report
+from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+
+__all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
+
+_DRAWN = 4  # logs whose series are kept for figures
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which model, what ails it, and how its logs are imitated."""
+
+    model: str = ""  # a model file
+    fault: tuple[str, ...] = ()  # CAUSE[:JOINT]:NAME=VALUE,…
+    replicas: int = 1
+    seed: int = 1
+    noise: tuple[float, ...] = ()  # [N m] std of the drives' torque noise: one, or one a joint
+    windowed: bool = False
+    window: float = 0.1  # [s]
+    steps: int | None = None  # of the integrator, a sample; None: as few as the error allows
+
+    @property
+    def how(self) -> How:
+        return How(self.replicas, self.seed, self.noise, self.windowed, self.window, self.steps)
+
+
+@dataclass(frozen=True)
+class Result:
+    """Every log that was imitated."""
+
+    model: str
+    faults: tuple[str, ...]  # as they were written
+    logs: tuple[Imitation, ...]
+    doctor: tuple[Check, ...]  # what the logs are like
+
+
+def read(request: Request, settings: Settings) -> Inputs:
+    """The model, and the logs to imitate.
+
+    Raises:
+        UsageError: C02, no model was named; C04, no such file.
+    """
+    if not settings.model:
+        raise UsageError("C02", "no model", where="simulate", remedy="name a model.json, or the shipped 'rrr'")
+    if not request.paths:
+        raise UsageError("C02", "no log to imitate", where="simulate", remedy="name one: --like LOG")
+    inputs = read_logs(request, settings)
+    path = Path(settings.model).absolute()
+    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Imitate every log.
+
+    Raises:
+        NothingMatched: C06, there is no log.
+        UsageError: C01, C02, settings, faults or a model that do not fit.
+        InputRejected: D17, the simulated arm runs away; S22, a plan whose controller is not described; what a log lacks.
+    """
+    if not inputs.logs:
+        raise NothingMatched("C06", "no log to imitate", where=inputs.label, remedy="name one: --like LOG")
+    nominal: Arm = inputs.material
+    arm = nominal.extended(*(acting_cause(text, nominal.robot.revolute) for text in settings.fault))
+    told = encode(replace(settings, model=Path(settings.model).name))[0]
+    found: list[Imitation] = []
+    said: list[Check] = []
+    taken: set[str] = set()
+    for opened in inputs.logs:
+        stem = slug(opened.path.stem)
+        while stem in taken:
+            stem += "+"
+        taken.add(stem)
+        said += _examined(opened)
+        one = imitate(opened.log, arm, settings.how, f"logs/{stem}", told, len(found) < _DRAWN)
+        found.append(replace(one, source=opened.path.name))
+    return Result(nominal.name, settings.fault, tuple(found), tuple(said))
+
+
+def _examined(opened: Opened) -> list[Check]:
+    """What the doctor says of a recording."""
+    if opened.log.origin == "planned":
+        return []
+    checks = [check for check in check_log(Subject(recording(opened.log))) if check.level != "ok"]
+    if reject := next((check for check in checks if check.level == "reject"), None):
+        raise reject.as_error()
+    return checks
+
+
+def _checks(result: Result) -> tuple[Check, ...]:
+    """What the doctor said, and why a log could not be simulated in closed loop."""
+    why = (Check.of("S22", "warn", f"simulated in windows of {one.window:.3g} s: {one.reason}", where=one.source,
+                    remedy="describe the controller in the log to simulate it in closed loop")
+           for one in result.logs if one.simulation == "windowed" and one.reason != "asked for")
+    return (*result.doctor, *why)
+
+
+def write(result: Result, folder: Path, request: Request) -> None:
+    """Every simulated log, in the container asked for."""
+    for one in result.logs:
+        for file, log in zip(one.files, one.logs, strict=True):
+            request.tell(f"writing {file}")
+            write_log(folder / f"{file}.{request.format}", log)
+
+
+def report(result: Result) -> Report:
+    """Measured over simulated position, speed and torque, their difference and its spectrum."""
+    return simulation_report(result.model, result.faults, result.logs)
+
+
+STAGE = Stage("simulate", "Simulate a model", Settings, compute, report, read, write, checks=_checks)
