@@ -1,0 +1,44 @@
+"""What a search may spend, counted in evaluations: equal numbers of them give equal designs, however fast the machine."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+__all__ = ["Budget", "SpentError"]
+
+_TELL_EVERY = 1.0  # [s]
+
+
+class SpentError(Exception):
+    """The search is over; what it has found by then is its answer."""
+
+
+class Budget:
+    """Count evaluations; end the search at a number of them, or after seconds of computing."""
+
+    def __init__(self, seconds: float | None, evaluations: int | None, tell: Callable[[int], None] = lambda done: None) -> None:
+        """One of both may be None; `tell` is called about every second with the evaluations so far."""
+        self.seconds, self.limit = seconds, evaluations
+        self.done = 0
+        self._tell, self._start, self._told = tell, time.process_time(), 0.0
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds of computing since the search began."""
+        return time.process_time() - self._start
+
+    def spend(self) -> None:
+        """Before each evaluation.
+
+        Raises:
+            SpentError: nothing is left.
+        """
+        elapsed = self.elapsed
+        if (self.limit is not None and self.done >= self.limit) or (
+                self.limit is None and self.seconds is not None and elapsed >= self.seconds):
+            raise SpentError
+        self.done += 1
+        if elapsed - self._told >= _TELL_EVERY:
+            self._told = elapsed
+            self._tell(self.done)

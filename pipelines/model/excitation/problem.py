@@ -1,0 +1,186 @@
+"""The design problem: from a point of the space of motions to its value, its gradient, and how near it comes to its limits.
+
+    x → motion → signals within limits, rows of the equations → Gram matrices → goal
+
+and back: the derivative by the Gram matrices becomes one by the rows, 2/n A S̄, that one by the motion (the rows' adjoint),
+that one by x (the series' adjoint). One pass there and back costs about three evaluations, whatever the number of harmonics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.fit.design.barrier import barrier, cost_of_bounds
+from pipelines.fit.design.goal import Goal
+from pipelines.model.excitation.columns import ArmColumns
+from pipelines.model.excitation.limits import Limit, Limits, middle_and_half
+from pipelines.model.excitation.space import MotionSpace
+from pipelines.model.excitation.tip import TipMotion, tip_motion
+from pipelines.model.rigid.body import Array
+from pipelines.model.rigid.geometry import SerialChain
+
+__all__ = ["ArmProblem", "DesignProblem", "grams_of"]
+
+_ROOMY = 0.7  # of the limits: where a start begins
+_INSIDE = 0.97  # each step of drawing a motion back into its limits
+_STEPS = 200
+
+
+def grams_of(columns: tuple[np.ndarray, ...], rows: tuple[Array, ...], count: int) -> Array:
+    """S_j = A_jᵀ A_j / samples of every joint (joints, count, count)."""
+    grams = np.zeros((len(rows), count, count))
+    for gram, own, row in zip(grams, columns, rows, strict=True):
+        gram[np.ix_(own, own)] = row @ row.T / row.shape[1]
+    return grams
+
+
+@dataclass(frozen=True, eq=False)
+class ArmProblem:
+    """What does not depend on the harmonics."""
+
+    columns: ArmColumns
+    chain: SerialChain
+    limits: Limits
+    beta: Array | None  # (all columns,) what is believed of the parameters: predicts torque
+    goal: Goal
+
+    @cached_property
+    def listed(self) -> tuple[Limit, ...]:
+        return self.limits.listed(self.beta is not None)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        return middle_and_half(self.listed)
+
+    @cached_property
+    def watched(self) -> tuple[Array, Array, Array, Array]:
+        """Which joints have a limit of position, speed, acceleration and torque."""
+        def of(quantity: str) -> Array:
+            return np.array([one.joint - 1 for one in self.listed if one.quantity == quantity and one.joint], dtype=np.intp)
+
+        return of("position"), of("speed"), of("acceleration"), of("torque")
+
+    @property
+    def tip_limited(self) -> bool:
+        return self.limits.tip_speed is not None or self.limits.tip_box is not None
+
+    def torque(self, rows: tuple[Array, ...]) -> Array:
+        """τ (joints, samples) of what is believed."""
+        beta = self.beta if self.beta is not None else np.zeros(len(self.columns.names))
+        return np.stack([beta[own] @ row for own, row in zip(self.columns.columns, rows, strict=True)])
+
+    def signals(self, motion: Array, rows: tuple[Array, ...]) -> tuple[Array, TipMotion | None]:
+        """What the limits are about, (limits, samples), in their order; of the tip's speed its square."""
+        position, speed, acceleration, torque = self.watched
+        parts = [motion[0, position], motion[1, speed], motion[2, acceleration]]
+        if len(torque):
+            parts.append(self.torque(rows)[torque])
+        tip = tip_motion(self.chain, motion[0], motion[1]) if self.tip_limited else None
+        if tip is not None and self.limits.tip_speed is not None:
+            parts.append((tip.velocity**2).sum(axis=0)[None])
+        if tip is not None and self.limits.tip_box is not None:
+            parts.append(tip.position)
+        return np.concatenate(parts), tip
+
+    def signals_adjoint(self, motion: Array, tip: TipMotion | None, bars: Array) -> tuple[Array, Array]:
+        """Derivatives by the motion (3, joints, samples) and by the torque (joints, samples) from those by the signals."""
+        out, on_torque = np.zeros_like(motion), np.zeros_like(motion[0])
+        first = 0
+        for target, own in zip((out[0], out[1], out[2], on_torque), self.watched, strict=True):
+            target[own] += bars[first:first + len(own)]
+            first += len(own)
+        if tip is not None:
+            on_speed = np.zeros_like(tip.velocity)
+            if self.limits.tip_speed is not None:
+                on_speed = 2.0 * bars[first] * tip.velocity
+                first += 1
+            on_place = bars[first:first + 3] if self.limits.tip_box is not None else np.zeros_like(tip.position)
+            by_q, by_dq = tip.adjoint(motion[1], on_place, on_speed)
+            out[0] += by_q
+            out[1] += by_dq
+        return out, on_torque
+
+
+class DesignProblem:
+    """The problem on one space of motions, sampled `samples` times a period: a landscape to search."""
+
+    def __init__(self, arm: ArmProblem, space: MotionSpace, samples: int, around: tuple[Array, Array]) -> None:
+        """`around`: postures (joints,) [rad] between which random motions are centred."""
+        self.arm, self.space, self.samples, self.around = arm, space, samples, around
+
+    def value(self, x: Array, sharpness: float, weight: float) -> tuple[float, Array, float]:
+        """What is minimised, its gradient, and the exact figure; infinite outside the limits."""
+        arm = self.arm
+        motion = self.space.motion(x, self.samples)
+        # the limits of the motion itself cost nothing to look at: no torque is computed for a motion that breaks them
+        if not self._moves_within(motion):
+            return np.inf, x, np.inf
+        rows = arm.columns.rows(motion)
+        signals, tip = arm.signals(motion, rows)
+        walls = barrier(signals, *arm.bounds)
+        if walls is None:
+            return np.inf, x, np.inf
+        value, on_grams, score = arm.goal.value(grams_of(arm.columns.columns, rows, len(arm.columns.names)), sharpness)
+        by_motion, on_torque = arm.signals_adjoint(motion, tip, weight * walls[1])
+        bars = []
+        for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True)):
+            bar = (2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
+            if arm.beta is not None and len(arm.watched[3]):
+                bar += arm.beta[own, None] * on_torque[j]
+            bars.append(bar)
+        by_motion += arm.columns.adjoint(motion, tuple(bars))
+        return value + weight * walls[0], self.space.gradient(by_motion), score
+
+    def _moves_within(self, motion: Array) -> bool:
+        middle, half = self.arm.bounds
+        first = 0
+        for signal, own in zip(motion, self.arm.watched[:3], strict=True):
+            part = slice(first, first + len(own))
+            first += len(own)
+            if not (np.abs(signal[own] - middle[part, None]) < half[part, None]).all():
+                return False
+        return True
+
+    def nearness(self, x: Array) -> Array:
+        """How near each limit is approached, (limits,): 1 is the limit."""
+        motion = self.space.motion(x, self.samples)
+        middle, half = self.arm.bounds
+        signals, _ = self.arm.signals(motion, self.arm.columns.rows(motion))
+        return np.asarray((np.abs(signals - middle[:, None]) / half[:, None]).max(axis=1, initial=0.0))
+
+    def cost(self, x: Array) -> Array:
+        """What each limit costs, (limits,), as a share of what all of them cost."""
+        motion = self.space.motion(x, self.samples)
+        signals, _ = self.arm.signals(motion, self.arm.columns.rows(motion))
+        found = cost_of_bounds(signals, *self.arm.bounds)
+        return np.asarray(found / max(float(found.sum()), 1e-300))
+
+    def start(self, rng: np.random.Generator) -> Array:
+        """A random motion within the limits, as large as it may be about where it begins."""
+        x = self.space.random(rng, *self.around)
+        return self.drawn_in(self._grown(x), _ROOMY)
+
+    def _grown(self, x: Array) -> Array:
+        """As large as the limits that grow with it allow, if a random motion falls short of them."""
+        for _ in range(_STEPS):
+            if float(self.nearness(x).max(initial=0.0)) > _ROOMY:
+                break
+            x = self.space.shrunk(x, 1.3)
+        return x
+
+    def disturbed(self, x: Array, size: float, rng: np.random.Generator) -> Array:
+        """x with noise of `size` times what its coefficients are worth, within the limits."""
+        if size > 0.0:
+            x = self.space.project(x + rng.normal(size=x.shape) * (3.0 * size * float(np.abs(x).mean())))
+        return self.drawn_in(x, 1.0)
+
+    def drawn_in(self, x: Array, reach: float) -> Array:
+        """x made smaller until its nearest limit is approached to less than `reach`; at a standstill where nothing helps."""
+        for _ in range(_STEPS):
+            if float(self.nearness(x).max(initial=0.0)) < reach:
+                return x
+            x = self.space.shrunk(x, _INSIDE)
+        return self.space.shrunk(x, 0.0)
