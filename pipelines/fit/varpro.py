@@ -1,0 +1,164 @@
+"""Separable least squares: y = Z α + A(θ) β, linear in all but a few numbers θ, which are solved for alone.
+
+    problem = Separable(y, Z, build, lower, upper)       build(θ) -> A(θ)
+    found = fit_separable(problem, starts)               the best of several starts, with its covariance
+
+For every θ the linear part has a closed solution, so the search is over θ only (variable projection: Golub & Pereyra 1973).
+Its Gauss-Newton step takes Kaufman's Jacobian 1975, -P⊥ (∂A/∂θ_i) β, with P⊥ the projection off [Z, A]; Levenberg-Marquardt
+keeps it from running away. Rows are taken as equally good; whatever memory their noise has goes into the covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.fit.equations import Array
+
+__all__ = ["Linear", "Separable", "SeparableFit", "fit_separable", "linear_part", "search"]
+
+_RANK = 1e-5  # singular values of unit columns below it: two columns that are one to within what any log can tell
+_STEP = 1e-4  # of a finite difference in θ
+_GAIN = 1e-6  # of the sum of squares: of a thousand rows, a thousandth of what noise alone is worth
+_MOST = 40  # steps
+_DAMPING = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Separable:
+    """Rows y (m,), columns Z (m, z) that are fixed, and columns A(θ) (m, k) that `build` makes of θ within its bounds."""
+
+    y: Array
+    fixed: Array
+    build: Callable[[Array], Array]
+    lower: Array  # (p,)
+    upper: Array
+
+    def columns(self, theta: Array) -> Array:
+        return np.hstack([self.fixed, self.build(theta)])
+
+    def of_rows(self, rows: npt.NDArray[np.intp]) -> Separable:
+        """Some of its rows."""
+        return Separable(self.y[rows], self.fixed[rows], lambda theta: self.build(theta)[rows], self.lower, self.upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The linear part at one θ."""
+
+    columns: Array  # (m, z + k)
+    beta: Array  # (z + k,) the smallest that explains y, where columns depend on one another
+    residual: Array  # (m,)
+    basis: Array  # (m, rank) orthonormal
+
+    @property
+    def rss(self) -> float:
+        return float(self.residual @ self.residual)
+
+
+@dataclass(frozen=True, eq=False)
+class SeparableFit:
+    """θ and β = (α, β) with their joint covariance, in this order: linear ones first."""
+
+    theta: Array  # (p,)
+    beta: Array  # (z + k,)
+    covariance: Array  # (z + k + p, z + k + p); of directions that no row shows it holds nothing
+    seen: Array  # (z + k + p,) share of each number that lies in directions the rows show; 1 where it is known on its own
+    residual: Array  # (m,)
+    jacobian: Array  # (m, z + k + p) ∂ŷ/∂(β, θ)
+    at_bound: tuple[bool, ...]  # (p,) θ rests on a bound
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(np.square(self.residual))))
+
+
+def linear_part(columns: Array, y: Array) -> Linear:
+    """Least squares with columns of unit length, cut off below `_RANK`."""
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    unit = columns / scale
+    values, vectors = np.linalg.eigh(unit.T @ unit)
+    kept = values > _RANK**2 * values[-1]
+    basis = unit @ (vectors[:, kept] / np.sqrt(values[kept]))
+    project = basis.T @ y
+    beta = vectors[:, kept] @ (project / np.sqrt(values[kept])) / scale
+    return Linear(columns, beta, y - basis @ project, basis)
+
+
+def fit_separable(problem: Separable, starts: Iterable[Array], lags: int | None = None) -> SeparableFit:
+    """The best of the local optima that `starts` lead to.
+
+    Args:
+        lags: rows over which noise may remember itself; by default Newey and West's rule.
+    """
+    found = min((search(problem, start) for start in starts), key=lambda pair: pair[1].rss)
+    return _with_covariance(problem, *found, lags)
+
+
+def search(problem: Separable, start: Array) -> tuple[Array, Linear]:
+    """Levenberg-Marquardt over θ from one start, within the bounds."""
+    theta = np.clip(start, problem.lower, problem.upper)
+    now = linear_part(problem.columns(theta), problem.y)
+    damping = _DAMPING
+    for _ in range(_MOST if theta.size else 0):
+        slope = _slopes(problem, theta, now)
+        slope = slope - now.basis @ (now.basis.T @ slope)
+        normal, downhill = slope.T @ slope, slope.T @ now.residual
+        gain = 0.0
+        while damping < 1e8:
+            shift = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-300), downhill)
+            there = np.clip(theta + np.clip(shift, -1.0, 1.0), problem.lower, problem.upper)
+            other = linear_part(problem.columns(there), problem.y)
+            if other.rss <= now.rss:
+                gain = 1.0 - other.rss / max(now.rss, 1e-300)
+                theta, now, damping = there, other, damping / 5.0
+                break
+            damping *= 5.0
+        if gain < _GAIN:
+            break
+    return theta, now
+
+
+def _slopes(problem: Separable, theta: Array, now: Linear) -> Array:
+    """(m, p) (∂A/∂θ_i) β by forward differences, backward ones at an upper bound."""
+    own = now.beta[problem.fixed.shape[1]:]
+    here = now.columns[:, problem.fixed.shape[1]:] @ own
+    slopes = np.empty((len(problem.y), len(theta)))
+    for i in range(len(theta)):
+        moved = theta.copy()
+        step = _STEP if theta[i] + _STEP <= problem.upper[i] else -_STEP
+        moved[i] += step
+        slopes[:, i] = (problem.build(moved) @ own - here) / step
+    return slopes
+
+
+def _with_covariance(problem: Separable, theta: Array, now: Linear, lags: int | None) -> SeparableFit:
+    """The sandwich B M B with B = (FᵀF)⁻¹ over what the rows show, and M allowing for rows that depend on one another.
+
+    Newey & West 1987: M = Σ_l w_l Σ_i (f_i r_i)(f_{i+l} r_{i+l})ᵀ with falling weights w_l keeps M positive.
+    """
+    jacobian = np.hstack([now.columns, _slopes(problem, theta, now)])
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale = np.where(scale > 0.0, scale, np.inf)  # a number that no row shows
+    unit = jacobian / scale
+    values, vectors = np.linalg.eigh(unit.T @ unit)
+    kept = values > _RANK**2 * values[-1]
+    bread = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+    scores = unit * now.residual[:, None]
+    rows, width = scores.shape
+    reach = int(4.0 * (rows / 100.0) ** (2.0 / 9.0)) if lags is None else lags
+    meat = scores.T @ scores
+    for lag in range(1, min(reach, rows - 1) + 1):
+        cross = scores[lag:].T @ scores[:-lag]
+        meat += (1.0 - lag / (reach + 1.0)) * (cross + cross.T)
+    meat *= rows / max(rows - int(kept.sum()), 1)
+    inverse = np.where(np.isinf(scale), 0.0, 1.0 / scale)
+    covariance = bread @ meat @ bread * inverse * inverse[:, None]
+    seen = np.where(np.isinf(scale), 0.0, np.square(vectors[:, kept]).sum(axis=1))
+    bounds = (theta <= problem.lower + 1e-9) | (theta >= problem.upper - 1e-9)
+    assert covariance.shape == (width, width)
+    return SeparableFit(theta, now.beta, covariance, seen, now.residual, jacobian, tuple(map(bool, bounds)))

@@ -1,0 +1,157 @@
+"""Choose among laws: each is fitted on some rows and judged on others; the simplest that is not measurably worse is taken.
+
+The interval is that of the difference of two laws on the same rows: what is common to both, a cable that pulls or a noisy
+minute, cancels. It is about the law, not about its numbers: labels may differ where curves agree, and
+laws that these rows cannot tell apart are named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.fit.varpro import search
+from pipelines.model.friction.fit_law import LawEquations, LawFit, fit_law
+from pipelines.model.friction.laws import LADDER, Law, with_further
+from pipelines.model.rigid.body import Array
+
+__all__ = ["Judge", "Ladder", "Tried", "climb"]
+
+_SURE = 2.0  # standard errors of a difference: beyond, it is one
+_WORTH = 0.01  # of the mean square: a smaller difference is none, however sure
+_BLOCKS = 20  # of the rows that judge
+_FOLDS = 5
+_SEEN = 0.9  # share of a number that must lie in directions that the rows show
+_FURTHER = 2  # causes beside the first
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """One law, and how it did."""
+
+    fit: LawFit
+    identify_rms: float  # [N m] of mean torques
+    validate_rms: float
+    residual: Array  # (rows,) [N m] of the rows that judge
+    reason: str = ""  # why it cannot be chosen; empty where it can
+
+    @property
+    def law(self) -> Law:
+        return self.fit.law
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """Every law that was tried, and the choice."""
+
+    tried: tuple[Tried, ...]
+    chosen: Tried
+    best: Tried  # by the rows that judge
+    by: str  # "logs" | "blocks"
+
+    def alike(self, one: Tried) -> bool:
+        """Not measurably worse than the best."""
+        return not one.reason and _alike(one.residual, self.best.residual)
+
+    @property
+    def rivals(self) -> tuple[Tried, ...]:
+        """Laws as simple as the chosen one, or nearly, that these rows do not tell from it."""
+        return tuple(one for one in self.tried if one is not self.chosen and self.alike(one)
+                     and one.law.size <= self.chosen.law.size + 1
+                     and not set(self.chosen.law.members) <= set(one.law.members))
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """What laws are fitted to and judged by: other logs, or blocks of the same ones held out in turn."""
+
+    identify: LawEquations
+    validate: LawEquations | None
+
+    def residual(self, fit: LawFit) -> Array:
+        """What the law leaves (rows,) of rows that it was not fitted to [N m]."""
+        return self.validate.predicted(fit).residual if self.validate is not None else _held_out(self.identify, fit)
+
+    def try_law(self, law: Law, start: Sequence[Array] | None = None, sharpness: float | None = None) -> Tried:
+        fit = fit_law(self.identify, law, start, sharpness)
+        residual = self.residual(fit)
+        return Tried(fit, fit.found.rms, float(np.sqrt(np.mean(np.square(residual)))), residual, _fault(fit))
+
+
+def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
+    """Try `laws`, then further causes beside the best of them while they are measurably better."""
+    tried: list[Tried] = []
+    sharpness: float | None = None
+    for law in laws:
+        one = judge.try_law(law, None, sharpness if law.name != "coulomb+viscous" else None)
+        tried.append(one)
+        if law.name == "coulomb+viscous":
+            sharpness = float(np.exp(one.fit.theta[0]))
+    causes = [law.name for law in laws if len(law.members) > 2]
+    for _ in range(_FURTHER):
+        best = _best(tried)
+        if best.law.name in ("viscous", "coulomb", "coulomb+viscous"):
+            break  # no single cause helps: two would be chance
+        more = [_beside(judge, best, cause) for cause in causes if cause not in best.law.members]
+        tried += more
+        if _alike(best.residual, _best(tried).residual):
+            break
+    best = _best(tried)
+    able = [one for one in tried if not one.reason and _alike(one.residual, best.residual)]
+    chosen = min(able, key=lambda one: (one.law.size, one.validate_rms))
+    return Ladder(tuple(tried), chosen, best, "logs" if judge.validate is not None else "blocks")
+
+
+def _beside(judge: Judge, best: Tried, cause: str) -> Tried:
+    """`best` with one more cause, begun from where it stands."""
+    law = with_further(best.law, cause)
+    known = {place.name if place.name == "sharpness" else (place.effects, place.name): value
+             for place, value in zip(best.law.places, best.fit.theta, strict=True)}
+    longest = max(judge.identify.stretches, key=lambda stretch: len(stretch.t))
+    starts: list[Array] = []
+    for theta in law.starts(longest.nodes, judge.identify.joint):
+        begin = np.array([known.get(place.name if place.name == "sharpness" else (place.effects, place.name), value)
+                          for place, value in zip(law.places, theta, strict=True)])
+        if not any(np.array_equal(begin, other) for other in starts):
+            starts.append(begin)
+    return judge.try_law(law, starts)
+
+
+def _best(tried: Sequence[Tried]) -> Tried:
+    able = [one for one in tried if not one.reason]
+    return min(able or list(tried), key=lambda one: one.validate_rms)
+
+
+def _alike(one: Array, best: Array) -> bool:
+    """Whether residuals are not measurably larger than the best law's.
+
+    Σ r² - Σ b² = Σ δ² + 2 Σ δ b with δ = r - b. Where the best law is right, b is noise, and the last sum is what chance
+    does to the difference. Its deviation comes from sums over blocks, within which noise may remember itself.
+    """
+    apart = one - best
+    chance = np.array([part.sum() for part in np.array_split(2.0 * apart * best, min(_BLOCKS, len(best)))])
+    difference = float(one @ one - best @ best)
+    return difference <= max(_SURE * float(np.sqrt(chance @ chance)), _WORTH * float(best @ best))
+
+
+def _held_out(equations: LawEquations, fit: LawFit) -> Array:
+    """The residual of every block of rows, explained by what the others gave; the search begins where the whole fit ended."""
+    problem = equations.problem(fit.law, equations.arms(fit.found.beta))
+    residual = np.empty(len(problem.y))
+    for part in np.array_split(np.arange(len(problem.y)), _FOLDS):
+        rest = np.delete(np.arange(len(problem.y)), part)
+        theta, linear = search(problem.of_rows(rest), fit.theta)
+        residual[part] = problem.y[part] - problem.columns(theta)[part] @ linear.beta
+    return residual
+
+
+def _fault(fit: LawFit) -> str:
+    """Why a law cannot be chosen: a number that the rows do not show, or one that its cause cannot have."""
+    numbers = fit.numbers
+    unseen = [number.name for number in numbers if number.seen < _SEEN]
+    if unseen:
+        return f"{', '.join(unseen)} cannot be told from the rest"
+    below = [number.name for number in numbers if number.value < number.low - _SURE * number.std]
+    return f"{', '.join(below)} would be negative" if below else ""

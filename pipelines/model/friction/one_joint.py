@@ -1,0 +1,68 @@
+"""A joint on its own, the others locked: J ddq + c sin q + c' cos q + friction = τ. Kostić et al. 2004, eq. (11).
+
+The printed equation has c sin q with q from the hanging position; c' cos q lets the equilibrium lie anywhere. A prismatic
+joint has its weight along the axis instead, a constant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NoReturn
+
+import numpy as np
+
+from pipelines.log.robot import Joint, RobotDescription
+from pipelines.model.rigid.body import Array, Motion, RigidBody
+
+__all__ = ["OneJoint", "gravity_columns", "gravity_names"]
+
+
+@dataclass(frozen=True)
+class OneJoint:
+    """The arm that a friction law sees when one joint moves: an arm of one joint."""
+
+    robot: RobotDescription  # of this joint alone
+    inertia: float  # J [kg m^2]
+    gravity: tuple[float, ...]  # c, c' [N m] of sin q and cos q; prismatic: the weight along the axis [N]
+
+    @classmethod
+    def of(cls, whole: RobotDescription, joint: int, inertia: float = 0.0, gravity: tuple[float, ...] = ()) -> OneJoint:
+        """Joint `joint`, counted from 1, of a robot."""
+        own = whole.joints[joint - 1]
+        alone = RobotDescription(whole.name, whole.gravity, "dh", (Joint(own.name, own.type),))
+        return cls(alone, inertia, gravity or (0.0,) * len(gravity_names(own.revolute)))
+
+    @property
+    def n_joints(self) -> int:
+        return 1
+
+    @property
+    def revolute(self) -> bool:
+        return self.robot.joints[0].revolute
+
+    @property
+    def body(self) -> RigidBody:
+        raise TypeError("a joint on its own has no links")
+
+    @property
+    def p(self) -> Array:
+        return np.array([self.inertia, *self.gravity])
+
+    def torque(self, motion: Motion) -> Array:
+        """J ddq + c sin q + c' cos q, (samples, 1) [N m]."""
+        return np.asarray(self.inertia * motion.ddq + (gravity_columns(motion.q[:, 0], self.revolute) @ self.p[1:])[:, None])
+
+    def with_body(self, body: RigidBody, p: Array) -> NoReturn:
+        raise TypeError("a joint on its own has no links")
+
+    def carrying(self, inertia: float, gravity: tuple[float, ...]) -> OneJoint:
+        return replace(self, inertia=inertia, gravity=gravity)
+
+
+def gravity_columns(q: Array, revolute: bool) -> Array:
+    """(samples, 2) sin q, cos q; of a prismatic joint (samples, 1) ones."""
+    return np.stack([np.sin(q), np.cos(q)], axis=-1) if revolute else np.ones((len(q), 1))
+
+
+def gravity_names(revolute: bool) -> tuple[str, ...]:
+    return ("sine", "cosine") if revolute else ("constant",)

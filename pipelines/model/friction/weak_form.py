@@ -1,0 +1,196 @@
+"""Equations of one moving joint without its acceleration: what torque adds to its momentum, window by window.
+
+Integrated over a window [a, b], eq. (11) of Kostić et al. 2004 reads
+
+    J (dq(b) - dq(a)) + ∫ (c sin q + c' cos q + τ_f) dt = ∫ τ dt
+
+No acceleration has to be reconstructed, a held command is integrated exactly, and a sign change of friction, which smears
+an acceleration over the reach of every filter, is a kink of the speed at a known instant. Divided by its length, a row is a
+mean torque [N m]. The integrals are sums over nodes: one a sample's interval, several where speed passes zero within it, one
+for a few samples where speed hardly changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.friction.one_joint import gravity_columns
+from pipelines.model.motion import Reconstructed
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["Stretch", "Windows", "stretches_of"]
+
+_PARTS = 8  # of an interval in which speed passes zero
+_NEAR = 2.0  # changes of speed within a sample: nearer to zero, the sign of friction may turn over inside
+_STEADY = 20.0  # a speed that changes by less than a twentieth: one node for several samples
+_MOST = 5  # of them
+_COARSEST = 5e-3  # [s]
+_VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
+_FEWEST = 10  # windows of a stretch that is worth using
+_SHORTEST = 4  # samples of a window
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Nodes, and the windows over which columns are averaged."""
+
+    nodes: Motion  # (nodes, 1)
+    share: Array  # (nodes,) time that a node stands for over the length of its window
+    first: npt.NDArray[np.intp]  # (windows,) first node of every window
+    kept: npt.NDArray[np.bool_]  # (windows,) whether it makes a row
+
+    def means(self, columns: Array) -> Array:
+        """Of columns (nodes, k): (rows, k)."""
+        return np.asarray(np.add.reduceat(columns * self.share[:, None], self.first, axis=0)[self.kept])
+
+    def some(self, every: int) -> Windows:
+        """Every so-manieth row, with its own nodes alone."""
+        chosen = np.flatnonzero(self.kept)[::every]
+        count = np.diff(np.append(self.first, len(self.share)))[chosen]
+        begin = np.concatenate([[0], np.cumsum(count)[:-1]])
+        index = np.repeat(self.first[chosen] - begin, count) + np.arange(count.sum())
+        motion = self.nodes
+        nodes = Motion(motion.t[index], motion.q[index], motion.dq[index], motion.ddq[index])
+        return Windows(nodes, self.share[index], begin, np.ones(len(chosen), dtype=bool))
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Samples of one joint without a gap, and the windows its equations are taken over."""
+
+    name: str  # of the log
+    t: Array  # [s] (samples,)
+    measured: Array  # [rad] (samples,) position as the encoder gave it, NaN where it is missing
+    tau: Array  # [N m] (samples,)
+    q: Array  # [rad] (samples,) reconstructed
+    dq: Array  # [rad/s] (samples,)
+    spoilt: npt.NDArray[np.bool_]  # (samples,) no row may use it
+    held: bool  # the torque is a command held from sample to sample
+    window: int  # samples
+    revolute: bool
+    posture: tuple[float, ...]  # [rad] of the other joints
+
+    def moved(self, q: Array, dq: Array) -> Stretch:
+        """The same with a better motion."""
+        return replace(self, q=q, dq=dq)
+
+    @property
+    def rows(self) -> int:
+        return int(self.kept.sum())
+
+    @cached_property
+    def edges(self) -> npt.NDArray[np.intp]:
+        """Samples at which windows begin and end."""
+        return np.arange(0, len(self.t), self.window)
+
+    @cached_property
+    def kept(self) -> npt.NDArray[np.bool_]:
+        """(windows,) nothing in it is spoilt."""
+        bad = np.concatenate([[0], np.cumsum(self.spoilt)])
+        return np.asarray(bad[self.edges[1:] + 1] == bad[self.edges[:-1]])
+
+    @cached_property
+    def impulse(self) -> Array:
+        """∫ τ dt from the first sample (samples,) [N m s]."""
+        tau = np.where(np.isfinite(self.tau), self.tau, 0.0)
+        each = tau[:-1] if self.held else 0.5 * (tau[1:] + tau[:-1])
+        return np.concatenate([[0.0], np.cumsum(each * np.diff(self.t))])
+
+    @cached_property
+    def length(self) -> Array:
+        """(windows,) [s]"""
+        return np.diff(self.t[self.edges])
+
+    @cached_property
+    def torque(self) -> Array:
+        """Mean torque of every window that is kept (rows,) [N m]."""
+        return np.asarray((np.diff(self.impulse[self.edges]) / self.length)[self.kept])
+
+    @cached_property
+    def rigid(self) -> Array:
+        """Columns of J and of gravity (rows, 1 + gravity)."""
+        mean = np.diff(self.dq[self.edges]) / self.length
+        gravity = self.windows.means(gravity_columns(self.nodes.q[:, 0], self.revolute))
+        return np.hstack([mean[self.kept, None], gravity])
+
+    @cached_property
+    def ends(self) -> Array:
+        """Times between the nodes [s] (nodes + 1,): fine where friction may change its sign, coarse where speed hardly changes."""
+        v, t = self.dq, self.t
+        nearest = np.where(v[1:] * v[:-1] <= 0.0, 0.0, np.minimum(np.abs(v[1:]), np.abs(v[:-1])))
+        fine = nearest < _NEAR * np.abs(np.diff(v))
+        parts = np.where(fine, _PARTS, 1)
+        size = self._group
+        if size > 1:
+            whole = len(fine) // size * size
+            group = np.abs(np.stack([v[k:whole + k:size] for k in range(size + 1)]))
+            slowest = group.min(axis=0)
+            alone = nearest[:whole].reshape(-1, size).min(axis=1) > 0.0
+            steady = np.repeat(alone & (slowest > _STEADY * (group.max(axis=0) - slowest)), size)
+            inside = np.arange(whole) % size > 0
+            parts[:whole][steady & inside] = 0  # the node before reaches over it
+        at = np.repeat(np.arange(len(parts)), parts)
+        first = np.concatenate([[0], np.cumsum(parts)[:-1]])
+        share = (np.arange(len(at)) - first[at]) / parts[at]
+        return np.append(t[at] + share * np.diff(t)[at], t[-1])
+
+    @property
+    def _group(self) -> int:
+        """Samples that one node may stand for: a divisor of the window."""
+        most = max(1, min(_MOST, int(_COARSEST / float(np.median(np.diff(self.t))) + 1e-9)))
+        return max(size for size in range(1, most + 1) if self.window % size == 0)
+
+    @cached_property
+    def nodes(self) -> Motion:
+        """Motion (nodes, 1) in the middle of every part; speed runs straight from sample to sample."""
+        ends = self.ends
+        middle = 0.5 * (ends[1:] + ends[:-1])
+        v = np.interp(ends, self.t, self.dq)
+        return Motion(middle, np.interp(middle, self.t, self.q)[:, None], np.interp(middle, self.t, self.dq)[:, None],
+                      (np.diff(v) / np.diff(ends))[:, None])
+
+    @cached_property
+    def windows(self) -> Windows:
+        """Where the nodes lie in the windows that are kept."""
+        first = np.searchsorted(self.ends[:-1], self.t[self.edges])
+        length = np.full(len(self.ends) - 1, np.inf)
+        length[:first[-1]] = np.repeat(self.length, np.diff(first))
+        return Windows(self.nodes, np.diff(self.ends) / length, first[:-1], self.kept)
+
+    def accumulated(self, values: Array) -> Array:
+        """∫ values dt of values (nodes,) from the first sample, at every sample."""
+        whole = np.concatenate([[0.0], np.cumsum(values * np.diff(self.ends))])
+        return np.asarray(np.interp(self.t, self.ends, whole))
+
+    @cached_property
+    def middle(self) -> tuple[Array, Array, Array]:
+        """Position, speed and time of every row (rows,), as means over its window."""
+        mean = self.windows.means(np.hstack([self.nodes.q, self.nodes.dq, self.nodes.t[:, None]]))
+        return mean[:, 0], mean[:, 1], mean[:, 2]
+
+
+def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: float) -> tuple[Stretch, ...]:
+    """What of `log` can be used for its joint `joint`, counted from 1, in windows of `window` [s]."""
+    good, j = found.good, joint - 1
+    others = tuple(float(np.nanmedian(good.log.q[:, k])) for k in range(log.n_joints) if k != j)
+    size = max(_SHORTEST, round(window / log.sample_time))
+    stretches = []
+    for run in good.runs:
+        rows = good.kept[run]
+        q, dq = found.motion.q[rows, j], found.motion.dq[rows, j]
+        spoilt = (good.missing | good.spikes | good.saturated)[run, j] | ~np.isfinite(q + dq)
+        if found.std is not None:
+            speed = found.std[1][rows, j]
+            spoilt |= speed > _VAGUE * np.nanmedian(found.std[1][:, j])
+        measured = np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j])
+        stretch = Stretch(log.name, good.log.t[run], measured, good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
+                          np.where(np.isfinite(dq), dq, 0.0), spoilt, log.torque != "measured", size,
+                          log.robot.joints[j].revolute, others)
+        if len(stretch.edges) > _FEWEST and stretch.rows >= _FEWEST:
+            stretches.append(stretch)
+    return tuple(stretches)
