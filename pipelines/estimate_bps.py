@@ -22,7 +22,8 @@ from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, model_text, read_model
 from pipelines.log.results import encode
 from pipelines.model.arm import Arm, ArmTorque
-from pipelines.model.estimation.checks import consistency, power_balance
+from pipelines.model.estimation.balance import power_balance
+from pipelines.model.estimation.checks import consistency
 from pipelines.model.estimation.compare import compare
 from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, fit_logs, judge
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
@@ -147,7 +148,7 @@ def _result(fitted: Fitted, judged: Judged, arm: Arm, settings: Settings) -> Res
         torque_signal_rms={key: tuple(map(float, e.signal_rms)) for key, e in both.items()},
         held_out=judged.by, filter_hz=fitted.recipe.cutoff_hz, equations=tuple(map(int, found.statistics.counts)),
         friction="fitted" if fitted.recipe.known is None else "given",
-        physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(fitted),
+        physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
         unresolved=str(found.unresolved) if found.unresolved.parameters else "",
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,

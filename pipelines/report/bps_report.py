@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pipelines.model.estimation.balance import ALONE, CLOSED
 from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
@@ -105,6 +106,8 @@ def _trust_section(result: Result) -> Section:
         tables.append(Table(("condition", "value", "holds"), tuple(
             (i.condition, with_std(i.value, i.std), "yes" if i.holds else "no") for i in result.consistency.inequalities),
             "What positive mass demands of these parameters."))
+    if (balance := _balance_table(result)) is not None:
+        tables.append(balance)
     growth = convergence_figure(
         "convergence", "Estimates as samples come in, each in units of its final value: a model that is right settles early.",
         result.convergence_samples, result.convergence, result.convergence_std, tuple(p.name for p in result.parameters))
@@ -112,13 +115,44 @@ def _trust_section(result: Result) -> Section:
 
 
 def _balance_words(result: Result) -> tuple[str, ...]:
-    if result.balance is None:
+    """What the balance of power says, and what a difference would mean."""
+    balance = result.balance
+    if balance is None:
         return ()
-    largest = f"the largest difference is {max(result.balance.apart):.1f} standard deviations"
-    if result.balance.agree:
-        return (f"The balance of power, which needs no acceleration, gives the same parameters: {largest}.",)
-    return (f"The balance of power, which needs no acceleration, gives other parameters: {largest}. Either the reconstructed "
-            f"acceleration is spoilt, or position and torque are not of the same instant, or the model lacks an effect.",)
+    together = (f"all differences together make χ² = {balance.chi_square:.3g} of {balance.freedom}, the largest is "
+                f"{max(balance.apart):.1f} standard deviations")
+    late = (f"torque lies {with_std(1e3 * abs(balance.delay), 1e3 * balance.delay_std)} ms "
+            f"{'behind' if balance.delay > 0 else 'ahead of'} the position")
+    if balance.agree:
+        return (f"The balance of power, which needs no acceleration, gives the same parameters: {together}; {late}.",)
+    meanings = []
+    if balance.closure > CLOSED:
+        meanings.append(f"the reconstructed motion contradicts itself by {100 * balance.closure:.2g} % of the energy: its "
+                        f"acceleration is not the slope of its speed, as after an observer that lags; a smoother's is.")
+    if abs(balance.delay) > ALONE * balance.delay_std:
+        meanings.append(f"{late}: a drive or a filter delays one of them, or their clocks differ.")
+    if differing := [name for name, apart in zip(balance.names, balance.apart, strict=True) if apart > ALONE]:
+        meanings.append(f"{', '.join(differing)} {'differs' if len(differing) == 1 else 'differ'}: the reconstructed acceleration "
+                        f"is too small or too large, or the model lacks an effect.")
+    if not meanings:
+        meanings.append("No one of them stands out, all of them together do: most likely the model lacks an effect.")
+    return (f"The balance of power, which needs no acceleration, does not confirm the parameters: {together}.",
+            *(f"{words[0].upper()}{words[1:]}" for words in meanings))
+
+
+def _balance_table(result: Result) -> Table | None:
+    if result.balance is None:
+        return None
+    fitted, balance = {p.name: p for p in result.parameters}, result.balance
+    rows = [(name, with_std(p.value, p.std) if (p := fitted[name]).value is not None and p.std is not None else "not determined",
+             with_std(value, std), p.unit, apart)
+            for name, value, std, apart in zip(balance.names, balance.value, balance.std, balance.apart, strict=True)]
+    rows.append(("torque behind position", "taken for 0", with_std(1e3 * balance.delay, 1e3 * balance.delay_std), "ms",
+                 abs(balance.delay) / balance.delay_std))
+    tones: tuple[Tone, ...] = tuple("attention" if float(row[4]) > ALONE else "good" for row in rows)
+    return Table(("parameter", "by the torques", "by the balance of power", "unit", "apart [std]"), tuple(rows),
+                 f"{balance.windows} balances of work and energy. Above {ALONE:g} standard deviations a difference is not chance.",
+                 tones)
 
 
 def _winner(comparison: tuple[Compared, ...]) -> str:

@@ -54,8 +54,13 @@ def test_impossible_links_and_a_balance_that_differs_are_said(result: Result) ->
     wrong = replace(result, physically_consistent=False, balance=replace(result.balance, agree=False, apart=apart))
     assert bps_report(wrong).tone == "bad"
     assert "No links that could exist" in bps_report(wrong).verdict
-    assert "gives other parameters" in page(wrong)
+    assert "does not confirm the parameters" in page(wrong)
     assert "or the model lacks an effect" in page(wrong)
+    late = replace(wrong, balance=replace(result.balance, agree=False, delay=2e-3, delay_std=1e-5))
+    assert "ms behind the position: a drive or a filter delays one of them" in page(late)
+    lagging = replace(wrong, balance=replace(result.balance, agree=False, closure=0.031))
+    said = " ".join(text for section in bps_report(lagging).sections for text in section.text)
+    assert "contradicts itself by 3.1 % of the energy" in said
 
 
 def test_names_from_logs_are_inert(result: Result) -> None:

@@ -8,7 +8,8 @@ from pipelines.errors import Check
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
-from pipelines.model.estimation.checks import Balance, Consistent
+from pipelines.model.estimation.balance import Balance
+from pipelines.model.estimation.checks import Consistent
 from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.outcome import Course, Direction, Estimated
 
