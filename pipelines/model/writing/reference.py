@@ -144,18 +144,19 @@ class WritingTask:
         return f"{'' if piece.drawn else 'on the way to '}{self.path.place(piece.letter)}, tip at ({x:.3f}, {y:.3f}, {z:.3f}) m"
 
 
-def writing_task(robot: RobotDescription, text: str, page: Page | None = None, pace: Pace | None = None, *, elbow: Elbow = "up",
-                 posture: Sequence[float] | None = None, rest: float = 0.5) -> WritingTask:
+def writing_task(robot: RobotDescription, text: str, page: Page | None = None, pace: Pace | None = None, *,
+                 elbow: Elbow | None = None, posture: Sequence[float] | None = None, rest: float = 0.5) -> WritingTask:
     """`text` as a task for `robot`.
 
     Args:
-        elbow: of the RRR arm, which has a closed form.
+        elbow: of the RRR arm, which has a closed form; "up" by default.
         posture: (joints,) [rad] of any other arm, near the task: the numerical inverse starts there, and an arm of more than
             three joints stays near it. By default the middle of each joint's range.
         rest: [s] at rest before and after.
 
     Raises:
-        UsageError: the text, the page or the pace makes no sense, or the arm has fewer than three joints.
+        UsageError: the text, the page or the pace makes no sense; the arm has fewer than three joints; an elbow for an arm
+            without a closed form, or a posture for one that has it.
     """
     page, pace = page or Page(), pace or Pace()
     if not (math.isfinite(rest) and rest >= 0.0):
@@ -164,9 +165,14 @@ def writing_task(robot: RobotDescription, text: str, page: Page | None = None, p
     return WritingTask(robot, path, pace, time_law(path, pace), _inverse(robot, elbow, posture), rest)
 
 
-def _inverse(robot: RobotDescription, elbow: Elbow, posture: Sequence[float] | None) -> Inverse:
+def _inverse(robot: RobotDescription, elbow: Elbow | None, posture: Sequence[float] | None) -> Inverse:
     if rrr.fits(robot):
-        return ClosedForm(rrr_geometry(robot), elbow)
+        if posture is not None:
+            raise UsageError("C02", "a posture for an arm that has a closed form", where=robot.name, remedy="say elbow up or down")
+        return ClosedForm(rrr_geometry(robot), elbow or "up")
+    if elbow is not None:
+        raise UsageError("C02", f"elbow {elbow} of an arm that is not the RRR arm", where=robot.name,
+                         remedy="give a posture near the task instead")
     if robot.n_joints < _FEWEST_JOINTS:
         raise UsageError("C02", f"{robot.n_joints} joints cannot write", where=robot.name,
                          remedy="writing takes three joints or more")

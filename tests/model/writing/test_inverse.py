@@ -100,3 +100,11 @@ def test_a_posture_of_another_arm_is_refused(shared: Path, tmp_path: Path) -> No
     robot: RobotDescription = ARMS["tx40"](shared, tmp_path).robot
     with pytest.raises(UsageError, match="a posture of 3 joints for an arm of 6"):
         writing_task(robot, "A", posture=(0.0, 0.0, 0.0))
+
+
+def test_a_choice_that_the_arm_does_not_have_is_refused(shared: Path, tmp_path: Path) -> None:
+    """Neither an elbow of the TX40 nor a posture of the RRR arm is passed over in silence."""
+    with pytest.raises(UsageError, match="elbow up of an arm that is not the RRR arm"):
+        writing_task(ARMS["tx40"](shared, tmp_path).robot, "A", elbow="up")
+    with pytest.raises(UsageError, match="a posture for an arm that has a closed form"):
+        writing_task(ARMS["rrr"](shared, tmp_path).robot, "A", posture=(0.0, 0.0, 0.0))
