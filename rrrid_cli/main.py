@@ -19,6 +19,7 @@ from pipelines import __version__
 from pipelines.errors import Interrupted, RrridError, UsageError
 from rrrid_cli.console import Teller, say_error, say_outcome
 from rrrid_cli.options import Common, LogPaths, StageCommand, StageGroup, numbers, with_common
+from rrrid_cli.process import economise
 from rrrid_cli.usage import WrongUsage, as_error
 
 __all__ = ["app", "entry"]
@@ -224,9 +225,7 @@ def _interrupt(number: int, _frame: FrameType | None) -> NoReturn:
 
 def entry() -> NoReturn:
     """The console script: every error becomes one line and an exit code; a traceback only with --debug."""
-    # Default threading makes the many small solves 5-10 times slower (design.md).
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
+    economise()
     signal.signal(signal.SIGTERM, _interrupt)
     signal.signal(signal.SIGINT, _interrupt)
     sys.unraisablehook = _again

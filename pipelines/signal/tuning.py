@@ -186,7 +186,9 @@ def tune_smoother(y: Array, sample_time: float, resolution: Array | float, order
         passed, weight = stationary(order, np.ones(1)).numerator(w) / w**order, power[1:] / w**order
         grid = np.geomspace(min((8.0 * 37.0 / len(values)) ** order, 1e-2), 1e4, 30)
         for _ in range(3):
-            left = 1.0 / (1.0 + np.multiply.outer(grid**2, passed))  # 1 - G
+            left = np.multiply.outer(grid**2, passed)
+            left += 1.0
+            np.divide(1.0, left, out=left)  # 1 - G
             free, rest = left.sum(axis=1) / len(power), np.square(left, out=left) @ weight / len(power)
             best = int(np.argmin(rest / free**2))
             index, ratio = float(grid[best]), grid[1] / grid[0]
@@ -208,7 +210,12 @@ def _tune_channel(y: Array, order: int, step: float) -> tuple[float, float, bool
     grid = bank.filter.tracking_index
     if not lively.any():
         return float(grid[0]), given, False, False, np.nan
-    for _ in range(3):  # twice finer around the best of either criterion
+    index = 0.0
+    for finer in range(3):  # twice finer around the best of either criterion
+        if finer:
+            ratio = grid[1] / grid[0]
+            grid = np.geomspace(index / ratio, index * ratio, 13)
+            bank = _Bank(order, grid)
         mean_square, remainder = _mean_square(values, lively, bank), bank.filter.remainder
         expected = given / remainder
         fixed = np.log(expected) + mean_square / expected  # -2 log likelihood a sample, R given
@@ -218,10 +225,7 @@ def _tune_channel(y: Array, order: int, step: float) -> tuple[float, float, bool
         believed = bool(noise[best] > _NOISIER * given and free[best] < fixed.min() - 20.0 / np.count_nonzero(lively))
         best = best if believed else int(np.argmin(fixed))
         index, variance = float(grid[best]), float(noise[best] if believed else given)
-        ratio = grid[1] / grid[0]
-        grid = np.geomspace(index / ratio, index * ratio, 13)
-        bank = _Bank(order, grid)
-    white = np.where(lively, _Bank(order, np.array([index])).surprise(values)[0], np.nan)
+    white = np.where(lively, bank.surprise(values, slice(best, best + 1))[0], np.nan)
     return index, variance, believed, True, float(whiteness(white[len(white) // 4:, None]).statistic[0])
 
 
@@ -259,16 +263,18 @@ class _Bank:
         self.inside = np.eye(BLOCK) - blocks.impulse_toeplitz(late)
         self.free = -self.power[:, :BLOCK, 0].swapaxes(1, 2)
 
-    def surprise(self, values: Array) -> Array:
-        """Innovations (filters, samples) of one channel; whole blocks only."""
-        y = (values - values[0]).reshape(1, -1, BLOCK)
-        drive = np.zeros((len(self.entry), y.shape[1], self.filter.order))
+    def surprise(self, values: Array, which: slice = slice(None)) -> Array:
+        """Innovations (filters, samples) of one channel by the filters `which`; whole blocks only."""
+        y, entry, step = (values - values[0]).reshape(1, -1, BLOCK), self.entry[which], self.filter.step[which]
+        drive = np.zeros((len(entry), y.shape[1], self.filter.order))
         away = np.arange(BLOCK) - (BLOCK - 1) / 2.0
         slope = float(away @ y[0, 0] / (away @ away))  # the filters start on the straight line through the first block
-        drive[:, 0, 0], drive[:, 0, 1] = y[0, 0].mean() + slope * away[0], slope / self.filter.step
-        drive[:, 1:] = y[:, :-1] @ self.entry[:, ::-1]
-        blocks.scan(self.power[:, BLOCK], drive)
-        return np.asarray(y @ self.inside + drive @ self.free).reshape(len(self.entry), -1)
+        drive[:, 0, 0], drive[:, 0, 1] = y[0, 0].mean() + slope * away[0], slope / step
+        drive[:, 1:] = y[:, :-1] @ entry[:, ::-1]
+        blocks.scan(self.power[which, BLOCK], drive)
+        found = y @ self.inside[which]
+        found += drive @ self.free[which]
+        return np.asarray(found).reshape(len(entry), -1)
 
 
 @lru_cache(maxsize=16)
@@ -282,5 +288,5 @@ def _mean_square(values: Array, lively: npt.NDArray[np.bool_], bank: _Bank) -> A
     if np.count_nonzero(lively[len(values) // 4:]) > len(values) // 16:
         counted[:len(values) // 4] = False  # long enough for the slowest filter to settle
     surprise = bank.surprise(values)
-    return np.asarray(np.maximum(np.einsum("fk,fk,k->f", surprise, surprise, counted.astype(np.float64))
-                                 / np.count_nonzero(counted), 1e-300))
+    total = np.square(surprise, out=surprise) @ counted.astype(np.float64)
+    return np.asarray(np.maximum(total / np.count_nonzero(counted), 1e-300))

@@ -1,0 +1,35 @@
+"""Set up the process of one command: threads, garbage, memory. What a run of half a second would spend on them, a fifth, is saved.
+
+    economise()      first of all, before NumPy is loaded
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import gc
+import os
+
+__all__ = ["economise"]
+
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_OBJECTS = 100_000  # made since the last search for cycles, before the next
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
+_ARRAY = 32 << 20  # [B] the largest array whose memory is kept for the next: where glibc would end by itself
+_KEPT = 64 << 20  # [B] free memory at most
+
+
+def economise() -> None:
+    """One BLAS thread, few searches for cycles, memory of arrays used again."""
+    # Default threading makes the many small solves 5-10 times slower (design.md).
+    for name in _THREADS:
+        os.environ.setdefault(name, "1")
+    # Modules stay and arrays go by reference counts: to look for cycles among them at every 700th object costs 30 ms,
+    # and again at the very end, when all goes anyway.
+    gc.set_threshold(_OBJECTS, 20, 20)
+    atexit.register(gc.freeze)
+    # Each array of a 10 s log would be mapped anew, and every page of it faults: 40 ms.
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc has it
+    if mallopt is not None:
+        mallopt(_M_MMAP_THRESHOLD, _ARRAY)
+        mallopt(_M_TRIM_THRESHOLD, _KEPT)
