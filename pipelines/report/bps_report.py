@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from pipelines.model.estimation.balance import ALONE, CLOSED
 from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.outcome import Estimated
@@ -21,6 +23,8 @@ _ALIKE = 0.02  # of the better error: less is no difference worth speaking of
 def bps_report(result: Result) -> Report:
     """The verdict, Table V with standard deviations, and what the estimate rests on."""
     sections = [_parameter_section(result), _course_section(result), _trust_section(result)]
+    if result.noise_floor:
+        sections.insert(2, _noise_section(result))
     if result.comparison:
         sections.append(_comparison_section(result))
     return Report("Base parameters", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
@@ -54,16 +58,49 @@ def _verdict(result: Result) -> str:
         return f"These logs do not determine the model: {result.unresolved}."
     seen = [_seen(p) for p in result.parameters]
     small, worst = seen.count("known to be small"), _worst_joint(result)
+    noise = _beside_noise(result)
     text = (f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
             f"{f', {small} known to be small' if small else ''}; the model explains the torque of {judged} "
             f"to {100 * result.relative_error['validate']:.2g} %"
-            f"{f', that of the worst joint less well: {worst}' if worst else ''}.")
+            f"{f', that of the worst joint less well: {worst}' if worst else ''}{f'; {noise}' if noise else ''}.")
     return text if result.physically_consistent is not False else f"{text} No links that could exist have these parameters."
 
 
+def _beside_noise(result: Result) -> str:
+    """"the residual is at most 1.1 times what differs from one period to the next", of the fitted logs; empty without periods."""
+    ratios = [(float(ratio), result.joints[j]) for log in result.noise_floor if log.role == "identify"
+              for j, ratio in enumerate(log.ratio) if math.isfinite(ratio)]
+    if not ratios:
+        return ""
+    worst, joint = max(ratios)
+    return (f"the residual is {'' if len(result.joints) == 1 else 'at most '}{worst:.2g} times what the noise between periods leaves"
+            f"{'' if len(result.joints) == 1 else f' ({joint})'}")
+
+
+def _noise_section(result: Result) -> Section:
+    """Residual and noise floor side by side, and which periods were averaged."""
+    text, rows = [], []
+    for log in result.noise_floor:
+        left_out = f"; period {', '.join(map(str, log.left_out))} differs and is left out" if log.left_out else ""
+        text.append(f"{log.log}: the mean of {log.periods} periods makes the equations{left_out}." if log.averaged else
+                    f"{log.log}: its periods are not averaged, {log.why_not}.")
+        rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.floor[j],
+                  log.residual[j], log.ratio[j]) for j, name in enumerate(result.joints)]
+    columns = ("log", "joint", "position, one sample [rad]", "torque, one sample [N m]", "after the low-pass [N m]",
+               "by noise of the motion [N m]", "noise floor [N m]", "residual [N m]", "residual / floor")
+    values = tuple(tuple(x if isinstance(x, str) or math.isfinite(x) else None for x in row) for row in rows)
+    return Section("Residual beside the noise floor", (*text, "What differs from one period to the next is noise, which no model "
+                   "explains. A residual well above it is what this model lacks; equal to it, more experiments help, not more model."),
+                   (Table(columns, values, "Root mean squares. Noise floor: what is left of the noise of torque and motion in the "
+                                           "equations, where periods are averaged in their mean."),))
+
+
 def _key_figures(result: Result) -> Table:
+    beside = tuple((f"residual over noise floor, {log.log}, joint by joint", ", ".join(f"{ratio:.2g}" for ratio in log.ratio))
+                   for log in result.noise_floor if all(map(math.isfinite, log.ratio)))
     rows = (("relative torque error, fitted logs [%]", 100 * result.relative_error["identify"]),
             (f"relative torque error, held-out {result.held_out} [%]", 100 * result.relative_error["validate"]),
+            *beside,
             ("equations, joint by joint", ", ".join(map(str, result.equations))),
             ("condition number of the rigid columns", result.condition_number),
             ("condition number of the fit, unit columns", result.condition_number_fit),
@@ -156,24 +193,32 @@ def _balance_table(result: Result) -> Table | None:
 
 
 def _winner(comparison: tuple[Compared, ...]) -> str:
-    """Which way explains best what was held out."""
+    """Whether another way explains measurably better what was held out, and by how much."""
     ranked = sorted((c for c in comparison if c.value), key=lambda c: c.validate)
     if len(ranked) < 2:
         return "Only one way gives an estimate." if ranked else "No way gives an estimate."
-    best = ranked[0]
-    near = [c.method for c in ranked[1:] if c.validate <= (1.0 + _ALIKE) * best.validate]
-    if len(near) == len(ranked) - 1:
-        return "Held out, there is no difference worth speaking of."
-    if near:
-        return f"Held out, there is no difference worth speaking of between {best.method} and {', '.join(near)}; the rest is worse."
-    return f"Held out, {best.method} explains the torque best."
+    used = next((c for c in ranked if c.used), None)
+    if used is None:
+        return f"The way that was asked for gives no estimate; held out, {ranked[0].method} explains the torque best."
+    better = [c for c in ranked if c.apart[1] < 0.0]
+    if better and better[0].validate < (1.0 - _ALIKE) * used.validate:
+        low, high = (100 * bound for bound in better[0].apart)
+        return (f"Held out, {better[0].method} is measurably better than {used.method}, which was used: its error is lower by "
+                f"{-high:.2g} to {-low:.2g} percentage points (95 %). To use it, say --method {better[0].method}.")
+    worse = [c.method for c in ranked if not c.used and c.apart[0] > 0.0]
+    rest = f"; {' and '.join(worse)} {'is' if len(worse) == 1 else 'are'} measurably worse" if worse else ""
+    how = "better by more than a trifle" if better else "measurably better"
+    return f"Held out, no way is {how} than {used.method}, which was used{rest}."
 
 
 def _comparison_section(result: Result) -> Section:
-    rows = tuple((c.method, 100 * c.identify, 100 * c.validate, c.failed or ("used here" if c.used else ""))
+    rows = tuple((c.method, 100 * c.identify, 100 * c.validate,
+                  "" if c.used or not c.value else f"{100 * c.apart[0]:+.2g} … {100 * c.apart[1]:+.2g}",
+                  c.failed or ", ".join(filter(None, ("used here" if c.used else "", "as good as the best" if c.tied else ""))))
                  for c in result.comparison)
-    errors = Table(("motion by", "fitted [%]", "held out [%]", ""), rows,
-                   f"Relative torque error on the same equations. {_winner(result.comparison)}")
+    errors = Table(("motion by", "fitted [%]", "held out [%]", "less the one used, 95 % [%]", ""), rows,
+                   "Relative torque error on the same equations. The intervals come of drawing the held-out stretches of time "
+                   f"anew, the same ones for both. {_winner(result.comparison)}")
     good = [c for c in result.comparison if c.value]
     values = tuple((p.name, *(with_std(c.value[k], c.std[k]) for c in good))
                    for k, p in enumerate(result.parameters[:len(good[0].value) if good else 0]))

@@ -123,21 +123,39 @@ def test_all_ways_are_judged_by_the_same_equations(alone: bool, min_speed: float
     assert result.comparison[0].equations > 0
 
 
-def _compared(**errors: float) -> tuple[Compared, ...]:
-    return tuple(Compared(name, False, error, error, 9, (1.0,), (0.1,), "") for name, error in errors.items())
+def _compared(**errors: tuple[float, float, float]) -> tuple[Compared, ...]:
+    """Of each way its held-out error and the interval of its difference to the first, which is the one used."""
+    return tuple(Compared(name, k == 0, error, error, (low, high), low <= 0.0, 9, (1.0,), (0.1,), "")
+                 for k, (name, (error, low, high)) in enumerate(errors.items()))
 
 
-def test_the_report_names_the_best_way(good: ExperimentLog, tmp_path: Path) -> None:
+def test_the_report_names_a_better_way_only_where_it_is_measured(good: ExperimentLog, tmp_path: Path) -> None:
     result = stage(tmp_path, good).result
 
-    def said(**errors: float) -> str:
+    def said(**errors: tuple[float, float, float]) -> str:
         section = bps_report(replace(result, comparison=_compared(**errors))).sections[-1]
         assert section.text[0] in section.tables[0].caption
         return section.text[0]
 
-    assert "observer explains the torque best" in said(smoother=0.05, observer=0.04)
-    assert said(smoother=0.0401, observer=0.04) == "Held out, there is no difference worth speaking of."
-    assert "between observer and smoother" in said(smoother=0.0401, observer=0.04, other=0.05)
+    better = said(smoother=(0.05, 0.0, 0.0), observer=(0.04, -0.012, -0.008))
+    assert "observer is measurably better than smoother, which was used" in better
+    assert "0.8 to 1.2 percentage points" in better
+    assert "--method observer" in better
+    draw = "no way is measurably better than smoother, which was used"
+    assert said(smoother=(0.05, 0.0, 0.0), observer=(0.04, -0.021, 0.001)).endswith(f"{draw}.")
+    assert said(smoother=(0.04, 0.0, 0.0), other=(0.05, 0.008, 0.012)).endswith(f"{draw}; other is measurably worse.")
+    assert "better by more than a trifle than smoother" in said(smoother=(0.0401, 0.0, 0.0), observer=(0.04, -0.0002, -0.0001))
+
+
+def test_what_is_alike_is_called_so(samples: Path, tmp_path: Path) -> None:
+    """Sample logs of a fine encoder: smoother and zero-phase filter cannot be told apart, the observer can."""
+    request = Request((samples / "rrr-closed-form",), out=tmp_path / "out", no_report=True)
+    beside = {c.method: c for c in run_stage(estimate_bps.STAGE, request, Settings()).result.comparison}
+    assert {name for name, c in beside.items() if c.tied} == {"smoother", "zero-phase"}
+    low, high = beside["zero-phase"].apart
+    assert low < beside["zero-phase"].validate - beside["smoother"].validate < high
+    assert low < 0.0 < high
+    assert beside["observer"].apart[0] > 0.5 * (beside["observer"].validate - beside["smoother"].validate)
 
 
 def test_the_verdict_names_the_worst_joint_and_what_is_small(good: ExperimentLog, tmp_path: Path) -> None:
