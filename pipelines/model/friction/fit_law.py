@@ -39,7 +39,10 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class LawFit:
-    """A law with its numbers and their covariance. Order of `beta`: J, c, c' of each posture, then the law's amplitudes."""
+    """A law with its numbers and their covariance.
+
+    Order of `beta`: J, c, c' and couplings of each posture, then the law's amplitudes.
+    """
 
     law: Law
     joint: OneJoint  # with the inertia and gravity of the first posture
@@ -61,11 +64,18 @@ class LawFit:
 
     @property
     def gravity(self) -> tuple[float, ...]:
-        return tuple(map(float, self.found.beta[1:self.rigid_size]))
+        return tuple(map(float, self.found.beta[1:1 + len(gravity_names(self.joint.revolute))]))
+
+    def at(self, stretch: Stretch) -> tuple[OneJoint, Array]:
+        """The joint as it is in the posture of `stretch`, and the inertias (coupled,) of the joints that sway beside it."""
+        rigid = self.found.beta[:self.rigid_size * len(self.postures)].reshape(-1, self.rigid_size)
+        own = rigid[nearest(stretch.posture, self.postures)]
+        last = 1 + len(gravity_names(self.joint.revolute))
+        return self.joint.carrying(float(own[0]), tuple(map(float, own[1:last]))), own[last:]
 
     @cached_property
     def std(self) -> Array:
-        """Of J, c, c' of each posture, the amplitudes, and θ."""
+        """Of J, c, c' and couplings of each posture, the amplitudes, and θ."""
         return np.sqrt(np.maximum(np.diag(self.found.covariance), 0.0))
 
     @cached_property
@@ -140,8 +150,8 @@ class LawEquations:
 
     @cached_property
     def width(self) -> int:
-        """Numbers of one posture: J, c, c'."""
-        return 1 + len(gravity_names(self.joint.revolute))
+        """Numbers of one posture: J, c, c', and the inertias that couple joints which sway."""
+        return int(self.stretches[0].rigid.shape[1])
 
     @cached_property
     def fixed(self) -> Array:
@@ -163,7 +173,8 @@ class LawEquations:
         if beta is None:
             return (self.joint,) * len(self.postures)
         parts = beta[:self.width * len(self.postures)].reshape(-1, self.width)
-        return tuple(self.joint.carrying(float(part[0]), tuple(map(float, part[1:]))) for part in parts)
+        gravity = len(gravity_names(self.joint.revolute))
+        return tuple(self.joint.carrying(float(part[0]), tuple(map(float, part[1:1 + gravity]))) for part in parts)
 
     def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array:
         """The law's columns (rows, amplitudes)."""

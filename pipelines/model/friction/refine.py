@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.model.friction.fit_law import LawFit, nearest
+from pipelines.model.friction.fit_law import LawFit
 from pipelines.model.friction.one_joint import gravity_columns
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array
@@ -50,14 +50,11 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float) -> Stretch:
 
 def reference_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
     """q_r and dq_r (samples,): what the fitted joint does under the measured torque, friction taken along the motion so far."""
-    rigid = fit.found.beta[:fit.rigid_size * len(fit.postures)].reshape(-1, fit.rigid_size)
-    inertia, *gravity = rigid[nearest(stretch.posture, fit.postures)]
-    arm = fit.joint.carrying(float(inertia), tuple(map(float, gravity)))
+    arm, coupling = fit.at(stretch)
     nodes = stretch.nodes
-    load = gravity_columns(nodes.q[:, 0], stretch.revolute) @ np.array(gravity)
+    load = gravity_columns(nodes.q[:, 0], stretch.revolute) @ np.array(arm.gravity)
     load = load + fit.law.columns(nodes, arm, fit.theta) @ fit.amplitudes
-    lost = stretch.accumulated(load)
-    dq = (stretch.impulse - lost) / inertia
+    dq = (stretch.impulse - stretch.accumulated(load) - (stretch.coupled - stretch.coupled[0]) @ coupling) / arm.inertia
     step = np.diff(stretch.t)
     q = np.concatenate([[0.0], np.cumsum(0.5 * step * (dq[1:] + dq[:-1]))])
     shift = np.nanmedian(stretch.measured[:50] - q[:50]) if np.isfinite(stretch.measured[:50]).any() else 0.0

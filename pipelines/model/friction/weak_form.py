@@ -12,6 +12,7 @@ for a few samples where speed hardly changes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,7 +24,7 @@ from pipelines.model.friction.one_joint import gravity_columns
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Stretch", "Windows", "stretches_of"]
+__all__ = ["Stretch", "Windows", "stretches_of", "swaying"]
 
 _PARTS = 8  # of an interval in which speed passes zero
 _NEAR = 2.0  # changes of speed within a sample: nearer to zero, the sign of friction may turn over inside
@@ -31,6 +32,7 @@ _STEADY = 20.0  # a speed that changes by less than a twentieth: one node for se
 _MOST = 5  # of them
 _COARSEST = 5e-3  # [s]
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
+_SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
 _FEWEST = 10  # windows of a stretch that is worth using
 _SHORTEST = 4  # samples of a window
 
@@ -74,6 +76,7 @@ class Stretch:
     window: int  # samples
     revolute: bool
     posture: tuple[float, ...]  # [rad] of the other joints
+    coupled: Array  # [rad/s] (samples, coupled) speeds of joints that are held and give way
 
     def moved(self, q: Array, dq: Array) -> Stretch:
         """The same with a better motion."""
@@ -113,10 +116,14 @@ class Stretch:
 
     @cached_property
     def rigid(self) -> Array:
-        """Columns of J and of gravity (rows, 1 + gravity)."""
+        """Columns of J, of gravity, and of the inertias J_k that couple joints which are held and sway: (rows, width).
+
+        A controller that holds a joint lets it give way a little; J_k ddq_k then is a torque on this one, and larger than noise.
+        """
         mean = np.diff(self.dq[self.edges]) / self.length
+        beside = np.diff(self.coupled[self.edges], axis=0) / self.length[:, None]
         gravity = self.windows.means(gravity_columns(self.nodes.q[:, 0], self.revolute))
-        return np.hstack([mean[self.kept, None], gravity])
+        return np.hstack([mean[self.kept, None], gravity, beside[self.kept]])
 
     @cached_property
     def ends(self) -> Array:
@@ -162,6 +169,11 @@ class Stretch:
         length[:first[-1]] = np.repeat(self.length, np.diff(first))
         return Windows(self.nodes, np.diff(self.ends) / length, first[:-1], self.kept)
 
+    def sway(self) -> Array:
+        """Accelerations of the coupled joints over the step after each sample (samples, coupled) [rad/s^2]."""
+        each = np.diff(self.coupled, axis=0) / np.diff(self.t)[:, None]
+        return np.vstack([each, np.zeros((1, each.shape[1]))])
+
     def accumulated(self, values: Array) -> Array:
         """∫ values dt of values (nodes,) from the first sample, at every sample."""
         whole = np.concatenate([[0.0], np.cumsum(values * np.diff(self.ends))])
@@ -174,8 +186,20 @@ class Stretch:
         return mean[:, 0], mean[:, 1], mean[:, 2]
 
 
-def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: float) -> tuple[Stretch, ...]:
-    """What of `log` can be used for its joint `joint`, counted from 1, in windows of `window` [s]."""
+def swaying(found: Reconstructed, joint: int, resolution: Array) -> tuple[int, ...]:
+    """Joints, counted from 1, that are held in the log but visibly give way."""
+    q = found.motion.q[found.good.kept[found.good.fit]]
+    moved = np.ptp(q, axis=0) > _SWAY * resolution
+    return tuple(int(k) + 1 for k in np.flatnonzero(moved) if k != joint - 1)
+
+
+def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: float,
+                 coupled: Sequence[int] = ()) -> tuple[Stretch, ...]:
+    """What of `log` can be used for its joint `joint`, counted from 1, in windows of `window` [s].
+
+    Args:
+        coupled: joints that are held and sway.
+    """
     good, j = found.good, joint - 1
     others = tuple(float(np.nanmedian(good.log.q[:, k])) for k in range(log.n_joints) if k != j)
     size = max(_SHORTEST, round(window / log.sample_time))
@@ -190,7 +214,8 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
         measured = np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j])
         stretch = Stretch(log.name, good.log.t[run], measured, good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
                           np.where(np.isfinite(dq), dq, 0.0), spoilt, log.torque != "measured", size,
-                          log.robot.joints[j].revolute, others)
+                          log.robot.joints[j].revolute, others,
+                          np.nan_to_num(found.motion.dq[rows][:, [k - 1 for k in coupled]]))
         if len(stretch.edges) > _FEWEST and stretch.rows >= _FEWEST:
             stretches.append(stretch)
     return tuple(stretches)
