@@ -46,11 +46,10 @@ def _many(logs: Sequence[Imitation], what: str) -> str:
 def _stays(one: Imitation) -> str:
     assert one.position_rms is not None
     joint = int(np.argmax(one.position_rms))
-    apart = f"{format_number(float(one.position_rms[joint]), 2)} {one.units[joint]} rms"
+    place = f"joint {joint + 1}"
     if one.noise_rms is not None and one.noise_rms[joint] > 0.0:
-        times = format_number(float(one.position_rms[joint] / one.noise_rms[joint]), 2)
-        apart += f" and {times} times what different noise does"
-    return f"is {apart} (joint {joint + 1}) from"
+        place += f": {format_number(float(one.position_rms[joint] / one.noise_rms[joint]), 2)} times what different noise does"
+    return f"stays within {format_number(float(one.position_rms[joint]), 2)} {one.units[joint]} rms ({place}) of"
 
 
 def _way(one: Imitation) -> str:

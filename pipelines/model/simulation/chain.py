@@ -26,16 +26,21 @@ class ManyChains:
         """`p` (parameters,), or (replicas, parameters); `added` (joints, joints) [kg m^2] goes to D."""
         chain = body.chain
         n = chain.n_joints
-        self._replicas, self._added, self._gravity = replicas, added[..., None], chain.gravity[:, None, None]
-        self._offset, self._turning = chain.offset[:, None], np.array(chain.revolute)[:, None]
+        self._added, self._gravity, self._offset = added[..., None], chain.gravity[:, None], chain.offset[:, None]
         before = np.array([np.column_stack([place.rotation, place.position]) for place in chain.before])  # (n, 3, 4)
         after = np.array([np.column_stack([place.rotation, place.position]) for place in chain.after])
-        self._before = np.moveaxis(before, 0, -1)[..., None]  # (3, 4, n, 1)
-        still, sine, cosine = np.moveaxis(_local(before, after, np.array(chain.revolute)), (0, 1), (0, -1))
-        self._local = tuple(np.ascontiguousarray(part)[..., None] for part in (still, sine, cosine))  # each (3, 4, n, 1)
+        turning = np.array(chain.revolute)
+        self._axis, self._anchor = before[:, :, 2:3], before[:, :, 3:]
+        self._local = np.ascontiguousarray(np.moveaxis(_local(before, after, turning), 0, -1).reshape(n, 12, 3))
+        self._shifting = np.flatnonzero(~turning)
         moments = np.array([[_moments(link) for link in body.standard(own).reshape(n, 10)] for own in np.atleast_2d(p)])
-        self._moments = np.ascontiguousarray(np.transpose(moments, (2, 3, 1, 0)))  # (4, 4, n, 1 or replicas)
-        self._upper = np.triu(np.ones((n, n), dtype=bool))
+        self._moments = np.ascontiguousarray(np.broadcast_to(np.transpose(moments, (1, 2, 3, 0)), (n, 4, 4, replicas)))
+        self._upper, self._before = np.triu(np.ones((n, n), dtype=bool))[..., None], np.tril(np.ones((n, n)))
+        self._features = np.ones((n, 3, replicas))
+        self._frames = np.zeros((n + 1, 4, 4, replicas))
+        for k in range(4):
+            self._frames[0, k, k] = self._frames[:, 3, 3] = 1.0
+        self._twists = np.zeros((n, 3, 4, replicas))
 
     def acceleration(self, q: Array, dq: Array, torque: Array, out: Array) -> None:
         """a (joints, replicas) [rad/s^2] into `out`, for q, dq and the torque that is left for motion, all of that shape."""
@@ -45,59 +50,57 @@ class ManyChains:
 
     def equations(self, q: Array, dq: Array) -> tuple[Array, Array]:
         """D (joints, joints, replicas) and c + h (joints, replicas)."""
-        frames, twists = self._frames(q)
-        moving = twists * dq
-        velocity = np.cumsum(moving, axis=2)
-        spin, turning = velocity[:, :3], twists[:, :3] * dq
+        self._place(q)
+        frames, twists = self._frames[1:], self._twists
+        moving = twists * dq[:, None, None]
+        velocity = self._up_to(moving)
         # of matrices whose last row is zero, only the first three rows and columns of the left factor act
-        change = np.einsum("abnr,bcnr->acnr", spin, moving)
-        change -= np.einsum("abnr,bcnr->acnr", turning, velocity)
-        acceleration = np.cumsum(change, axis=2)
-        acceleration += np.einsum("abnr,bcnr->acnr", spin, velocity)
-        acceleration[:, 3] -= self._gravity
-        moments = np.einsum("abnr,bcnr->acnr", frames, np.broadcast_to(self._moments, (*self._moments.shape[:3], q.shape[1])))
-        moments = np.einsum("abnr,cbnr->acnr", moments, frames)
-        wrenches = _beyond(np.einsum("abnr,bcnr->acnr", acceleration, moments))
-        bias = np.einsum("abnr,abnr->nr", twists, wrenches)
-        carried = np.einsum("abnr,bcnr->acnr", twists, _beyond(moments))
-        mass = np.einsum("abjr,abkr->jkr", twists, carried)
-        mass = np.where(self._upper[..., None], mass, mass.transpose(1, 0, 2))
+        spin = velocity[:, :, :3]
+        change = _product(spin, moving)
+        change -= _product(moving[:, :, :3], velocity)
+        acceleration = self._up_to(change)
+        acceleration += _product(spin, velocity)
+        acceleration[:, :, 3] -= self._gravity
+        moments = np.einsum("nabr,ncbr->nacr", _product(frames, self._moments), frames)
+        bias = np.einsum("nabr,nabr->nr", twists, self._from(_product(acceleration, moments)))
+        mass = np.einsum("jabr,kabr->jkr", twists, _product(twists, self._from(moments)))
+        mass = np.where(self._upper, mass, mass.transpose(1, 0, 2))
         mass += self._added
         return mass, bias
 
-    def _frames(self, q: Array) -> tuple[Array, Array]:
-        """T (4, 4, joints, replicas), and the joints' unit twists S (3, 4, joints, replicas) in the base frame."""
-        angle = q + self._offset
-        still, sine, cosine = self._local
-        local = sine * np.where(self._turning, np.sin(angle), angle)
-        local += cosine * np.cos(angle)
-        local += still
+    def _place(self, q: Array) -> None:
+        """T (links from the base on, 4, 4, replicas), and the joints' unit twists S (joints, 3, 4, replicas) in the base frame."""
+        features, frames, twists, shifting = self._features, self._frames, self._twists, self._shifting
         n, replicas = q.shape
-        frames = np.zeros((4, 4, n + 1, replicas))
-        frames[[0, 1, 2, 3], [0, 1, 2, 3], 0], frames[3, 3] = 1.0, 1.0
-        for i in range(n):
-            here = frames[:3, :, i]
-            np.einsum("abr,bcr->acr", here[:, :3], local[:, :, i], out=frames[:3, :, i + 1])
-            frames[:3, 3, i + 1] += here[:, 3]
-        axis = np.einsum("abnr,bnr->anr", frames[:3, :3, :n], np.broadcast_to(self._before[:, 2], (3, n, replicas)))
-        anchor = np.einsum("abnr,bnr->anr", frames[:3, :3, :n], np.broadcast_to(self._before[:, 3], (3, n, replicas)))
-        anchor += frames[:3, 3, :n]
-        return frames[:, :, 1:], _twists(axis, anchor, self._turning)
+        angle = q + self._offset
+        np.sin(angle, out=features[:, 1])
+        np.cos(angle, out=features[:, 2])
+        features[shifting, 1] = angle[shifting]
+        local = np.matmul(self._local, features).reshape(n, 3, 4, replicas)
+        for here, step, there in zip(frames[:-1], local, frames[1:], strict=True):
+            np.einsum("abr,bcr->acr", here[:3, :3], step, out=there[:3])
+            there[:3, 3] += here[:3, 3]
+        rotation = frames[:-1, :3, :3]
+        x, y, z = axis = np.einsum("nabr,nbk->anr", rotation, self._axis)
+        px, py, pz = np.einsum("nabr,nbk->anr", rotation, self._anchor) + np.moveaxis(frames[:-1, :3, 3], 1, 0)
+        twists[:, 2, 1], twists[:, 0, 2], twists[:, 1, 0] = x, y, z
+        twists[:, 1, 2], twists[:, 2, 0], twists[:, 0, 1] = -x, -y, -z
+        twists[:, 0, 3], twists[:, 1, 3], twists[:, 2, 3] = py * z - pz * y, pz * x - px * z, px * y - py * x
+        twists[shifting, :, :3] = 0.0
+        twists[shifting, :, 3] = np.moveaxis(axis[:, shifting], 0, 1)
+
+    def _up_to(self, values: Array) -> Array:
+        """Sums over each link and all links before it; the first axis counts links."""
+        return (self._before @ values.reshape(len(values), -1)).reshape(values.shape)
+
+    def _from(self, values: Array) -> Array:
+        """Sums over each link and all links behind it."""
+        return (self._before.T @ values.reshape(len(values), -1)).reshape(values.shape)
 
 
-def _twists(axis: Array, anchor: Array, turning: Array) -> Array:
-    """S: [z]× and anchor × z where the joint turns, z as its last column where it shifts."""
-    twists = np.zeros((3, 4, *axis.shape[1:]))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        turn = np.where(turning, axis[i], 0.0)
-        twists[k, j], twists[j, k] = turn, -turn
-        twists[i, 3] = np.where(turning, anchor[j] * axis[k] - anchor[k] * axis[j], axis[i])
-    return twists
-
-
-def _beyond(values: Array) -> Array:
-    """Sums over each link and all links behind it; the third axis counts links."""
-    return np.cumsum(values[:, :, ::-1], axis=2)[:, :, ::-1]
+def _product(a: Array, b: Array) -> Array:
+    """Matrix products, link by link and replica by replica."""
+    return np.asarray(np.einsum("nabr,nbcr->nacr", a, b))
 
 
 def _local(before: Array, after: Array, turning: Array) -> Array:

@@ -48,9 +48,11 @@ def course(log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None, windows: Win
     torque_off = None if tau is None else tau[1] - tau[0]
     frequency, density = (None, None) if windows is not None else _spectrum(off, log.sample_time)
     torque_density = None if torque_off is None or frequency is None else _spectrum(torque_off, log.sample_time)[1]
-    torques = (None, None, None) if tau is None else tuple(_envelope(x, size) for x in (*tau, tau[1] - tau[0]))
     elapsed, drift = (None, None) if windows is None else _drift(off, windows, log.sample_time)
-    return Course(t, *(_envelope(x, size) for x in (*q, off, *dq)), *torques, frequency, density, torque_density, elapsed, drift)
+    position, position_simulated, difference, speed, speed_simulated = (_envelope(x, size) for x in (*q, off, *dq))
+    torque, torque_simulated = (None, None) if tau is None else (_envelope(x, size) for x in tau)
+    return Course(t, position, position_simulated, difference, speed, speed_simulated, torque, torque_simulated,
+                  None if torque_off is None else _envelope(torque_off, size), frequency, density, torque_density, elapsed, drift)
 
 
 def _spectrum(x: Array, sample_time: float) -> tuple[Array, Array] | tuple[None, None]:

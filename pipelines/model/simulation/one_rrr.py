@@ -1,12 +1,15 @@
 """One RRR arm without arrays: for a single robot plain numbers are several times faster than arrays of three.
 
-The same (A5) of Kostić et al. 2004 as `ManyRRR`, gathered by what needs the fewest products, and the same Runge-Kutta step.
+The same (A5) of Kostić et al. 2004 as `ManyRRR`, gathered by what needs the fewest products, and the same Runge-Kutta step. The
+step is written out as Python text with the arm's numbers in it, and compiled once for each arm: calls and look-ups of constants
+would cost as much as the arithmetic.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from math import cos, sin, tanh
+from typing import Any
 
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.rrr import RRR
@@ -14,9 +17,74 @@ from pipelines.model.simulation.plant import Plant
 
 __all__ = ["OneRRR"]
 
-_Triple = tuple[float, float, float]
-_Acceleration = Callable[[float, float, float, float, float, float, float, float], _Triple]
-_Friction = Callable[[float], float]
+# dq = D⁻¹ (u - τ_f(v) - c - h) at angles {q2}, {q3} and speeds {v1} {v2} {v3}, into {a1} {a2} {a3}; S = q2 + q3.
+_ACCELERATION = """
+    x2 = {q2}{offset2}
+    x3 = {q3}{offset3}
+    c2 = cos(x2)
+    s2 = sin(x2)
+    c3 = cos(x3)
+    s3 = sin(x3)
+    cS = c2 * c3 - s2 * s3
+    sS = s2 * c3 + c2 * s3
+    lever = {p3} * cS - {p4} * sS
+    across = {twice_a2} * ({p3} * sS + {p4} * cS) * c2
+    near = {a2_p3} * c3 - {a2_p4} * s3
+    bent = {a2_p3} * s3 + {a2_p4} * c3
+    d0 = {p8} * cS + {p9} * sS
+    D13 = d0 + {m13}
+    D12 = d0 + {p10} * c2 + {p11} * s2 + {m12}
+    D11 = ({p1} * c2 + {p2} * s2 + {twice_a2} * lever) * c2 + ({p5} * cS - {p6} * sS) * cS + {e11}
+    D22 = {e22} + near + near
+    D23 = {e23} + near
+    outer = {twice_p5} * sS * cS + {p6} * (cS * cS - sS * sS) + across
+    upper = {twice_p1} * s2 * c2 - {p2} * (c2 * c2 - s2 * s2) + outer + across - bent - bent
+    v = {v2} + {v3}
+    half = 0.5 * {v1} * {v1}
+    h3 = {g} * lever
+    r1 = u1 - ({friction1}) + {v1} * ({v2} * upper + {v3} * outer) - v * v * ({p9} * cS - {p8} * sS) \\
+        - {v2} * {v2} * ({p11} * c2 - {p10} * s2)
+    r2 = u2 - ({friction2}) - half * upper + (v + {v2}) * {v3} * bent - h3 - {g_p14} * c2 + {g_p15} * s2
+    r3 = u3 - ({friction3}) - half * outer - {v2} * {v2} * bent - h3
+    C11 = D22 * {e33} - D23 * D23
+    C12 = D13 * D23 - D12 * {e33}
+    C13 = D12 * D23 - D13 * D22
+    C23 = D12 * D13 - D11 * D23
+    scale = 1.0 / (D11 * C11 + D12 * C12 + D13 * C13)
+    {a1} = (C11 * r1 + C12 * r2 + C13 * r3) * scale
+    {a2} = (C12 * r1 + (D11 * {e33} - D13 * D13) * r2 + C23 * r3) * scale
+    {a3} = (C13 * r1 + C23 * r2 + (D11 * D22 - D12 * D12) * r3) * scale
+"""
+
+# Kutta's stages k, l, m, n: the slope of the position is the speed of the stage.
+_STEP = """
+def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh):
+{first}
+    w1 = v1 + {half} * k1
+    w2 = v2 + {half} * k2
+    w3 = v3 + {half} * k3
+    y2 = q2 + {half} * v2
+    y3 = q3 + {half} * v3
+{second}
+    z1 = v1 + {half} * l1
+    z2 = v2 + {half} * l2
+    z3 = v3 + {half} * l3
+    y2 = q2 + {half} * w2
+    y3 = q3 + {half} * w3
+{third}
+    o1 = v1 + {h} * m1
+    o2 = v2 + {h} * m2
+    o3 = v3 + {h} * m3
+    y2 = q2 + {h} * z2
+    y3 = q3 + {h} * z3
+{fourth}
+    return (q1 + {sixth} * (v1 + 2.0 * (w1 + z1) + o1), q2 + {sixth} * (v2 + 2.0 * (w2 + z2) + o2),
+            q3 + {sixth} * (v3 + 2.0 * (w3 + z3) + o3), v1 + {sixth} * (k1 + 2.0 * (l1 + m1) + n1),
+            v2 + {sixth} * (k2 + 2.0 * (l2 + m2) + n2), v3 + {sixth} * (k3 + 2.0 * (l3 + m3) + n3))
+"""
+_STAGES = {"first": ("q", "v", "k"), "second": ("y", "w", "l"), "third": ("y", "z", "m"), "fourth": ("y", "o", "n")}
+
+_Step = Callable[..., tuple[float, float, float, float, float, float]]
 
 
 class OneRRR:
@@ -24,8 +92,8 @@ class OneRRR:
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
         """`plant` as `fits` it; `steps` of equal size make one control sample."""
-        self._acceleration = _acceleration(plant)
-        self._h, self._steps = sample_time / steps, steps
+        self._step = _compiled(plant, sample_time / steps)
+        self._steps = steps
 
     @staticmethod
     def fits(plant: Plant) -> bool:
@@ -34,85 +102,44 @@ class OneRRR:
     def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:
         """Move `state` (6, 1) on by one sample, in place; there are no memories, and nothing depends on time."""
         del t
-        f, h = self._acceleration, self._h
-        half, sixth = 0.5 * h, h / 6.0
-        q1, q2, q3, v1, v2, v3 = state[:, 0].tolist()
-        u1, u2, u3 = command[:, 0].tolist()
+        step, now, torque = self._step, state[:, 0].tolist(), command[:, 0].tolist()
         for _ in range(self._steps):
-            a1, a2, a3 = f(q2, q3, v1, v2, v3, u1, u2, u3)
-            # position's slopes are the speeds of the stages: k2 = v + h/2 a, k3 = v + h/2 b, k4 = v + h c
-            w1, w2, w3 = v1 + half * a1, v2 + half * a2, v3 + half * a3
-            b1, b2, b3 = f(q2 + half * v2, q3 + half * v3, w1, w2, w3, u1, u2, u3)
-            x1, x2, x3 = v1 + half * b1, v2 + half * b2, v3 + half * b3
-            c1, c2, c3 = f(q2 + half * w2, q3 + half * w3, x1, x2, x3, u1, u2, u3)
-            y1, y2, y3 = v1 + h * c1, v2 + h * c2, v3 + h * c3
-            d1, d2, d3 = f(q2 + h * x2, q3 + h * x3, y1, y2, y3, u1, u2, u3)
-            q1 += sixth * (v1 + 2.0 * (w1 + x1) + y1)
-            q2 += sixth * (v2 + 2.0 * (w2 + x2) + y2)
-            q3 += sixth * (v3 + 2.0 * (w3 + x3) + y3)
-            v1 += sixth * (a1 + 2.0 * (b1 + c1) + d1)
-            v2 += sixth * (a2 + 2.0 * (b2 + c2) + d2)
-            v3 += sixth * (a3 + 2.0 * (b3 + c3) + d3)
-        state[:, 0] = q1, q2, q3, v1, v2, v3
+            now = step(*now, *torque)
+        state[:, 0] = now
         return states
 
 
-def _acceleration(plant: Plant) -> _Acceleration:
-    """f(q2, q3, v1, v2, v3, u1, u2, u3) = D⁻¹ (u - τ_f(v) - c - h), with its constants bound once."""
-    p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11, p12, p13, p14, p15 = plant.p.reshape(15).tolist()
-    joints = plant.body.robot.joints
-    a2, g, offset2, offset3 = joints[1].a, -plant.body.robot.gravity[2], joints[1].offset, joints[2].offset
-    (m11, m12, m13), (_, m22, m23), (_, _, m33) = plant.added.tolist()
-    k3, k4, twice = a2 * p3, a2 * p4, 2.0 * a2
-    e11, e22, e23, e33 = p7 + m11, p12 + m22, p13 + m23, p13 + m33
-    g3, g4, g14, g15 = g * p3, g * p4, g * p14, g * p15
-    friction1, friction2, friction3 = _curves(plant)
-
-    def acceleration(q2: float, q3: float, v1: float, v2: float, v3: float, u1: float, u2: float, u3: float) -> _Triple:
-        q2 += offset2
-        q3 += offset3
-        c2, s2, c3, s3 = cos(q2), sin(q2), cos(q3), sin(q3)
-        cS, sS = c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
-        swing, bent, near = p9 * cS - p8 * sS, k3 * s3 + k4 * c3, k3 * c3 - k4 * s3
-        lever, across = p3 * cS - p4 * sS, twice * (p3 * sS + p4 * cS) * c2  # across = both + bent
-        D13 = p8 * cS + p9 * sS + m13
-        D12 = D13 - m13 + p10 * c2 + p11 * s2 + m12
-        D11 = (p1 * c2 + p2 * s2 + twice * lever) * c2 + (p5 * cS - p6 * sS) * cS + e11
-        D22, D23, D33 = e22 + near + near, e23 + near, e33
-        fore = 2.0 * p5 * sS * cS + p6 * (cS * cS - sS * sS)
-        upper = 2.0 * p1 * s2 * c2 - p2 * (c2 * c2 - s2 * s2) + fore + 2.0 * (across - bent)  # upper + fore + 2 both
-        outer = fore + across
-        v, half = v2 + v3, 0.5 * v1 * v1
-        h3 = g3 * cS - g4 * sS
-        r1 = u1 - friction1(v1) + v1 * (v2 * upper + v3 * outer) - v * v * swing - v2 * v2 * (p11 * c2 - p10 * s2)
-        r2 = u2 - friction2(v2) - half * upper + (v3 + v2 + v2) * v3 * bent - h3 - g14 * c2 + g15 * s2
-        r3 = u3 - friction3(v3) - half * outer - v2 * v2 * bent - h3
-        C11, C12, C13 = D22 * D33 - D23 * D23, D13 * D23 - D12 * D33, D12 * D23 - D13 * D22
-        inverse = 1.0 / (D11 * C11 + D12 * C12 + D13 * C13)
-        C23 = D12 * D13 - D11 * D23
-        return ((C11 * r1 + C12 * r2 + C13 * r3) * inverse,
-                (C12 * r1 + (D11 * D33 - D13 * D13) * r2 + C23 * r3) * inverse,
-                (C13 * r1 + C23 * r2 + (D11 * D22 - D12 * D12) * r3) * inverse)
-
-    return acceleration
+def _compiled(plant: Plant, h: float) -> _Step:
+    """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, u1, u2, u3) -> the first six after it."""
+    numbers = _numbers(plant)
+    stages = {name: _ACCELERATION.format(**numbers, **_names(plant, *letters)) for name, letters in _STAGES.items()}
+    text = _STEP.format(**stages, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))
+    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh}
+    exec(compile(text, "<one step of an RRR arm>", "exec"), scope)
+    step: _Step = scope["step"]
+    return step
 
 
-def _curves(plant: Plant) -> tuple[_Friction, _Friction, _Friction]:
-    """The friction of each joint over its speed, only as many sigmoids as it has."""
+def _numbers(plant: Plant) -> dict[str, str]:
+    """Every constant of `_ACCELERATION` as the text of a number, a negative one in brackets."""
+    p = dict(zip([f"p{k}" for k in range(1, 16)], plant.p.reshape(15).tolist(), strict=True))
+    joints, g = plant.body.robot.joints, -plant.body.robot.gravity[2]
+    a2, m = joints[1].a, plant.added.tolist()
+    values = p | {
+        "twice_a2": 2.0 * a2, "a2_p3": a2 * p["p3"], "a2_p4": a2 * p["p4"], "twice_p1": 2.0 * p["p1"], "twice_p5": 2.0 * p["p5"],
+        "m12": m[0][1], "m13": m[0][2], "e11": p["p7"] + m[0][0], "e22": p["p12"] + m[1][1], "e23": p["p13"] + m[1][2],
+        "e33": p["p13"] + m[2][2], "g": g, "g_p14": g * p["p14"], "g_p15": g * p["p15"]}
+    offsets = {f"offset{k}": f" + {joints[k - 1].offset!r}" if joints[k - 1].offset else "" for k in (2, 3)}
+    return {name: f"({value!r})" for name, value in values.items()} | offsets
+
+
+def _names(plant: Plant, position: str, speed: str, slope: str) -> dict[str, str]:
+    """The variables of one stage, and friction as text over its speeds."""
+    names = {f"{kind}{k}": f"{letter}{k}" for kind, letter in (("q", position), ("v", speed), ("a", slope)) for k in (1, 2, 3)}
     curves = plant.curves
-    one, two, three = (_curve(float(curves.constant[j]), float(curves.viscous[j]),
-                              [(f, w) for f, w in zip(curves.heights[:, j].tolist(), curves.sharpnesses[:, j].tolist(), strict=True)
-                               if f != 0.0]) for j in range(3))
-    return one, two, three
-
-
-def _curve(constant: float, viscous: float, sigmoids: list[tuple[float, float]]) -> _Friction:
-    if not sigmoids:
-        return lambda v: constant + viscous * v
-    if len(sigmoids) == 1:
-        [(f, w)] = sigmoids
-        return lambda v: constant + viscous * v + f * tanh(w * v)
-    if len(sigmoids) == 3:
-        (f1, w1), (f2, w2), (f3, w3) = sigmoids
-        return lambda v: constant + viscous * v + f1 * tanh(w1 * v) + f2 * tanh(w2 * v) + f3 * tanh(w3 * v)
-    return lambda v: constant + viscous * v + sum(f * tanh(w * v) for f, w in sigmoids)
+    for j in range(3):
+        v = f"{speed}{j + 1}"
+        sigmoids = zip(curves.heights[:, j].tolist(), curves.sharpnesses[:, j].tolist(), strict=True)
+        terms = [f"({curves.viscous[j].item()!r}) * {v}", *(f"({f!r}) * tanh({w!r} * {v})" for f, w in sigmoids if f)]
+        names[f"friction{j + 1}"] = " + ".join([*terms, repr(curves.constant[j].item())] if curves.constant[j] else terms)
+    return names
