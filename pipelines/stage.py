@@ -116,7 +116,7 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     """
     del settings
     paths, checks = find_logs(request.paths)
-    robot = load_robot(request.robot) if request.robot else None
+    robot = load_robot(request.robot) if request.robot is not None else None
     opened: list[Opened] = []
     rejected: list[Rejected] = []
     for index, path in enumerate(paths):
@@ -179,7 +179,7 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     if request.out is not None:
         keep_apart(request.out, (), request.paths)
         refuse_foreign(request.out, request.force)
-    described = _hashes(robot_sources(request.robot), {}) if request.robot else {}
+    described = _hashes(robot_sources(request.robot), {}) if request.robot is not None else {}
     inputs = stage.read(request, settings)
     out = request.out or Path("runs") / slug(inputs.robot_name) / slug(inputs.label) / stage.name
     keep_apart(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))

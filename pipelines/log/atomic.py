@@ -10,7 +10,6 @@ import contextlib
 import errno
 import os
 import platform
-import secrets
 import shutil
 import zlib
 from collections.abc import Callable, Iterator
@@ -54,7 +53,7 @@ def write_file(path: Path, fill: Callable[[Path], None]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         # The ending stays: writers choose the container by it.
         _sweep(path.parent)
-        draft = path.parent / f"{_prefix()}{os.getpid()}-{secrets.token_hex(4)}{path.suffix}"
+        draft = path.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}{path.suffix}"
         try:
             fill(draft)
             _sync(draft)
@@ -73,7 +72,7 @@ def staging_folder(target: Path) -> Path:
     with environment_faults(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         _sweep(target.parent)
-        folder = target.parent / f"{_prefix()}{os.getpid()}-{secrets.token_hex(4)}"
+        folder = target.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}"
         folder.mkdir()
         return folder
 

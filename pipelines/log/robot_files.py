@@ -12,7 +12,6 @@ from pipelines.errors import UsageError
 from pipelines.log.robot import Joint, RobotDescription, parse_robot
 from pipelines.log.shipped import shipped
 from pipelines.log.text import read_small_text
-from pipelines.log.urdf import import_urdf
 
 __all__ = ["load_robot", "robot_sources"]
 
@@ -27,7 +26,7 @@ def load_robot(source: str | Path) -> RobotDescription:
     """
     path = _file_of(source)
     if path.suffix.lower() in _URDF:
-        return import_urdf(path)
+        return _from_urdf(path)
     text = read_small_text(path, what="a robot description (TOML) or a URDF")
     return _embed_urdf(text, path) or parse_robot(text, where=path)
 
@@ -43,7 +42,16 @@ def robot_sources(source: str | Path) -> tuple[Path, ...]:
 
 def _file_of(source: str | Path) -> Path:
     path = Path(source)
-    return path if os.path.lexists(path) else shipped("robots", str(source))
+    if not str(source):
+        raise UsageError("C02", "empty", where="--robot", remedy="name a description, a URDF, or a shipped robot")
+    if os.path.lexists(path) and not path.is_dir():
+        return path
+    try:
+        return shipped("robots", str(source))
+    except UsageError as problem:
+        if not path.is_dir():
+            raise
+        raise UsageError("C04", "a folder, not the description of a robot", where=source, remedy=problem.remedy) from None
 
 
 def _table_of(text: str) -> dict[str, Any]:
@@ -67,7 +75,7 @@ def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
     if named is None or not isinstance(kinematics, dict):
         return None
     tip = kinematics.get("tip_link")
-    arm = import_urdf(path.parent / named, tip_link=tip if isinstance(tip, str) else None)
+    arm = _from_urdf(path.parent / named, tip_link=tip if isinstance(tip, str) else None)
     kinematics.pop("urdf")
     kinematics["urdf_text"] = arm.urdf_text
     given = table.setdefault("joint", [{"name": j.name, "type": j.type} for j in arm.joints])
@@ -77,6 +85,12 @@ def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
                          remedy="describe each moving joint once, or none")
     merged = tuple(_fill(mine, urdf) for mine, urdf in zip(described.joints, arm.joints, strict=True))
     return replace(described, joints=merged, tip_link=arm.tip_link)
+
+
+def _from_urdf(path: Path, tip_link: str | None = None) -> RobotDescription:
+    from pipelines.log.urdf import import_urdf  # and with it a parser of XML, for the few robots that need one
+
+    return import_urdf(path, tip_link=tip_link)
 
 
 def _parse_table(table: dict[str, object], path: Path) -> RobotDescription:

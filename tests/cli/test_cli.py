@@ -6,6 +6,8 @@ import json
 import os
 import resource
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -44,6 +46,13 @@ def test_json_is_alone_on_standard_output(logs: Path) -> None:
     (("convert", "logs/a.h5", "--to", "xlsx"), "RRID-C02", 2),
     (("convert", "logs/a.h5", "--format", "zip"), "RRID-C02", 2),
     (("convert", "logs/a.h5", "--robot", "nobody"), "RRID-C04", 2),
+    (("convert", "logs/a.h5", "--robot", "logs"), "RRID-C04", 2),
+    (("convert", "logs/a.h5", "--robot", ""), "RRID-C02", 2),
+    *(((command, "logs/a.h5", "--robot", "nobody"), "RRID-C04", 2)
+      for command in ("run", "inspect", "reconstruct", "estimate-bps")),
+    (("estimate-bps", "logs/a.h5", "--filter", "fast"), "RRID-C02", 2),
+    (("estimate-bps", "logs/a.h5", "--decimate", "1.5"), "RRID-C02", 2),
+    (("import", "tx40", "--robot", "nobody"), "RRID-C04", 2),
     (("convert", "logs/a.h5", "--config", "no.toml"), "RRID-C04", 2),
     (("convert", "logs/a.h5", "--config", "evil.yaml"), "RRID-C03", 2),
     (("convert", "logs", "--out", "logs/out"), "RRID-C05", 2),
@@ -163,6 +172,18 @@ def test_help_is_quick(tmp_path: Path) -> None:
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     assert min(cpu() for _ in range(8)) <= 0.2
+
+
+def test_an_estimate_loads_only_what_it_uses(tmp_path: Path) -> None:
+    """Neither schemas for the options, nor masked arrays, packages' metadata, URDF or plots: each costs 10 to 1000 ms."""
+    unused = {"pydantic", "numpy.ma", "importlib.metadata", "xml", "scipy", "pandas", "matplotlib", "pyarrow", "rich", "jinja2"}
+    code = ("import sys, rrrid_cli.main as main\ntry:\n    main.entry()\nexcept SystemExit:\n    pass\n"
+            f"print(sorted({unused} & set(sys.modules)))")
+    log = REPO / "sample_logs/rrr-closed-form/excitation-1.h5"
+    words = ("estimate-bps", log, "--no-report", "--quiet", "--filter", "20", "--out", tmp_path / "out")
+    done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, cwd=REPO, check=False)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+    assert (tmp_path / "out/model.json").is_file()
 
 
 def test_help_is_plain(tmp_path: Path) -> None:
