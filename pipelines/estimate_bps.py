@@ -25,11 +25,13 @@ from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.balance import power_balance
 from pipelines.model.estimation.checks import consistency
 from pipelines.model.estimation.compare import compare
-from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, fit_logs, judge
+from pipelines.model.estimation.floor import averaged, residuals
+from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, fit_logs, judge, with_cutoff
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
 from pipelines.model.estimation.result import Result
+from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
@@ -52,6 +54,7 @@ class Settings:
     order: int = Reconstruction.order
     jerk_std: tuple[float, ...] | None = None  # [rad/s^order]
     bandwidth: tuple[float, ...] | None = None  # [Hz]
+    average: bool = True  # periods of periodic logs, where they differ by noise alone
     filter: float | None = None  # [Hz] low-pass over torque and columns; None: five times the motion's highest frequency
     decimate: int | None = None  # every so-manieth sample; None: four a period of the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
@@ -67,7 +70,7 @@ class Settings:
 
     @property
     def reconstruction(self) -> Reconstruction:
-        return Reconstruction(self.method, self.order, self.jerk_std, self.bandwidth)
+        return Reconstruction(self.method, self.order, self.jerk_std, self.bandwidth, self.average)
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -103,10 +106,16 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         recipe.check(log)
     motions, said = _examined(identify, settings)
     judges, said_too = _examined(validate, settings)
-    fitted = fit_logs(motions, columns, recipe, settings.weighted)
-    judged = judge(fitted, judges, settings.blocks)
+    recipe = with_cutoff(recipe, motions, columns)
+    means, floors = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
+    fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
+    judged = judge(fitted, means[len(motions):], settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
-    result = replace(_result(fitted, judged, arm, settings), doctor=(*said, *said_too))
+    logs = (*identify, *validate)
+    said_of_periods = [check for floor, log in zip(floors, logs, strict=True)
+                       for check in doubts(floor, log.source or log.name, settings.average)]
+    result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), doctor=(*said, *said_too, *said_of_periods),
+                     noise_floor=residuals(floors, fitted, judged, logs, settings.average))
     return result if not settings.compare else replace(
         result, comparison=compare(fitted, judged, settings.blocks, settings.weighted))
 
@@ -134,8 +143,8 @@ def _friction_of(model: Arm | None, log: ExperimentLog) -> Arm | None:
     return model if model is not None and model.friction else None
 
 
-def _result(fitted: Fitted, judged: Judged, arm: Arm, settings: Settings) -> Result:
-    found, motions = fitted.estimate, (*fitted.motions, *judged.motions)
+def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings: Settings) -> Result:
+    found = fitted.estimate
     both = {"identify": fitted.errors, "validate": judged.errors}
     torques = [(log, motion, torque_parts(arm, log, motion)) for log, motion in motions]
     growth, checked = found.convergence(), consistency(found, arm.body)
@@ -153,7 +162,7 @@ def _result(fitted: Fitted, judged: Judged, arm: Arm, settings: Settings) -> Res
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, parts) for log, _, parts in torques[:_COURSES]),
-        model=arm.to_model(validity=validity(fitted.motions), sources=_sources(motions),
+        model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),
                            notes=(f"fitted by rrrid estimate-bps, motion by {settings.method}",)),
         derived=tuple(_derived(log, motion, parts, settings) for log, motion, parts in torques))
 

@@ -5,6 +5,8 @@ Writes   logs/<name>.h5 or .parquet with q_hat, dq_hat, ddq_hat and their std; r
 Source   Kostić et al. 2004, Section IV.C.2 and IV.C.4, eq. (16)-(21), Figs. 7 and 10; Rauch, Tung & Striebel 1965
 
 The observer is eq. (20), its jerk the one its innovations ask for; the default goes on to smooth, with later samples as well.
+A derived log holds the motion of every sample. Periods of a periodic log are compared, and how well their mean is known is
+reported; equations are taken from the mean by who makes them, `estimate-bps`, out of those same samples.
 """
 
 from __future__ import annotations
@@ -20,8 +22,9 @@ from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import Array
 from pipelines.log.files import Opened, write_log
 from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.motion_result import ALARM, LogResult, ObserverResult, Place, assess, coloured, straying
+from pipelines.model.motion_result import LogResult, ObserverResult, Place, alarm, assess, coloured, straying
 from pipelines.report.motion_report import motion_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug
@@ -88,7 +91,8 @@ def _one(opened: Opened, robot: RobotDescription | None, settings: Settings, fil
     found = reconstruct(bare, settings, subject.good)
     derived = derive(bare, "reconstruct", settings.as_settings(), found.signals())
     result = assess(bare, found, settings, Place(opened.path.name, file), derived, draw)
-    return result, [*checks, *_doubts(result, settings, opened.path)]
+    odd = doubts(result.noise_floor, opened.path, settings.average)
+    return result, [*checks, *odd, *_doubts(result, settings, opened.path)]
 
 
 def _doubts(log: LogResult, settings: Settings, path: Path) -> list[Check]:
@@ -96,8 +100,9 @@ def _doubts(log: LogResult, settings: Settings, path: Path) -> list[Check]:
     found = []
     if far := straying(log):
         worst = max(float(log.reconstruction_error_max[j - 1]) for j in far)
+        limit = max(float(alarm(log)[j - 1]) for j in far)
         found.append(Check.of("D12", "warn", f"the reconstructed position of joint {_listed(far)} is up to {worst:.2g} rad from "
-                              f"the measured one, more than {ALARM:g} rad", where=path, gate=True,
+                              f"the measured one, more than {limit:.3g} rad", where=path, gate=True,
                               remedy="allow more jerk or bandwidth, or look for jumps and slips of the encoder"))
     forced = settings.jerk_std is not None or settings.bandwidth is not None
     if forced and (doubtful := coloured(log)) and not np.isnan(log.speed_std).all():

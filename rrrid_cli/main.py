@@ -25,6 +25,8 @@ from rrrid_cli.usage import WrongUsage, as_error
 __all__ = ["app", "entry"]
 
 TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
+Average = Annotated[bool | None, typer.Option("--average/--no-average",
+                                              help="Mean of the periods of a periodic log, where they are alike. [average]")]
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
 STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps", "simulate")
@@ -113,12 +115,13 @@ def reconstruct(
     order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
     jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint.")] = None,
     bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
+    average: Average = None,
 ) -> None:
     """Reconstruct position, speed and acceleration from the encoders: Kalman observer and smoother."""
     from pipelines.reconstruct import STAGE
 
     _go(STAGE, tuple(logs), common, {"method": method, "order": order, "jerk_std": numbers(jerk_std, "--jerk-std"),
-                                     "bandwidth": numbers(bandwidth, "--bandwidth")})
+                                     "bandwidth": numbers(bandwidth, "--bandwidth"), "average": average})
 
 
 @app.command("estimate-bps", cls=StageCommand)
@@ -129,6 +132,7 @@ def estimate_bps(
     order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
     jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint.")] = None,
     bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
+    average: Average = None,
     filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
     decimate: Annotated[int | None, typer.Option(help="Keep every so-manieth sample. [four a period of the low-pass]")] = None,
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint.")] = None,
@@ -144,7 +148,7 @@ def estimate_bps(
 
     _go(STAGE, tuple(logs), common, {
         "method": method, "order": order, "jerk_std": numbers(jerk_std, "--jerk-std"),
-        "bandwidth": numbers(bandwidth, "--bandwidth"), "filter": filter,
+        "bandwidth": numbers(bandwidth, "--bandwidth"), "average": average, "filter": filter,
         "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "blocks": blocks,
         "symmetric": symmetric, "weighted": False if unweighted else None, "model": model, "allow_same": allow_same,
         "allow_mismatch": allow_mismatch,

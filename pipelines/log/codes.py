@@ -31,7 +31,7 @@ CODES: Final[dict[str, str]] = {
     "S22": "controller not described",
     "T01": "time does not increase", "T02": "repeated time stamps", "T03": "dropped samples", "T04": "gap",
     "T05": "uneven sampling", "T06": "torque and position out of step", "T07": "shorter than one period",
-    "T08": "too few samples", "T09": "sampled too slowly",
+    "T08": "too few samples", "T09": "sampled too slowly", "T10": "periods that are not alike",
     "X01": "external link", "X02": "external storage", "X03": "virtual data", "X04": "links, depth or number of members",
     "X05": "declares more than it can hold", "X06": "declares more than it can hold", "X07": "pickled objects",
     "X11": "link or name that leads elsewhere", "X12": "archive", "X13": "unsafe URDF", "Z70": "internal error",

@@ -24,7 +24,7 @@ from pipelines.log.derive import derived_by
 from pipelines.log.doctor.faults import Mask
 from pipelines.log.doctor.segments import Usable, long_blocks, usable
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.order_statistics import distinct
+from pipelines.log.order_statistics import distinct, median
 from pipelines.model.rigid.body import Motion
 from pipelines.model.tuned import METHODS, Observers, Reconstruction, encoder_resolution, tuned_observers
 from pipelines.signal.grid import Grid, Tracker, grids, on_grid
@@ -32,7 +32,7 @@ from pipelines.signal.observer import Observer, Track, observe
 from pipelines.signal.smoother import Smoother, smooth, twicing_growth
 
 __all__ = ["METHODS", "Mean", "Measured", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "measured",
-           "reconstruct"]
+           "noise_response", "reconstruct"]
 
 Indices = npt.NDArray[np.intp]
 Run = Callable[[Array], tuple[Array, Array]]
@@ -41,6 +41,7 @@ _SIGNALS = ("q_hat", "dq_hat", "ddq_hat")
 _LONG = 4096  # missing samples: of more, only the first are predicted
 _END = 1024
 _LEAD = 2  # missing samples at the very start that are predicted from what comes after
+_VAGUE = 2.0  # times the usual standard deviation of the acceleration
 _BEYOND = 5.0  # usual deviations: no cap below it, however still a joint stands
 _CUTOFF_HZ = 100.0  # of the zero-phase filter where no bandwidth is asked for
 _FASTEST = 0.4  # of the rate, its cut-off
@@ -60,15 +61,6 @@ class Measured:
         return max(self.grids, key=lambda grid: grid.last - grid.first)
 
 
-@dataclass(frozen=True)
-class Mean:
-    """Which samples of a log are the mean of several periods; the rest are copies of them (`mean_period`)."""
-
-    first: int
-    last: int
-    periods: int  # in the mean
-
-
 @dataclass(frozen=True, eq=False)
 class Reconstructed:
     """Motion with its uncertainty, and the observer it came from."""
@@ -80,10 +72,30 @@ class Reconstructed:
     derived: bool  # taken from the log instead of computed
     mean: Mean | None = None  # where the log is the mean period of another
 
+    @property
+    def vague(self) -> Mask:
+        """(samples, joints) near an end or a gap, where the acceleration is known half as well as elsewhere, or worse."""
+        if self.std is None:
+            return np.zeros(self.motion.q.shape, dtype=bool)
+        std = self.std[2]
+        return np.asarray(std > _VAGUE * np.array([median(column[~np.isnan(column)]) for column in std.T]))
+
     def signals(self) -> dict[str, Array]:
         """What a derived log gets."""
         values = dict(zip(_SIGNALS, (self.motion.q, self.motion.dq, self.motion.ddq), strict=True))
         return values | {f"{name}_std": std for name, std in zip(_SIGNALS, self.std or (), strict=False)}
+
+
+@dataclass(frozen=True, eq=False)
+class Mean:
+    """Of which log another one is the mean period, and how it came of it (`mean_period`)."""
+
+    first: int  # samples from here on are the mean; those before are copies of it
+    last: int  # and those from here on
+    periods: int  # in the mean
+    source: ExperimentLog
+    whole: Reconstructed  # the motion of the source
+    fold: Callable[[Array], Array]  # from any signal of the source, (kept samples, channels), to its mean and the copies
 
 
 def measured(log: ExperimentLog, good: Usable | None = None) -> Measured:
@@ -134,6 +146,23 @@ def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = N
     states, std = (_at_recording(seen.good.kept, values, log.n_samples) for values in (states, std))
     std[:, seen.good.time.undefined] = bound[:, None]
     return Reconstructed(Motion(log.t, *states), (std[0], std[1], std[2]) if filtering else None, tuned, seen.good, False)
+
+
+def noise_response(log: ExperimentLog, found: Reconstructed, how: Reconstruction, samples: int,
+                   rng: np.random.Generator) -> tuple[Array, Array]:
+    """What white noise as strong as that of the positions does to `found` (3, samples, joints), and its variance [rad²] (joints,).
+
+    Every way to reconstruct is linear in the positions: the response to noise adds to the motion.
+    """
+    seen, joints = measured(log, found.good), log.n_joints
+    track: Tracker
+    if found.std is None:
+        track, variance = _differences(seen, how), encoder_resolution(found.good) ** 2 / 12.0
+    else:
+        tuned = found.observers or tuned_observers(seen.good, seen.y, seen.longest, seen.step, how)
+        track, variance = _filter(tuned, how), tuned.smoothing.noise_variance
+    response = track(np.sqrt(variance) * rng.standard_normal((samples, joints)))[0][:3]
+    return np.nan_to_num(response), variance
 
 
 def _taken(log: ExperimentLog, good: Usable) -> Reconstructed:

@@ -1,35 +1,20 @@
-"""How well a motion is known: what is left of the measurement, how white that is, what repeats in each period."""
+"""How well a motion is known: what is left of the measurement, and how white that is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.experiment import Array
 from pipelines.model.motion import Measured, Reconstructed
 from pipelines.model.tuned import encoder_resolution
 from pipelines.signal.grid import lay_on
 from pipelines.signal.observer import Observer
-from pipelines.signal.periods import average_periods
 from pipelines.signal.spectra import Spectrum, welch
 from pipelines.signal.tuning import innovations, paper_rule, whiteness
 
-__all__ = ["NoiseFloor", "error_spectrum", "innovation_whiteness", "noise_floor", "paper_jerk",
-           "reconstruction_error", "typical_std"]
+__all__ = ["error_spectrum", "innovation_whiteness", "paper_jerk", "reconstruction_error", "typical_std"]
 
 _LONGEST = 131072  # samples that a spectrum or a test of whiteness looks at
-
-
-@dataclass(frozen=True)
-class NoiseFloor:
-    """What differs from period to period: nothing that repeats, be it modelled or not, is in it. Each (joints,)."""
-
-    periods: int  # compared
-    left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
-    position: Array  # [rad] standard deviation of one sample
-    torque: Array  # [N m]
 
 
 def reconstruction_error(seen: Measured, found: Reconstructed) -> Array:
@@ -74,18 +59,3 @@ def typical_std(found: Reconstructed) -> tuple[Array, Array, Array]:
         return unknown, unknown, unknown
     position, speed, acceleration = (np.median(std, axis=0) for std in found.std)
     return position, speed, acceleration
-
-
-def noise_floor(log: ExperimentLog, seen: Measured) -> NoiseFloor | None:
-    """Scatter between the periods of a periodic log; None where it has none, or fewer than two are whole."""
-    grid = seen.longest
-    if log.period is None or grid.size * seen.step < 2.0 * log.period * (1.0 - 1e-9):
-        return None
-    rows, good = slice(grid.first, grid.last), seen.good
-    torque = np.where(good.torque_spikes, np.nan, good.log.tau)
-    try:
-        position, effort = (average_periods(lay_on(x[rows], grid), 1.0 / grid.step, log.period) for x in (seen.y, torque))
-    except InputRejected:  # a part of the period was never measured
-        return None
-    left_out = tuple(k + 1 for k in sorted({*position.outliers, *effort.outliers}))
-    return NoiseFloor(min(position.count, effort.count), left_out, np.sqrt(position.noise_variance), np.sqrt(effort.noise_variance))

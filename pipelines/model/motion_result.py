@@ -11,12 +11,15 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import NOT_STORED
 from pipelines.log.schema import joint_unit
 from pipelines.model import motion_quality as quality
+from pipelines.model.estimation.regression import condition
+from pipelines.model.mean_period import NoiseFloor, mean_period, noise_floor
 from pipelines.model.motion import Measured, Reconstructed, Reconstruction, measured
-from pipelines.model.tuned import Observers, tuned_observers
+from pipelines.model.tuned import Observers, encoder_resolution, tuned_observers
 from pipelines.signal.observer import Observer
 from pipelines.signal.tuning import smoother_bandwidth
 
-__all__ = ["ALARM", "LogResult", "ObserverResult", "Place", "Series", "SmootherResult", "assess", "coloured", "straying"]
+__all__ = ["ALARM", "LogResult", "MeanResult", "ObserverResult", "Place", "Series", "SmootherResult", "alarm", "assess",
+           "coloured", "straying"]
 
 ALARM = 5e-4  # [rad] between measured and reconstructed position: Kostić et al. 2004, Fig. 10(a), stays below it
 
@@ -62,6 +65,16 @@ class Series:
 
 
 @dataclass(frozen=True)
+class MeanResult:
+    """How well the mean period is known; an estimate takes its equations from it. Arrays per joint."""
+
+    periods: int  # averaged
+    position_std: Array  # in the middle of all samples
+    speed_std: Array
+    acceleration_std: Array
+
+
+@dataclass(frozen=True)
 class LogResult:
     """One log. Every array is per joint, in SI units (m for prismatic joints)."""
 
@@ -72,6 +85,7 @@ class LogResult:
     samples: int
     predicted: int  # samples in which the position of some joint was not measured, and is predicted
     units: tuple[str, ...]  # of position
+    resolution: Array  # [rad] of the encoders: described, or seen in the samples
     observer: ObserverResult
     smoother: SmootherResult | None
     innovation_whiteness: Array  # about standard normal where white; null for a joint that stands still
@@ -84,7 +98,8 @@ class LogResult:
     position_std: Array  # of the reconstruction, in the middle of all samples
     speed_std: Array
     acceleration_std: Array
-    noise_floor: quality.NoiseFloor | None  # between the periods of a periodic log
+    noise_floor: NoiseFloor | None  # between the periods of a periodic log
+    mean: MeanResult | None  # of its periods, where they are averaged
     series: Series | None
     log: ExperimentLog = field(metadata=NOT_STORED, repr=False)
 
@@ -107,18 +122,36 @@ def assess(log: ExperimentLog, found: Reconstructed, how: Reconstruction, place:
     return LogResult(
         log.name, place.source, place.file, how.method, log.n_samples, int(np.isnan(seen.y).any(axis=1).sum()),
         tuple(joint_unit("q", joint.revolute) for joint in log.robot.joints),
-        _observer(observer, quality.paper_jerk(seen, found, how.order)),
+        encoder_resolution(found.good), _observer(observer, quality.paper_jerk(seen, found, how.order)),
         _smoother(tuned) if how.method == "smoother" else None,
         white, correlation, tuple(_words(w, c) for w, c in zip(white.tolist(), correlation.tolist(), strict=True)),
         np.nanmax(np.abs(error), axis=0), np.sqrt(np.nanmean(error**2, axis=0)),
         np.abs(found.motion.dq[inside]).max(axis=0), np.abs(found.motion.ddq[inside]).max(axis=0), *quality.typical_std(found),
-        quality.noise_floor(log, seen), _series(seen, found, error) if draw else None, derived)
+        *_periods(log, seen, found, how), _series(seen, found, error) if draw else None, derived)
+
+
+def _periods(log: ExperimentLog, seen: Measured, found: Reconstructed,
+             how: Reconstruction) -> tuple[NoiseFloor | None, MeanResult | None]:
+    """What differs between periods, before and after the low-pass that an estimate would choose, and their mean."""
+    cutoff = condition(found.motion, 1.0 / seen.step, None, None, np.zeros(log.n_joints)).cutoff_hz
+    if not how.average:
+        return noise_floor(log, found, cutoff), None
+    floor, mean = mean_period(log, found, cutoff)
+    return floor, None if floor is None or mean is None else MeanResult(floor.periods, *quality.typical_std(mean[1]))
+
+
+def alarm(log: LogResult) -> Array:
+    """[rad] (joints,) by which a reconstructed position may differ from a measured one: `ALARM`, or one step of the encoder.
+
+    What a coarse encoder counts is up to half a step from the motion, and further where its count is late.
+    """
+    return np.maximum(ALARM, log.resolution)
 
 
 def straying(log: LogResult) -> tuple[int, ...]:
-    """Revolute joints, counted from 1, whose reconstructed position is further than `ALARM` from a measured one."""
-    pairs = zip(log.units, log.reconstruction_error_max.tolist(), strict=True)
-    return tuple(j for j, (unit, error) in enumerate(pairs, 1) if unit == "rad" and error > ALARM)
+    """Revolute joints, counted from 1, whose reconstructed position is further than `alarm` from a measured one."""
+    triples = zip(log.units, log.reconstruction_error_max.tolist(), alarm(log).tolist(), strict=True)
+    return tuple(j for j, (unit, error, limit) in enumerate(triples, 1) if unit == "rad" and error > limit)
 
 
 def coloured(log: LogResult) -> tuple[int, ...]:

@@ -43,10 +43,11 @@ class Reconstruction:
     order: int = 4  # of the chain of integrators; 3 is the paper's
     jerk_std: tuple[float, ...] | None = None  # σ [rad/s^order], one a joint or one for all
     bandwidth: tuple[float, ...] | None = None  # [Hz] -3 dB of the observer's position, instead of jerk_std
+    average: bool = True  # periods of a periodic log, where they differ by noise alone
 
     def as_settings(self) -> dict[str, object]:
-        """What a derived log must have been made with to be used."""
-        return asdict(self)
+        """What a derived log must have been made with to be used; the motion of its samples is the same, averaged or not."""
+        return {name: value for name, value in asdict(self).items() if name != "average"}
 
     def check(self, joints: int) -> None:
         """C02: one of the methods and orders there are, and one positive number a joint or one for all."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.motion_result import ALARM, LogResult, ObserverResult, Series, coloured, straying
+from pipelines.model.mean_period import NoiseFloor
+from pipelines.model.motion_result import ALARM, LogResult, ObserverResult, Series, alarm, coloured, straying
 from pipelines.report.figures import Array, joint_axes, joint_size
 from pipelines.report.motion_figures import draw_banded, draw_bode, draw_density
 from pipelines.report.report import Figure, Report, Section, Table, Tone
@@ -72,9 +73,10 @@ def _alarm(logs: Sequence[LogResult], far: Sequence[LogResult]) -> tuple[str, ..
         return ()
     worst = max(far, key=lambda log: max(log.reconstruction_error_max[j - 1] for j in straying(log)))
     joint = max(straying(worst), key=lambda j: float(worst.reconstruction_error_max[j - 1]))
+    limit = float(alarm(worst)[joint - 1])
     return (f"joint {joint}{'' if len(logs) == 1 else f' of {worst.name}'} strays "
             f"{format_number(float(worst.reconstruction_error_max[joint - 1]), 2)} rad from what its encoder measured, more than "
-            f"the {format_number(ALARM)} rad that the paper calls good enough",)
+            f"the {format_number(limit)} rad that {'the paper calls good enough' if limit == ALARM else 'its steps allow for'}",)
 
 
 def _listed(joints: Sequence[int]) -> str:
@@ -117,8 +119,11 @@ def _log_section(log: LogResult, series: Series, number: int) -> Section:
                     f"{_listed(doubtful)}.")
     if floor is not None:
         left_out = f" (left out: period {', '.join(map(str, floor.left_out))})" if floor.left_out else ""
-        text.append(f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
-                    "The motion is no average of them.")
+        mean = ("The motion in the derived log is that of every sample; an estimate takes its equations from the mean of the "
+                "periods, whose deviations stand in the table as well." if log.mean is not None else
+                f"They are not averaged: {floor.unlike}." if floor.unlike else "They are not averaged, as asked for.")
+        compared = f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
+        text.append(f"{compared if floor.periods else ''}{mean}")
     return Section(f"Log {log.name}", tuple(text), _tables(log), tuple(_figures(log, series, number == 0)))
 
 
@@ -138,11 +143,20 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
               "std ddq [rad/s^2]": log.acceleration_std.tolist()}
     tables = (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white."),
               _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
-    if log.noise_floor is None:
-        return tables
-    floor = {"joint": columns["joint"], "position [rad]": log.noise_floor.position.tolist(),
-             "torque [N m]": log.noise_floor.torque.tolist()}
-    return (*tables, _table(floor, "Noise floor: standard deviation of one sample between periods."))
+    return tables if log.noise_floor is None else (*tables, _floor_table(log, log.noise_floor))
+
+
+def _floor_table(log: LogResult, noise: NoiseFloor) -> Table:
+    floor: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
+    floor |= {"position [rad]": noise.position.tolist(), "torque [N m]": noise.torque.tolist()}
+    passed = "" if noise.cutoff_hz is None else f" below {format_number(noise.cutoff_hz, 3)} Hz"
+    if noise.cutoff_hz is not None:
+        floor |= {f"position{passed} [rad]": noise.position_low_pass.tolist(),
+                  f"torque{passed} [N m]": noise.torque_low_pass.tolist()}
+    if log.mean is not None:
+        floor |= {"std dq of the mean [rad/s]": log.mean.speed_std.tolist(),
+                  "std ddq of the mean [rad/s^2]": log.mean.acceleration_std.tolist()}
+    return _table(floor, "Noise floor: standard deviation of one sample of one period, by what differs between periods.")
 
 
 def _table(columns: dict[str, Sequence[float]], caption: str) -> Table:

@@ -14,7 +14,8 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.blocks import impulse_toeplitz
 
-__all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "decimate", "design_low_pass", "zero_phase"]
+__all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "decimate", "design_low_pass", "passed_both_ways",
+           "zero_phase"]
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -136,3 +137,13 @@ def centre_samples(x: Array) -> Array:
         # five samples minus Simpson: -1/180 of the fourth difference
         out[1:-1] -= (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) * (1.0 / 180.0)
     return np.asarray(out)
+
+
+def passed_both_ways(frequency: Array, cutoff_hz: float, rate: float, order: int = 4) -> Array:
+    """What `zero_phase` leaves of a sinusoid of `frequency` [Hz]: |H|² of the low-pass, a real gain.
+
+    |H|² = 1 / (1 + (tan(π f / rate) / tan(π f_c / rate))^(2n)): Butterworth 1930, by the bilinear transform.
+    """
+    with np.errstate(over="ignore"):
+        return np.asarray(1.0 / (1.0 + (np.tan(np.pi * np.asarray(frequency) / rate)
+                                        / np.tan(np.pi * cutoff_hz / rate)) ** (2 * order)))

@@ -1,4 +1,10 @@
-"""Average the periods of a periodic signal, and learn the noise from what differs between them."""
+"""Average the periods of a periodic signal, and learn the noise from what differs between them.
+
+    found = average_periods(x, rate, period)
+    found.mean, found.noise_variance                 one period, and the noise of one sample of one period
+    passed_std(found.rest, amplitude)                the same noise after a filter
+    found.repeats(amplitude)                         whether the periods differ by noise alone
+"""
 
 from __future__ import annotations
 
@@ -9,13 +15,24 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
 
-__all__ = ["Periods", "average_periods"]
+__all__ = ["Periods", "Repeats", "average_periods", "mean_of_periods", "passed_std"]
 
 Array = npt.NDArray[np.float64]
 
 _ON_SAMPLE = 1e-3  # of a sample: nearer than this, a phase is taken to lie on a sample
 _OUTLIER = 3.0  # times the usual deviation of a period from the middle one
 _POINTS = 6  # samples that interpolate one between them
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """How far the periods in the mean are the same signal, in what a filter passes. Each (channels)."""
+
+    scatter: Array  # standard deviation of one period
+    signal: Array  # of the mean period about its own mean
+    white: Array  # what the sample-to-sample noise alone would leave of the scatter
+    order: Array  # successive differences over scatter: 1 where the periods differ at random, less where they drift
+    order_std: Array  # of `order`, where they do differ at random
 
 
 @dataclass(frozen=True)
@@ -29,18 +46,45 @@ class Periods:
     used: tuple[int, ...]  # periods in the mean, counted from 0
     outliers: tuple[int, ...]  # periods left out
     interpolated: bool  # the period is no whole number of samples
+    rest: Array  # (used periods, samples of a period, channels) what each has beside the mean; 0 where it is missing
 
     @property
     def count(self) -> int:
         return len(self.used)
 
+    def repeats(self, amplitude: Array) -> Repeats:
+        """Scatter, drift and noise after a filter that passes `amplitude` of each harmonic; see `passed_std`.
 
-def average_periods(x: Array, rate: float, period: float, lags: int = 100) -> Periods:
+        Where periods drift, neighbours are more alike than others: half the mean square of successive differences is less
+        than the variance (von Neumann 1941, Ann. Math. Stat. 12, p. 367). Two periods cannot show it: `order` is 1.
+        """
+        passed = _filtered(self.rest, amplitude)
+        power, steps = (passed**2).sum(axis=(0, 1)), (np.diff(passed, axis=0) ** 2).sum(axis=(0, 1))
+        order = np.where(power > 0.0, 0.5 * steps / np.where(power > 0.0, power, 1.0), 1.0)
+        spectrum = (np.abs(np.fft.fft(passed, axis=1)) ** 2).sum(axis=0)
+        free = spectrum.sum(axis=0) ** 2 / np.maximum((spectrum**2).sum(axis=0), 1e-300)  # independent samples of a period
+        spread = np.sqrt((self.count - 2) / (self.count**2 - 1) / np.maximum(free, 1.0))
+        signal = _filtered((self.mean - self.mean.mean(axis=0))[None], amplitude)[0]
+        # the second difference takes off what moves slowly; of white noise it leaves six times the variance
+        rough = np.sqrt((np.diff(self.rest, 2, axis=1) ** 2).mean(axis=(0, 1)) / 6.0 * self.count / (self.count - 1))
+        return Repeats(passed_std(self.rest, amplitude), np.sqrt((signal**2).mean(axis=0)),
+                       rough * _white_gain(amplitude, len(self.mean)), order, spread)
+
+
+def average_periods(x: Array, rate: float, period: float, lags: int = 100, amplitude: Array | None = None,
+                    least: Array | None = None) -> Periods:
     """Fold `x` (samples, channels...), NaN where missing, at `period` [s].
 
     A period that is no whole number of samples is interpolated by polynomials through six samples, good to 1e-6 of what
     moves slower than a tenth of the rate; what that takes off white noise is allowed for.
-    A period that deviates three times as much as the others do is left out and named (three periods or more needed).
+    A period that deviates three times as much as the others do is left out and named (three periods or more needed): the
+    first, where the motion starts from rest, or one in which somebody touched the arm.
+
+    Args:
+        amplitude: of a filter (samples of a period // 2 + 1,), as in `passed_std`; a period may then stand out in what it
+            passes alone, where the noise does not hide it.
+        least: (channels) deviation of a sample that is never odd: what counting leaves. Periods that are equal but for one
+            step of an encoder have no odd one among them.
     """
     flat = np.asarray(x, dtype=np.float64).reshape(len(x), -1)
     size = rate * period
@@ -54,9 +98,11 @@ def average_periods(x: Array, rate: float, period: float, lags: int = 100) -> Pe
     folded, gain, interpolated = _fold(flat, size, count)
     if np.isnan(folded).all(axis=0).any():
         raise InputRejected("D02", "a part of the period was measured in no period at all", remedy="record more periods")
-    outliers = _outliers(folded)
+    outliers = _outliers(folded, amplitude, np.zeros(flat.shape[1]) if least is None else least.ravel())
     used = tuple(k for k in range(count) if k not in outliers)
     good = folded[list(used)]
+    if np.isnan(good).all(axis=0).any():  # an odd period is the only one that was measured there
+        outliers, used, good = (), tuple(range(count)), folded
     mean = _mean(good)
     rest = good - mean
     present = np.isfinite(rest)
@@ -66,7 +112,36 @@ def average_periods(x: Array, rate: float, period: float, lags: int = 100) -> Pe
     variance = (rest**2).sum(axis=(0, 1)) / freedom / gain
     shape = x.shape[1:]
     return Periods(mean.reshape(-1, *shape), np.sqrt(variance / len(used)).reshape(shape), variance.reshape(shape),
-                   _autocorrelation(rest, min(lags, mean.shape[0] - 1)).reshape(-1, *shape), used, outliers, interpolated)
+                   _autocorrelation(rest, min(lags, mean.shape[0] - 1)).reshape(-1, *shape), used, outliers, interpolated,
+                   rest.reshape(*rest.shape[:2], *shape))
+
+
+def mean_of_periods(x: Array, rate: float, period: float, used: tuple[int, ...]) -> Array:
+    """The mean (samples of a period, channels) of the periods `used` of `x` (samples, channels), NaN where missing."""
+    size = rate * period
+    folded, _, _ = _fold(x, size, int((len(x) + _ON_SAMPLE) / size))
+    return _mean(folded[list(used)])
+
+
+def passed_std(rest: Array, amplitude: Array) -> Array:
+    """Standard deviation of one period (channels) of `rest`, which has been averaged out of its periods, after a filter.
+
+    Args:
+        rest: (periods, samples, channels), of `Periods`.
+        amplitude: (samples // 2 + 1,) what the filter passes of each harmonic of the period, a real gain.
+    """
+    passed = _filtered(rest, amplitude)
+    return np.asarray(np.sqrt((passed**2).mean(axis=(0, 1)) * len(rest) / (len(rest) - 1)))
+
+
+def _filtered(rest: Array, amplitude: Array) -> Array:
+    """Each period through the filter, its end beside its beginning."""
+    bins = np.fft.rfft(rest, axis=1)
+    return np.asarray(np.fft.irfft(bins * _beside(amplitude, bins[0]), rest.shape[1], axis=1))
+
+
+def _beside(amplitude: Array, bins: npt.NDArray[np.complex128]) -> Array:
+    return amplitude.reshape(-1, *(1,) * (bins.ndim - 1))
 
 
 def _fold(flat: Array, size: float, count: int) -> tuple[Array, float, bool]:
@@ -95,14 +170,30 @@ def _mean(folded: Array) -> Array:
     return np.asarray(np.where(present, folded, 0.0).sum(axis=0) / np.maximum(present.sum(axis=0), 1))
 
 
-def _outliers(folded: Array) -> tuple[int, ...]:
+def _outliers(folded: Array, amplitude: Array | None, least: Array) -> tuple[int, ...]:
     """Periods whose deviation from the middle one, in any channel, is far above that of the others."""
     if len(folded) < 3:
         return ()
     away = folded - np.nanmedian(folded, axis=0)
-    spread = np.sqrt(np.nanmean(away**2, axis=1))  # (periods, channels)
-    usual = np.median(spread, axis=0)
-    return tuple(np.flatnonzero((spread > _OUTLIER * usual + 1e-300).any(axis=1)).tolist())
+    odd = _apart(away, least)
+    if amplitude is not None:
+        odd |= _apart(_filtered(np.nan_to_num(away), amplitude), least * _white_gain(amplitude, away.shape[1]))
+    return tuple(np.flatnonzero(odd).tolist())
+
+
+def _apart(away: Array, least: Array) -> npt.NDArray[np.bool_]:
+    """(periods,) which of `away` (periods, samples, channels) are far larger than the rest."""
+    spread = np.sqrt(np.nansum(away**2, axis=1) / np.maximum(np.isfinite(away).sum(axis=1), 1))
+    usual = np.maximum(np.median(spread, axis=0), least)
+    return np.asarray((spread > _OUTLIER * usual + 1e-300).any(axis=1))
+
+
+def _white_gain(amplitude: Array, samples: int) -> float:
+    """Standard deviation of white noise after the filter, over that before: all harmonics, negative ones too."""
+    twice = np.full(len(amplitude), 2.0)
+    twice[0] = 1.0
+    twice[-1] = 1.0 if samples % 2 == 0 else 2.0
+    return float(np.sqrt(twice @ amplitude**2 / samples))
 
 
 def _autocorrelation(rest: Array, lags: int) -> Array:

@@ -124,7 +124,7 @@ def _deviate(chi_square: float, freedom: int, rest: int) -> float:
 
 def _groups(logs: Sequence[LogEquations], least: int) -> list[Gram]:
     """The statistics of consecutive stretches: `least` of them or up to twice as many, where there are as many windows."""
-    samples = sum(run.stop - run.start for one in logs for run in one.runs)
+    samples = sum(run.stop - run.start for one in logs for run in one.counted)
     windows = samples / max(2.0, _WINDOW / logs[0].found.good.log.sample_time)
     balances = chain.from_iterable(_balances(one) for one in logs)
     parts = gather_growing(split(balances, max(1, int(windows / least))), least)
@@ -168,7 +168,7 @@ def _parts(one: LogEquations) -> Iterator[_Part]:
     bad = one.rows.out | one.rows.slow.any(axis=1)
     size = max(2, round(_WINDOW / good.log.sample_time))
     length = max(1, _PIECE // size) * size
-    for run in one.runs:
+    for run in one.counted:
         for first in range(run.start, run.stop - size, length):
             samples = min(length, (run.stop - 1 - first) // size * size) + 1
             place, ends = slice(first, first + samples), np.arange(0, samples, size)

@@ -17,7 +17,6 @@ A fine encoder leaves all but the observer alike; a coarse one decides for the s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import and_
@@ -26,10 +25,11 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.fit.bootstrap import apart
-from pipelines.log.experiment import ExperimentLog
 from pipelines.model.estimation.blocks import Stretches
-from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, equations_of, fit_logs, judge, motions_of
+from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, equations_of, fit_logs, judge
 from pipelines.model.estimation.regression import Rows
+from pipelines.model.mean_period import alike
+from pipelines.model.motion import reconstruct
 from pipelines.model.tuned import METHODS
 
 __all__ = ["Compared", "compare"]
@@ -104,8 +104,8 @@ def _apart(ours: tuple[Compared, Stretches], theirs: tuple[Compared, Stretches])
 
 
 def _again(motions: Motions, recipe: Recipe, method: str) -> Motions:
-    logs: Sequence[ExperimentLog] = [log for log, _ in motions]
-    return motions_of(logs, replace(recipe.how, method=method, jerk_std=None, bandwidth=None))
+    how = replace(recipe.how, method=method, jerk_std=None, bandwidth=None)
+    return tuple((log, reconstruct(log, how, found.good) if found.mean is None else alike(found, how)) for log, found in motions)
 
 
 def _row(method: str, motions: tuple[Motions, Motions] | None, rows: list[list[Rows]], fitted: Fitted, blocks: int,

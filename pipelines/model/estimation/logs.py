@@ -17,7 +17,8 @@ from pipelines.model.estimation.regression import Columns, Conditioning, LogEqua
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of"]
+__all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
+           "with_cutoff"]
 
 Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
@@ -91,18 +92,24 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
     """
     for log, _ in motions:
         recipe.check(log)
-    if recipe.cutoff_hz is None:
-        asked = [_condition(log, found, recipe, columns).cutoff_hz for log, found in motions]
-        known = [cutoff for cutoff in asked if cutoff is not None]
-        recipe = replace(recipe, cutoff_hz=max(known) if known else None)
+    recipe = with_cutoff(recipe, motions, columns)
     equations = equations_of(motions, recipe, columns, rows)
     _enough(equations, motions[0][0])
     found = estimate(equations, columns, weighted)
     return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, equations), weighted)
 
 
+def with_cutoff(recipe: Recipe, motions: Motions, columns: Columns) -> Recipe:
+    """`recipe` with the cut-off for these logs, where none is given: the highest that any of them asks for."""
+    if recipe.cutoff_hz is not None:
+        return recipe
+    asked = [_condition(log, found, recipe, columns).cutoff_hz for log, found in motions]
+    known = [cutoff for cutoff in asked if cutoff is not None]
+    return replace(recipe, cutoff_hz=max(known) if known else None)
+
+
 def _enough(equations: Sequence[LogEquations], log: ExperimentLog) -> None:
-    counts = np.sum([one.counts for one in equations], axis=0)
+    counts = np.sum([one.counts * one.repeats for one in equations], axis=0)
     j = int(np.argmin(counts))
     if counts[j] < _FEWEST_OF_JOINT:
         raise InputRejected("T08", f"{counts[j]} equations of joint {j + 1} are left", where=log.source or log.name,
@@ -129,12 +136,21 @@ def judge(fitted: Fitted, motions: Motions, blocks: int, rows: Sequence[Rows] | 
 
 def _of_whole_torque(found: Errors, equations: Sequence[LogEquations]) -> Errors:
     """The same residual beside the whole torque, where a known part had been subtracted from it."""
-    if all(one.known is None for one in equations):
+    if any(one.known is not None for one in equations):
+        whole = gather(Stacked([replace(one, known=None) for one in equations]))
+        counts = np.maximum(whole.counts, 1)
+        found = replace(found, signal_rms=np.sqrt(whole.power / counts),
+                        relative_error=float(np.sqrt(np.sum(np.square(found.rms) * counts) / whole.power.sum())))
+    return _of_mean_periods(found, equations)
+
+
+def _of_mean_periods(found: Errors, equations: Sequence[LogEquations]) -> Errors:
+    """Root mean squares [N m] of torques as they are: equations of a mean period are scaled by the root of its periods."""
+    if all(one.repeats == 1 for one in equations):
         return found
-    whole = gather(Stacked([replace(one, known=None) for one in equations]))
-    counts = np.maximum(whole.counts, 1)
-    return replace(found, signal_rms=np.sqrt(whole.power / counts),
-                   relative_error=float(np.sqrt(np.sum(np.square(found.rms) * counts) / whole.power.sum())))
+    rows = np.sum([one.counts for one in equations], axis=0)
+    shrink = np.sqrt(rows / np.maximum(np.sum([one.counts * one.repeats for one in equations], axis=0), 1))
+    return replace(found, rms=found.rms * shrink, signal_rms=found.signal_rms * shrink)
 
 
 def _condition(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns) -> Conditioning:

@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.equations import Block
-from pipelines.log.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Array, Motion, RigidBody
@@ -33,7 +32,6 @@ _Piece = tuple[Array, tuple[Array, ...], tuple[Array, ...], tuple[npt.NDArray[np
 _SEED = 20040509
 _BLOCK = 32768  # samples of the log worked on at once
 _SETTLE = 10.0  # periods of the cut-off after which a fourth-order low-pass has forgotten to 1e-10
-_VAGUE = 2.0  # times the usual standard deviation of the acceleration
 _TOUCHED = 1.0  # periods of the cut-off to either side over which one bad sample spreads
 _MEMORY = 0.05  # [s] of the smoother, where no low-pass has a longer one
 
@@ -186,6 +184,8 @@ class LogEquations:
         for run in self.runs:
             count = np.cumsum(np.concatenate([np.zeros(reach + 1), touched[run], np.zeros(reach)]))
             out[run] = count[2 * reach + 1:] > count[:-2 * reach - 1]
+        if (mean := self.found.mean) is not None:  # the rest are copies
+            out[:mean.first] = out[mean.last:] = True
         return Rows(out, np.abs(self.found.motion.dq[good.kept]) < np.array(self.conditioning.min_speed))
 
     @cached_property
@@ -196,6 +196,18 @@ class LogEquations:
             thin = slice(run.start, run.stop, every)
             found += np.sum(~self.rows.out[thin, None] & ~self.rows.slow[thin], axis=0)
         return found
+
+    @property
+    def counted(self) -> tuple[slice, ...]:
+        """The runs without what is a copy of a mean period."""
+        if (mean := self.found.mean) is None:
+            return self.runs
+        return tuple(slice(max(run.start, mean.first), min(run.stop, mean.last)) for run in self.runs)
+
+    @property
+    def repeats(self) -> int:
+        """Periods of which each equation is the mean: scaled by the root of it, all equations have noise of one strength."""
+        return 1 if self.found.mean is None else self.found.mean.periods
 
     @property
     def samples(self) -> int:
@@ -257,24 +269,16 @@ class LogEquations:
         chosen = np.flatnonzero((inside >= first + phase) & (inside < last) & ((inside - first - phase) % how.decimation == 0))
         keep = chosen[~self.rows.out[wide][chosen + begin]]
         slow = self.rows.slow[wide][keep + begin]
-        parts = [np.where(slow[:, j, None], 0.0, s[keep]) for j, s in enumerate(stacks)]
+        scale = np.sqrt(self.repeats)
+        parts = [np.where(slow[:, j, None], 0.0, s[keep] if scale == 1.0 else scale * s[keep]) for j, s in enumerate(stacks)]
         return (motion.t[keep + begin], tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts),
                 tuple(np.ascontiguousarray(p[:, -1]) for p in parts), tuple(~slow.T) if slow.any() else None)
-
-    @cached_property
-    def _vague(self) -> npt.NDArray[np.bool_]:
-        """Samples near an end or a gap, where the acceleration is known half as well as elsewhere, or worse."""
-        if self.found.std is None:
-            return np.zeros(self.found.motion.q.shape, dtype=bool)
-        std = self.found.std[2]
-        usual = np.array([median(column[~np.isnan(column)]) for column in std.T])
-        return np.asarray(std > _VAGUE * usual)
 
     @cached_property
     def _unknown(self) -> npt.NDArray[np.bool_]:
         """(samples, joints) of the mended log: no motion, or a vague one."""
         kept, motion = self.found.good.kept, self.found.motion
-        return np.asarray(~np.isfinite(motion.q + motion.dq + motion.ddq)[kept] | self._vague[kept])
+        return np.asarray(~np.isfinite(motion.q + motion.dq + motion.ddq)[kept] | self.found.vague[kept])
 
     def _stretch(self, wide: slice) -> tuple[Motion, Array]:
         """Motion and torque with what is spoilt bridged by straight lines."""

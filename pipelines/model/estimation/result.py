@@ -11,6 +11,7 @@ from pipelines.log.results import NOT_STORED
 from pipelines.model.estimation.balance import Balance
 from pipelines.model.estimation.checks import Consistent
 from pipelines.model.estimation.compare import Compared
+from pipelines.model.estimation.floor import Beside
 from pipelines.model.estimation.outcome import Course, Direction, Estimated
 
 __all__ = ["Result"]
@@ -39,6 +40,7 @@ class Result:
     unresolved: str  # words; empty where everything shows
     hard_to_see: tuple[Direction, ...]
     comparison: tuple[Compared, ...]
+    noise_floor: tuple[Beside, ...] = field(default=(), kw_only=True)  # of logs that hold two periods or more
     convergence_samples: tuple[int, ...]
     convergence: Array  # (counts, parameters)
     convergence_std: Array

@@ -1,0 +1,102 @@
+"""What an estimate leaves unexplained, beside what differs from one period to the next: noise, which no model explains.
+
+    means, floors = averaged(motions, how, cutoff_hz)      mean periods instead of the logs that have them
+    beside = residuals(floors, fitted, judged, logs)       residual, floor and their ratio, joint by joint
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.fit.least_squares import errors
+from pipelines.fit.statistics import gather
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.estimation.logs import Fitted, Judged, Motions
+from pipelines.model.estimation.regression import LogEquations
+from pipelines.model.mean_period import NoiseFloor, mean_period, noise_floor
+from pipelines.model.motion import Reconstructed, Reconstruction, noise_response
+
+__all__ = ["Beside", "Floors", "averaged", "residuals"]
+
+_SEED = 20040509
+_DRAWS = 3  # of the noise of positions: their mean power is known to a few per cent
+Floors = tuple[NoiseFloor | None, ...]
+
+
+@dataclass(frozen=True)
+class Beside:
+    """One periodic log: its noise, and what the estimate leaves of its torque. Arrays are per joint."""
+
+    log: str
+    role: str
+    periods: int  # compared
+    averaged: bool
+    why_not: str  # the periods are not averaged, in words
+    left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
+    position: Array  # [rad] standard deviation of one sample of one period
+    torque: Array  # [N m]
+    torque_low_pass: Array  # [N m] what the low-pass over equations leaves of it
+    motion: Array  # [N m] what the noise of the positions does to the torque that the model asks for, in the equations
+    floor: Array  # [N m] that noise leaves in the equations: torque's, over the root of the periods averaged, and motion's
+    residual: Array  # [N m] root mean square of what the estimate leaves in the equations
+    ratio: Array  # residual over floor: 1 where the model explains all that repeats
+
+
+def averaged(motions: Motions, how: Reconstruction, cutoff_hz: float | None) -> tuple[Motions, Floors]:
+    """The logs and motions that equations come from, and the noise floor of each log that has two periods or more."""
+    chosen, floors = [], []
+    for log, found in motions:
+        floor, mean = _of(log, found, how, cutoff_hz)
+        chosen.append((log, found) if mean is None else mean)
+        floors.append(floor)
+    return tuple(chosen), tuple(floors)
+
+
+def _of(log: ExperimentLog, found: Reconstructed, how: Reconstruction,
+        cutoff_hz: float | None) -> tuple[NoiseFloor | None, tuple[ExperimentLog, Reconstructed] | None]:
+    if log.period is None:
+        return None, None
+    if how.average:
+        return mean_period(log, found, cutoff_hz)
+    return noise_floor(log, found, cutoff_hz), None
+
+
+def residuals(floors: Floors, fitted: Fitted, judged: Judged, logs: Sequence[ExperimentLog], asked: bool) -> tuple[Beside, ...]:
+    """Every periodic log's noise beside the residual of its equations; `floors` of `logs`, those fitted before those that judge."""
+    equations = [*(one for one in fitted.estimate.equations.logs if isinstance(one, LogEquations)), *judged.equations]
+    sources = [log for log, _ in (*fitted.motions, *judged.motions)]
+    return tuple(_beside(floor, one, log, source, fitted, asked)
+                 for floor, one, log, source in zip(floors, equations, logs, sources, strict=True) if floor is not None)
+
+
+def _beside(noise: NoiseFloor, one: LogEquations, log: ExperimentLog, source: ExperimentLog, fitted: Fitted,
+            asked: bool) -> Beside:
+    residual = errors(gather(one), fitted.estimate.beta).rms / np.sqrt(one.repeats)
+    motion = _of_motion(one, noise, source, fitted)
+    floor = np.hypot(noise.torque_low_pass / np.sqrt(one.repeats), motion)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = residual / floor
+    return Beside(log.name, log.role, noise.periods, one.repeats > 1, noise.unlike if asked else "not asked for", noise.left_out,
+                  noise.position, noise.torque, noise.torque_low_pass, motion, floor, residual, ratio)
+
+
+def _of_motion(one: LogEquations, noise: NoiseFloor, log: ExperimentLog, fitted: Fitted) -> Array:
+    """[N m] rms (joints,) by which the equations change when the positions get their noise once more.
+
+    Of a mean over M periods, what differs between them is left to 1/M; of what counting in steps leaves, the rest repeats.
+    """
+    found, mean, rng = one.found, one.found.mean, np.random.default_rng(_SEED)
+    source, whole = (log, found) if mean is None else (mean.source, mean.whole)
+    power, beta = np.zeros(log.n_joints), fitted.estimate.beta
+    for _ in range(_DRAWS):
+        response, variance = noise_response(source, whole, fitted.recipe.how, len(found.motion.t), rng)
+        differs = np.minimum(noise.position**2, variance)
+        response = response * np.sqrt(1.0 - differs / variance * (1.0 - 1.0 / one.repeats))
+        own = found.motion
+        shaken = replace(found, motion=replace(own, q=own.q + response[0], dq=own.dq + response[1], ddq=own.ddq + response[2]))
+        for block, moved in zip(one, replace(one, found=shaken, chosen=one.rows), strict=True):
+            power += np.sum((moved.residual(beta) - block.residual(beta)) ** 2, axis=1)
+    return np.asarray(np.sqrt(power / np.maximum(_DRAWS * one.repeats * one.counts, 1)))
