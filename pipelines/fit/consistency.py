@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -76,11 +77,13 @@ def _pseudo_map() -> Array:
 
 
 _PSEUDO = _pseudo_map()
+_ROWS = _PSEUDO.reshape(16, 10).T  # J as a row of 16 = φ · this
+_TRACE = np.einsum("aak->k", _PSEUDO)
 
 
 def pseudo_inertia(parameters: Array) -> Array:
     """J (bodies, 4, 4) of standard parameters (bodies, 10)."""
-    return np.asarray(np.tensordot(parameters, _PSEUDO, axes=(1, 2)))
+    return np.asarray((parameters @ _ROWS).reshape(-1, 4, 4))
 
 
 def physical_consistency(beta: Array, covariance: Array, combine: Array) -> Consistency:
@@ -123,10 +126,14 @@ class _Barrier:
     bodies: int
     bound: float
 
+    @cached_property
+    def free(self) -> list[int]:
+        return [i for i in range(self.bodies) if i not in self.held]
+
     def value(self, phi: Array) -> float:
         """Infinite outside."""
         table = phi.reshape(self.bodies, 10)
-        free = self.bound**2 - np.square(np.delete(table, self.held, axis=0))
+        free = self.bound**2 - np.square(table[self.free])
         inertias = pseudo_inertia(table[list(self.held)])
         room = self.bound - np.einsum("iaa->i", inertias)
         if (free <= 0.0).any() or (room <= 0.0).any():
@@ -143,15 +150,14 @@ class _Barrier:
         """
         table = phi.reshape(self.bodies, 10)
         gradient, factor = np.zeros((self.bodies, 10)), np.zeros((self.bodies, 17, self.bodies, 10))
-        trace = np.einsum("aak->k", _PSEUDO)
         for i in range(self.bodies):
             if i in self.held:
                 inertia = pseudo_inertia(table[i:i + 1])[0]
                 inverse = np.linalg.inv(np.linalg.cholesky(inertia))
                 scaled = np.einsum("ab,bck,dc->adk", inverse, _PSEUDO, inverse)
                 room = self.bound - float(np.trace(inertia))
-                gradient[i] = trace / room - np.einsum("aak->k", scaled)
-                factor[i, :16, i], factor[i, 16, i] = scaled.reshape(16, 10), trace / room
+                gradient[i] = _TRACE / room - np.einsum("aak->k", scaled)
+                factor[i, :16, i], factor[i, 16, i] = scaled.reshape(16, 10), _TRACE / room
             else:
                 room_of = self.bound**2 - np.square(table[i])
                 gradient[i] = 2.0 * table[i] / room_of
