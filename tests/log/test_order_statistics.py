@@ -1,11 +1,11 @@
-"""Median, quantile and distinct values as NumPy gives them, bit for bit."""
+"""Median, quantile, order and distinct values as NumPy gives them, bit for bit."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from pipelines.log.order_statistics import distinct, median, quantile
+from pipelines.log.order_statistics import distinct, in_order, median, quantile
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 10, 999, 10000])
@@ -35,6 +35,20 @@ def test_nothing_has_no_median() -> None:
     for found in (median(np.zeros((0, 2))), quantile(np.zeros((0, 2)), 0.9)):
         assert np.isnan(found).tolist() == [True, True]
     assert np.isnan(median(np.zeros(0)))
+
+
+@pytest.mark.parametrize("few", range(1, 8))
+def test_a_few_arrays_in_order(few: int) -> None:
+    """As np.sort has them, infinite ones too; where one of them is undefined, all are."""
+    x = np.round(np.random.default_rng([5, few]).standard_normal((few, 500, 2)), 1)
+    x[few // 2, :20], x[0, 10:40] = np.inf, -np.inf
+    assert np.array_equal(np.stack(in_order(x)), np.sort(x, axis=0))
+    for k in range(few):
+        y = x.copy()
+        y[k, 7] = np.nan
+        found = np.stack(in_order(y))
+        assert np.isnan(found[:, 7]).all()
+        assert np.isfinite(found[:, 50:]).all()
 
 
 def test_distinct_values_are_numpys() -> None:

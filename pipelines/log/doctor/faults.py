@@ -22,7 +22,7 @@ import numpy.typing as npt
 from pipelines.log import limits
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.limits import ABSURD, GAP_LIMIT, GAP_TICKS, sentinels
-from pipelines.log.order_statistics import distinct, median, quantile
+from pipelines.log.order_statistics import distinct, in_order, median, quantile
 
 __all__ = ["GAP_LIMIT", "Mask", "TimeBase", "jumps", "lagged_speed", "missing", "quantum", "saturated",
            "spikes", "time_base", "torque_limit"]
@@ -153,7 +153,8 @@ def spikes(x: Array, smooth: bool, floor: Array) -> Mask:
             expected = (4.0 * (b + c) - (a + d)) / 6.0
             left, right, spread = 2.0 * b - a, 2.0 * c - d, np.zeros_like(a)
         else:
-            expected = np.sort(np.stack([a, b, c, d]), axis=0)[1:3].mean(axis=0)
+            two = in_order(np.where(np.isnan(beside), np.inf, beside) for beside in (a, b, c, d))[1:3]  # a missing one comes last
+            expected = (two[0] + two[1]) / 2.0
             left, right, spread = (a + b) / 2.0, (c + d) / 2.0, np.maximum(np.abs(a - b), np.abs(c - d))
         off = np.abs(x[middle] - expected)
         off = np.where(np.isfinite(off), off, 0.0)
@@ -194,20 +195,20 @@ def saturated(log: ExperimentLog) -> Mask:
     if log.experiment in ("friction", "hold", "frf") or (log.controller is not None and log.controller.law == "open-loop"):
         return at_limit  # an open-loop torque is constant because it was asked to be
     for j in range(tau.shape[1]):
+        step = quantum(tau[:, j]) or 0.0
         for sign in (1.0, -1.0):
-            at_limit[:, j] |= _flat_top(sign * tau[:, j], log.q[:, j])
+            at_limit[:, j] |= _flat_top(sign * tau[:, j], log.q[:, j], step)
     return at_limit
 
 
-def _flat_top(x: Array, q: Array) -> Mask:
+def _flat_top(x: Array, q: Array, step: float) -> Mask:
     """Runs at the very maximum of `x` that no smooth peak makes: within half a run's length beside it, `x` falls by more
-    than 10 quanta, where a parabola that spends the run within one quantum would be down by 3."""
+    than 10 quanta, each `step`, where a parabola that spends the run within one quantum would be down by 3."""
     flat = np.zeros(x.shape, dtype=bool)
     finite = np.isfinite(x)
     if not finite.any():
         return flat
     top = x[finite].max()
-    step = quantum(x) or 0.0
     at = np.concatenate(([False], finite & (x >= top - max(0.01 * step, 1e-9 * abs(top))), [False]))
     edges = np.flatnonzero(np.diff(at.astype(np.int8))).reshape(-1, 2)
     travel = float(np.ptp(q[np.isfinite(q)])) if np.isfinite(q).any() else 0.0
@@ -233,7 +234,8 @@ def jumps(q: Array) -> tuple[Mask, Array]:
     if len(step) < 8:
         return np.zeros(step.shape, dtype=bool), np.zeros(step.shape)
     padded = np.pad(step, ((3, 3), (0, 0)), mode="edge")
-    around = median(np.stack([padded[k:k + len(step)] for k in (0, 1, 2, 4, 5, 6)]))
+    middle = in_order(padded[k:k + len(step)] for k in (0, 1, 2, 4, 5, 6))[2:4]
+    around = (middle[0] + middle[1]) / 2.0
     excess = step - around
     excess = np.where(np.isfinite(excess), excess, 0.0)
     usual = quantile(np.abs(excess), 0.99)
