@@ -1,0 +1,48 @@
+"""Torque saturation: the drive gives no more than its limit, and the log does not know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+
+__all__ = ["TorqueSaturation"]
+
+# causes.md: 0.55, 0.7 and 0.82 of the peak torque at strengths 1, 0.3 and 0.1; the peak itself at none.
+_STRENGTHS, _SHARES = (0.0, 0.1, 0.3, 1.0), (1.0, 0.82, 0.70, 0.55)
+
+
+@dataclass(frozen=True)
+class TorqueSaturation(Fault):
+    """The motor gets min(max(u, -L), L)."""
+
+    strength: float  # [1]
+    peak: float  # [N m] the most that the healthy machine asks for
+
+    name = "torque_saturation"
+
+    @property
+    def limit(self) -> float:
+        """L [N m]."""
+        return self.peak * float(np.interp(self.strength, _STRENGTHS, _SHARES))
+
+    @classmethod
+    def full(cls, case: Case) -> Self:
+        return cls(case.joint, 1.0, case.peak_torque[case.index])
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, strength=factor * self.strength)
+
+    def parameters(self) -> dict[str, float]:
+        return {"limit": self.limit}
+
+    def start(self, run: Run) -> Hooks:
+        j, limit = self.index, self.limit
+
+        def drive(t: float, torque: Floats, q: Floats) -> None:
+            torque[j] = min(max(torque[j], -limit), limit)
+
+        return Hooks(drive=drive)

@@ -1,0 +1,67 @@
+"""Machines and short motions that several tests of the bench share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.bench.fault import Fault, Floats, Hooks, Run
+from pipelines.bench.friction import CoulombViscous
+from pipelines.bench.machine import Machine, machine_of
+from pipelines.bench.reference import Reference, times
+from pipelines.log.experiment import Array
+from pipelines.log.robot import Joint, LinkParameters, RobotDescription
+
+CENTRE = np.array([0.3, -1.4, 0.6])  # [rad]
+
+
+def sway(duration: float = 1.0, centre: Array = CENTRE, hz: float = 1.0, amplitude: float = 0.15) -> Reference:
+    """Every joint to and fro, each at a rate of its own, from rest: q = A (1 - cos wt)²/2, without acceleration at first."""
+    t, w = times(duration), 2.0 * math.pi * hz * (1.0 + 0.3 * np.arange(len(centre)))
+    s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
+    return Reference(t, centre + 0.5 * amplitude * (1 - c) ** 2, amplitude * w * (1 - c) * s,
+                     amplitude * w**2 * (s**2 + (1 - c) * c))
+
+
+def frictionless(machine: Machine) -> Machine:
+    return machine.with_friction(*(CoulombViscous() for _ in range(machine.n)))
+
+
+def unrounded(machine: Machine) -> Machine:
+    """With its noise, but neither encoder steps nor torque bits, which turn any small change into a whole step."""
+    return replace(machine, encoder_resolution=(0.0,) * machine.n, quantised_torque=False)
+
+
+def turntable(inertia: float = 0.8) -> Machine:
+    """One joint about the vertical, without friction, noise or quantisation."""
+    link = LinkParameters(2.0, (0.0, 0.0, 0.0), (inertia, inertia, inertia, 0.0, 0.0, 0.0))
+    robot = RobotDescription("turntable", (0.0, 0.0, -9.81), "dh", (Joint("table", torque=20.0, link=link),))
+    machine = machine_of(robot, nuisances=False)
+    return frictionless(replace(machine, robot=robot)).ideal
+
+
+class Spy(Fault):
+    """Does nothing but note the torque at the motors in each inner step."""
+
+    name = "spy"
+
+    def __init__(self) -> None:
+        object.__setattr__(self, "joint", None)
+        object.__setattr__(self, "applied", [])
+
+    applied: list[Floats]
+
+    @classmethod
+    def full(cls, case: object) -> Spy:
+        return cls()
+
+    def scaled(self, factor: float) -> Spy:
+        return self
+
+    def parameters(self) -> dict[str, float]:
+        return {}
+
+    def start(self, run: Run) -> Hooks:
+        return Hooks(step=lambda t, q, v: self.applied.append(list(run.applied)))

@@ -1,0 +1,69 @@
+"""What holds for every fault in the folder, whoever wrote it."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, is_dataclass
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from pipelines.bench.controllers import Decentralised
+from pipelines.bench.fault import Fault
+from pipelines.bench.faults import fault_names, find_fault, make
+from pipelines.bench.machine import Machine, draw_machine
+from pipelines.bench.plant import Recording, run
+from pipelines.errors import UsageError
+from tests.bench.machines import sway, unrounded
+
+SECONDS = 0.4
+
+
+@lru_cache
+def machine() -> Machine:
+    return unrounded(draw_machine(11, "fault"))
+
+
+@lru_cache
+def healthy() -> Recording:
+    return run(machine(), Decentralised(), sway(SECONDS), seed=1)
+
+
+def with_fault(name: str, joint: int, strength: float) -> Fault:
+    peak = tuple(np.abs(healthy().tau).max(axis=0).tolist())
+    return make(name, machine(), joint, seed=4, strength=strength, peak_torque=peak)
+
+
+def moved(name: str, joint: int, strength: float) -> np.ndarray:
+    """Rms change of q [rad] and tau [N m] against the healthy run of the same noise, (2,)."""
+    sick = run(machine(), Decentralised(), sway(SECONDS), [with_fault(name, joint, strength)], seed=1)
+    return np.array([np.sqrt(np.mean((a - b) ** 2)) for a, b in ((sick.q, healthy().q), (sick.tau, healthy().tau))])
+
+
+@pytest.mark.parametrize("joint", [1, 3])
+@pytest.mark.parametrize("name", fault_names())
+def test_no_jump_at_zero(name: str, joint: int) -> None:
+    """A thousandth of the strength moves positions and torques by at most two thousandths of what the whole does."""
+    if find_fault(name).scope == "arm" and joint != 1:
+        joint = 2  # the same fault again, for the joint says nothing
+    whole, little = moved(name, joint, 1.0), moved(name, joint, 1e-3)
+    assert whole.max() > 1e-6
+    assert (little <= 2e-3 * whole).all(), little / whole
+
+
+@pytest.mark.parametrize("name", fault_names())
+def test_a_fault_is_frozen_and_says_what_it_is(name: str) -> None:
+    """A frozen dataclass, its parameters finite, the same whenever it is made of the same seed."""
+    fault = with_fault(name, 2, 1.0)
+    assert fault == with_fault(name, 2, 1.0)
+    assert is_dataclass(fault)
+    assert fault.name == name
+    assert fault.parameters()
+    assert all(np.isfinite(value) for value in fault.parameters().values())
+    with pytest.raises(FrozenInstanceError):
+        fault.joint = 1  # type: ignore[misc]
+
+
+def test_an_unknown_fault_is_refused() -> None:
+    with pytest.raises(UsageError, match="did you mean 'cogging'"):
+        find_fault("coging")

@@ -1,0 +1,123 @@
+"""Recorded logs: of the format, neutral, fit to be read by every stage, and the answers apart."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.bench import experiments
+from pipelines.bench.experiments import Experiment
+from pipelines.bench.faults import make
+from pipelines.bench.link_model import LinkModel
+from pipelines.bench.machine import Machine, draw_machine
+from pipelines.bench.session import peak_torque, record, seal
+from pipelines.log.canonical import digest_of
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import open_log, write_log
+from tests.bench.machines import CENTRE, sway
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    return draw_machine(21, "fault")
+
+
+@pytest.fixture(scope="module")
+def plans(machine: Machine) -> list[Experiment]:
+    model = LinkModel(machine)
+    writing = experiments.writing(sway(0.5), model)
+    return [experiments.excitation(machine, 1, period=2.0, periods=1), experiments.free(machine, 1, duration=2.0),
+            experiments.hold(CENTRE, duration=0.5), *(experiments.friction(machine, j, 1, duration=2.0) for j in (1, 2, 3)),
+            experiments.reversal(machine, 2, duration=1.0), writing[0].before(), *writing[1:],
+            *(experiments.frf(machine, j, experiments.frf_postures(machine)[0], model, duration=2.0) for j in (1, 2, 3))]
+
+
+@pytest.fixture(scope="module")
+def logs(machine: Machine, plans: list[Experiment]) -> list[ExperimentLog]:
+    return record(machine, [], plans, seed=3)
+
+
+def test_logs_are_of_the_format(logs: list[ExperimentLog], tmp_path: Path) -> None:
+    """Every kind is written and read again in both containers, unchanged, with nothing to be said."""
+    for log in logs:
+        for ending in ("h5", "parquet"):
+            write_log(tmp_path / f"{log.name}.{ending}", log)
+            opened = open_log(tmp_path / f"{log.name}.{ending}")
+            assert digest_of(opened.log) == digest_of(log)
+            assert not opened.checks
+
+
+def test_logs_pass_the_strict_checker(logs: list[ExperimentLog], shared: Path, tmp_path: Path) -> None:
+    """check_log.py finds no fault."""
+    import subprocess
+    import sys
+
+    for log in logs:
+        write_log(tmp_path / f"{log.name}.h5", log)
+    done = subprocess.run([sys.executable, str(shared / "tools" / "check_log.py"), str(tmp_path)], check=False,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_kind_of_experiment_is_there(logs: list[ExperimentLog]) -> None:
+    assert {log.experiment for log in logs} == {"excitation", "free", "hold", "friction", "writing", "frf"}
+    assert {log.role for log in logs} == {"identify", "validate", "reference"}
+    assert len({log.name for log in logs}) == len(logs)
+
+
+@pytest.mark.parametrize("name", ["cogging", "payload", "time_delay", "torque_lag"])
+def test_nothing_in_a_log_tells_the_fault(name: str, machine: Machine, plans: list[Experiment], tmp_path: Path) -> None:
+    """But for the samples, the log of a sick machine is that of the healthy one."""
+    well, sick = (record(machine, faults, plans[2:3], seed=3)[0] for faults in ([], [make(name, machine, 2)]))
+    assert set(well.signals) == set(sick.signals)
+    assert replace(sick, signals=well.signals) == well
+    assert "link" not in well.robot_text
+
+
+def test_references_are_their_own_derivatives(plans: list[Experiment]) -> None:
+    """dq and ddq against central differences of q and dq, to the order of the difference."""
+    for plan in plans:
+        r = plan.reference
+        for x, dx in ((r.q, r.dq), (r.dq, r.ddq)):
+            numeric = (x[2:] - x[:-2]) / 2e-3
+            scale = max(1.0, float(np.abs(r.ddq).max()))
+            assert np.abs(numeric - dx[1:-1]).max() < 0.02 * scale, plan.name
+        assert np.abs(r.dq[0]).max() < 1e-9, f"{plan.name} does not start at rest"
+
+
+def test_references_keep_the_limits(machine: Machine, plans: list[Experiment]) -> None:
+    for plan in plans:
+        for signal, key in ((plan.reference.dq, "velocity"), (plan.reference.ddq, "acceleration")):
+            limits = np.array([getattr(joint, key) for joint in machine.robot.joints])
+            assert (np.abs(signal).max(axis=0) <= 1.001 * limits).all(), (plan.name, key)
+
+
+def test_friction_logs_go_through_two_decades_of_speed_both_ways(machine: Machine) -> None:
+    """Of the open joint alone; the held ones stay within 0.05 rad of where they are."""
+    for joint in (1, 2, 3):
+        log, = record(machine, [], [experiments.friction(machine, joint, 2, duration=16.0)])
+        speed = np.gradient(log.q[:, joint - 1], 1e-3)
+        for way in (speed, -speed):
+            moving = way[way > 0.01]
+            assert np.quantile(moving, 0.99) > 30.0 * np.quantile(moving, 0.05)
+        held = np.delete(log.q, joint - 1, axis=1)
+        assert np.ptp(held, axis=0).max() < 0.05
+        assert (np.delete(log.controller.kp, joint - 1) > 0).all()  # type: ignore[union-attr, arg-type]
+
+
+def test_answers_are_kept_apart(machine: Machine, tmp_path: Path) -> None:
+    """Cause, joint and parameters as findings name them."""
+    seal(tmp_path / "sealed.json", {"case-1": [make("cogging", machine, 2)], "case-2": []})
+    answers = json.loads((tmp_path / "sealed.json").read_text())
+    assert answers["case-2"] == []
+    found = answers["case-1"][0]
+    assert (found["cause"], found["joint"]) == ("cogging", 2)
+    assert {"order", "amplitude", "phase"} <= set(found["parameters"])
+
+
+def test_peak_torque(logs: list[ExperimentLog]) -> None:
+    assert peak_torque(logs[:2]) == tuple(max(np.abs(log.tau[:, j]).max() for log in logs[:2]) for j in range(3))
