@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.doctor.faults import quantum
 from pipelines.log.doctor.segments import Usable
 from pipelines.log.experiment import Array
 from pipelines.signal.chain import ORDERS, stationary
@@ -66,9 +65,8 @@ class Reconstruction:
 
 def encoder_resolution(good: Usable) -> Array:
     """Δθ of each joint [rad] (joints,): the description's, or the step the samples show, whichever is coarser."""
-    shown = [quantum(column) or 0.0 for column in good.log.q.T]
     said = [joint.encoder_resolution or 0.0 for joint in good.log.robot.joints]
-    return np.array([max(pair) or _FALLBACK_RESOLUTION for pair in zip(shown, said, strict=True)])
+    return np.array([max(shown or 0.0, told) or _FALLBACK_RESOLUTION for shown, told in zip(good.steps, said, strict=True)])
 
 
 @dataclass(frozen=True)

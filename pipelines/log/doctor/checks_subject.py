@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.errors import Check, Level, clean
-from pipelines.log.doctor.faults import quantum
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.limits import FEWEST
@@ -45,10 +44,10 @@ class Subject:
         """Whether there are signals to judge; of fewer samples T08 says all there is to say."""
         return not self.planned and self.log.n_samples >= FEWEST
 
-    @cached_property
+    @property
     def steps(self) -> tuple[float | None, ...]:
         """Step in which each encoder counts, where it can be seen. [rad]"""
-        return tuple(quantum(column) for column in self.good.log.q.T)
+        return self.good.steps
 
     @cached_property
     def travel(self) -> Array:

@@ -43,6 +43,7 @@ class Usable:
     """A log as a stage may use it. Masks have the shape of `log.q`."""
 
     log: ExperimentLog  # mended copy
+    steps: tuple[float | None, ...]  # [rad] (joints) in which each encoder counts, where it can be seen
     kept: npt.NDArray[np.intp]  # (samples,) index of each sample in the recording
     runs: tuple[slice, ...]  # contiguous stretches of at least SHORTEST samples, in time order of recording
     missing: Mask  # no measurement of position or torque
@@ -84,21 +85,22 @@ def usable(log: ExperimentLog) -> Usable:
     signals["q"] = replace(signals["q"], values=signals["q"].values - wrapped)
     mended = replace(log, signals=signals)
     gone = lost["q"] | lost["tau"]
-    glitches = spikes(mended.q, True, _position_floor(mended)), spikes(mended.tau, False, _torque_floor(mended))
+    steps = tuple(quantum(column) for column in mended.q.T)
+    smallest = _position_floor(mended, steps)
+    glitches = spikes(mended.q, True, smallest), spikes(mended.tau, False, _torque_floor(mended, smallest))
     stop = emergency_stop(mended)
     end = len(kept) if stop is None else stop[0]
-    return Usable(mended, kept, _runs(mended, time, gone, jumped, end), gone, *glitches, saturated(mended), wrapped,
+    return Usable(mended, steps, kept, _runs(mended, time, gone, jumped, end), gone, *glitches, saturated(mended), wrapped,
                   jumped, end, time)
 
 
-def _position_floor(log: ExperimentLog) -> Array:
+def _position_floor(log: ExperimentLog, shown: tuple[float | None, ...]) -> Array:
     """(joints,) [rad] no deviation below eight encoder steps is a glitch."""
-    steps = [max(quantum(column) or 0.0, joint.encoder_resolution or 0.0)
-             for column, joint in zip(log.q.T, log.robot.joints, strict=True)]
+    steps = [max(step or 0.0, joint.encoder_resolution or 0.0) for step, joint in zip(shown, log.robot.joints, strict=True)]
     return np.maximum(8.0 * np.array(steps), 1e-9)
 
 
-def _torque_floor(log: ExperimentLog) -> Array:
+def _torque_floor(log: ExperimentLog, smallest: Array) -> Array:
     """(joints,) [N m] 5 % of the range, 1 % of the limit, and what one encoder step does through the controller."""
     with np.errstate(invalid="ignore"):
         finite = np.where(np.isfinite(log.tau), log.tau, 0.0)
@@ -107,7 +109,7 @@ def _torque_floor(log: ExperimentLog) -> Array:
     floor = np.maximum(0.05 * (high - low), np.where(np.isfinite(limit), 0.01 * limit, 0.0))
     control = log.controller
     if control is not None and control.kp is not None and control.kd is not None and control.law.startswith("pd"):
-        floor = np.maximum(floor, (control.kp + control.kd / log.sample_time) * _position_floor(log) / 4.0)
+        floor = np.maximum(floor, (control.kp + control.kd / log.sample_time) * smallest / 4.0)
     return np.asarray(np.maximum(floor, 1e-9))
 
 
