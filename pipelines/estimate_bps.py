@@ -161,7 +161,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         unresolved=str(found.unresolved) if found.unresolved.parameters else "",
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
-        courses=tuple(course(log, parts) for log, _, parts in torques[:_COURSES]),
+        courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
         model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),
                            notes=(f"fitted by rrrid estimate-bps, motion by {settings.method}",)),
         derived=tuple(_derived(log, motion, parts, settings) for log, motion, parts in torques))

@@ -23,14 +23,14 @@ Array = npt.NDArray[np.float64]
 _SHOWN = 8  # curves in one axes
 
 
-def torque_figure(name: str, caption: str, t: Array, measured: Array, model: Array, friction: Array,
+def torque_figure(name: str, caption: str, t: Array, measured: Array, model: Array, friction: Array, left: Array,
                   joints: Sequence[str]) -> Figure:
     """Measured and modelled torque, the friction in it, and what is left, one row a joint. All (points, joints) [N m]."""
 
     def draw(drawing: Drawing) -> None:
         axes = figures.joint_axes(drawing, measured.shape[1])
         for j, axis in enumerate(axes):
-            draw_torques(axis, t, measured[:, j], model[:, j], friction[:, j])
+            draw_torques(axis, t, measured[:, j], model[:, j], friction[:, j], left[:, j])
             axis.set_title(printable(joints[j], 60), pad=3.0)
         axes[-1].set_xlabel("time [s]")
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderpad=0.0)
@@ -39,10 +39,10 @@ def torque_figure(name: str, caption: str, t: Array, measured: Array, model: Arr
     return Figure(name, caption, draw, size=figures.joint_size(measured.shape[1]))
 
 
-def draw_torques(axis: Axes, t: Array, measured: Array, model: Array, friction: Array) -> None:
+def draw_torques(axis: Axes, t: Array, measured: Array, model: Array, friction: Array, left: Array) -> None:
     for values, label, color, width in ((measured, "measured", style.GREY, 1.6), (model, "model", style.BLUE, 0.9),
                                         (friction, "friction", style.GREEN, 0.9),
-                                        (measured - model, "left", style.VERMILLION, 0.9)):
+                                        (left, "left", style.VERMILLION, 0.9)):
         axis.plot(*figures.envelope(t, values, 800), color=color, linewidth=width, label=label)
     axis.margins(x=0.01, y=0.08)
     axis.locator_params(axis="y", nbins=4)
@@ -55,7 +55,7 @@ def convergence_figure(name: str, caption: str, samples: Sequence[int], beta: Ar
         axis = drawing.subplots()
         draw_convergence(axis, np.array(samples, dtype=np.float64), beta, std, names)
 
-    return Figure(name, caption, draw, size=(6.0, 3.2))
+    return Figure(name, caption, draw, size=(6.0, 3.8))
 
 
 def draw_convergence(axis: Axes, samples: Array, beta: Array, std: Array, names: Sequence[str]) -> None:
@@ -63,7 +63,7 @@ def draw_convergence(axis: Axes, samples: Array, beta: Array, std: Array, names:
     last, sigma = beta[-1], std[-1]
     shown = np.flatnonzero(np.isfinite(last) & (np.abs(last) > 5.0 * sigma))
     ratio = beta[:, shown] / last[shown]
-    half = ratio[len(ratio) // 4:]
+    half = ratio[len(ratio) // 2:]
     travel = np.nan_to_num(np.nanmax(half, axis=0, initial=0.0) - np.nanmin(half, axis=0, initial=2.0))
     loud = set(np.argsort(-travel)[:_SHOWN].tolist())
     colors = [style.BLUE, style.ORANGE, style.GREEN, style.VERMILLION, style.SKY, style.PURPLE, style.GREY, style.BLACK]
@@ -72,9 +72,10 @@ def draw_convergence(axis: Axes, samples: Array, beta: Array, std: Array, names:
             axis.plot(samples, ratio[:, k], color=style.GREY, linewidth=0.6, alpha=0.5)
     for color, k in zip(colors, sorted(loud), strict=False):
         axis.plot(samples, ratio[:, k], color=color, linewidth=1.2, label=printable(names[shown[k]], 40))
-    reach = np.clip(1.3 * np.nanmax(np.abs(half - 1.0), initial=0.0), 0.02, 0.5)  # the first quarter may leave the frame
+    reach = np.clip(1.5 * np.nanmax(np.abs(half - 1.0), initial=0.0), 0.01, 1.0)  # earlier parts may leave the frame
     axis.set_ylim(1.0 - reach, 1.0 + reach)
+    axis.axvline(samples[len(samples) // 2], color=style.GREY, linewidth=0.8, linestyle=(0, (4, 3)))
     axis.set_xlabel("equations a joint")
     axis.set_ylabel("estimate / final estimate")
     if len(shown):
-        axis.legend(loc="upper right", ncols=2, borderpad=0.2)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderpad=0.0)

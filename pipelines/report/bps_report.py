@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pipelines.model.estimation.balance import ALONE, CLOSED
 from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.outcome import Estimated
@@ -73,8 +75,9 @@ def _beside_noise(result: Result) -> str:
     if not ratios:
         return ""
     worst, joint = max(ratios)
-    return (f"the residual is {'' if len(result.joints) == 1 else 'at most '}{worst:.2g} times what the noise between periods leaves"
-            f"{'' if len(result.joints) == 1 else f' ({joint})'}")
+    several = len(result.joints) > 1
+    return (f"the residual is {'at most ' if several else ''}{worst:.2g} times what the noise between periods leaves"
+            f"{f' ({joint})' if several else ''}")
 
 
 def _noise_section(result: Result) -> Section:
@@ -89,8 +92,9 @@ def _noise_section(result: Result) -> Section:
     columns = ("log", "joint", "position, one sample [rad]", "torque, one sample [N m]", "after the low-pass [N m]",
                "by noise of the motion [N m]", "noise floor [N m]", "residual [N m]", "residual / floor")
     values = tuple(tuple(x if isinstance(x, str) or math.isfinite(x) else None for x in row) for row in rows)
-    return Section("Residual beside the noise floor", (*text, "What differs from one period to the next is noise, which no model "
-                   "explains. A residual well above it is what this model lacks; equal to it, more experiments help, not more model."),
+    text.append("What differs from one period to the next is noise, which no model explains. A residual well above it is what "
+                "this model lacks; where it is no larger, more experiments help, not more model.")
+    return Section("Residual beside the noise floor", tuple(text),
                    (Table(columns, values, "Root mean squares. Noise floor: what is left of the noise of torque and motion in the "
                                            "equations, where periods are averaged in their mean."),))
 
@@ -98,28 +102,30 @@ def _noise_section(result: Result) -> Section:
 def _key_figures(result: Result) -> Table:
     beside = tuple((f"residual over noise floor, {log.log}, joint by joint", ", ".join(f"{ratio:.2g}" for ratio in log.ratio))
                    for log in result.noise_floor if all(map(math.isfinite, log.ratio)))
-    rows = (("relative torque error, fitted logs [%]", 100 * result.relative_error["identify"]),
-            (f"relative torque error, held-out {result.held_out} [%]", 100 * result.relative_error["validate"]),
-            *beside,
-            ("equations, joint by joint", ", ".join(map(str, result.equations))),
-            ("condition number of the rigid columns", result.condition_number),
-            ("condition number of the fit, unit columns", result.condition_number_fit),
-            ("low-pass over torque and columns [Hz]", result.filter_hz),
-            ("friction", "fitted with the rest" if result.friction == "fitted" else "taken from the given model"),
-            ("links that could exist", {True: "yes", False: "no", None: "cannot be said"}[result.physically_consistent]))
+    rows: tuple[tuple[str, str | float | None], ...] = (
+        ("relative torque error, fitted logs [%]", 100 * result.relative_error["identify"]),
+        (f"relative torque error, held-out {result.held_out} [%]", 100 * result.relative_error["validate"]),
+        *beside,
+        ("equations, joint by joint", ", ".join(map(str, result.equations))),
+        ("condition number of the rigid columns", result.condition_number),
+        ("condition number of the fit, unit columns", result.condition_number_fit),
+        ("low-pass over torque and columns [Hz]", result.filter_hz),
+        ("friction", "fitted with the rest" if result.friction == "fitted" else "taken from the given model"),
+        ("links that could exist", {True: "yes", False: "no", None: "cannot be said"}[result.physically_consistent]))
     return Table(("what", "figure"), rows)
 
 
 def _parameter_section(result: Result) -> Section:
     known = any(p.known is not None for p in result.parameters)
-    columns = ("parameter", "value ± std", "unit", "seen", "stands for", *(("from the described links",) if known else ()))
+    columns = ("parameter", "value ± std", "unit", "seen", "stands for", *(("described",) if known else ()))
     rows = [(p.name, "not determined" if p.value is None or p.std is None else with_std(p.value, p.std), p.unit,
              _seen(p), p.combination, *((p.known,) if known else ()))
             for p in result.parameters]
     tones: tuple[Tone, ...] = tuple(
         "good" if p.visible else "bad" if p.value is None else "attention" for p in result.parameters)
     return Section("Parameters", ("Standard deviations allow for a residual whose samples depend on one another.",),
-                   (Table(columns, tuple(rows), "Table V of the paper, with what each stands for.", tones),))
+                   (Table(columns, tuple(rows), "Table V of the paper, with what each stands for"
+                          f"{', and the value of the described links' if known else ''}.", tones),))
 
 
 def _course_section(result: Result) -> Section:
@@ -128,9 +134,10 @@ def _course_section(result: Result) -> Section:
                   100 * left["validate"][j] / whole[j] if whole[j] else None) for j, name in enumerate(result.joints))
     table = Table(("joint", "residual, fitted [N m]", "residual, held out [N m]", "torque, held out [N m]", "relative [%]"), rows,
                   "Root mean squares, after the low-pass.")
+    passed = "" if result.filter_hz is None else f", all after the low-pass of {result.filter_hz:.3g} Hz"
     figures = [torque_figure(f"torque-{c.name}", f"{c.name} ({c.role}): measured torque, the model's, its friction, "
-                                                 f"and what is left.",
-                             c.t, c.measured, c.model, c.friction, result.joints) for c in result.courses]
+                                                 f"and what is left{passed}.",
+                             c.t, c.measured, c.model, c.friction, c.left, result.joints) for c in result.courses]
     return Section("Torque along the experiment", (), (table,), tuple(figures))
 
 
@@ -146,9 +153,24 @@ def _trust_section(result: Result) -> Section:
     if (balance := _balance_table(result)) is not None:
         tables.append(balance)
     growth = convergence_figure(
-        "convergence", "Estimates as samples come in, each in units of its final value: a model that is right settles early.",
+        "convergence", "Estimates as samples come in, each in units of its final value; every one ends at 1. What matters is "
+        "the second half: the frame is set by it, and cuts earlier parts off. Parameters that move least are grey.",
         result.convergence_samples, result.convergence, result.convergence_std, tuple(p.name for p in result.parameters))
-    return Section("What the estimate rests on", _balance_words(result), tuple(tables), (growth,))
+    return Section("What the estimate rests on", (*_balance_words(result), *_settling_words(result)), tuple(tables), (growth,))
+
+
+def _settling_words(result: Result) -> tuple[str, ...]:
+    """Whether the second half of the samples moved the estimates more than noise does: Var(β_n - β_N) = Var β_n - Var β_N."""
+    half = len(result.convergence) // 2
+    beta, std = (np.asarray(series)[[half, -1]] for series in (result.convergence, result.convergence_std))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        moved = np.nan_to_num(np.abs(beta[1] - beta[0]) / np.sqrt(np.square(std[0]) - np.square(std[1])), posinf=0.0)
+    k = int(np.argmax(moved))
+    if not moved[k] > 0.0:
+        return ()
+    words = f"The second half of the samples moves {result.parameters[k].name} most, by {moved[k]:.1f} standard deviations"
+    return (f"{words}: noise explains that." if moved[k] < ALONE else
+            f"{words}: more than noise explains. The model lacks something, or it changed during the experiment.",)
 
 
 def _balance_words(result: Result) -> tuple[str, ...]:
@@ -169,7 +191,7 @@ def _balance_words(result: Result) -> tuple[str, ...]:
     if abs(balance.delay) > ALONE * balance.delay_std:
         meanings.append(f"{late}: a drive or a filter delays one of them, or their clocks differ.")
     if differing := [name for name, apart in zip(balance.names, balance.apart, strict=True) if apart > ALONE]:
-        meanings.append(f"{', '.join(differing)} {'differs' if len(differing) == 1 else 'differ'}: the reconstructed acceleration "
+        meanings.append(f"too far apart: {', '.join(differing)}. Then the reconstructed acceleration "
                         f"is too small or too large, or the model lacks an effect.")
     if not meanings:
         meanings.append("No one of them stands out, all of them together do: most likely the model lacks an effect.")
@@ -182,10 +204,10 @@ def _balance_table(result: Result) -> Table | None:
         return None
     fitted, balance = {p.name: p for p in result.parameters}, result.balance
     rows = [(name, with_std(p.value, p.std) if (p := fitted[name]).value is not None and p.std is not None else "not determined",
-             with_std(value, std), p.unit, apart)
+             with_std(value, std), p.unit, round(apart, 1))
             for name, value, std, apart in zip(balance.names, balance.value, balance.std, balance.apart, strict=True)]
     rows.append(("torque behind position", "taken for 0", with_std(1e3 * balance.delay, 1e3 * balance.delay_std), "ms",
-                 abs(balance.delay) / balance.delay_std))
+                 round(abs(balance.delay) / balance.delay_std, 1)))
     tones: tuple[Tone, ...] = tuple("attention" if float(row[4]) > ALONE else "good" for row in rows)
     return Table(("parameter", "by the torques", "by the balance of power", "unit", "apart [std]"), tuple(rows),
                  f"{balance.windows} balances of work and energy. Above {ALONE:g} standard deviations a difference is not chance.",

@@ -69,3 +69,25 @@ def test_names_from_logs_are_inert(result: Result) -> None:
     named = replace(result, joints=(hostile, *result.joints[1:]),
                     courses=tuple(replace(c, name=hostile) for c in result.courses))
     assert "<script>" not in page(named)
+
+
+def test_estimates_that_do_not_settle_are_said(result: Result) -> None:
+    """A change that noise makes, and the same for a parameter five standard deviations away at half of the samples."""
+    def said(one: Result) -> str:
+        return " ".join(text for section in bps_report(one).sections for text in section.text)
+
+    assert "noise explains that" in said(result)
+    half = len(result.convergence) // 2
+    spread = np.sqrt(np.square(result.convergence_std[half, 2]) - np.square(result.convergence_std[-1, 2]))
+    moving = result.convergence.copy()
+    moving[half, 2] = moving[-1, 2] + 5.0 * spread
+    assert f"moves {result.parameters[2].name} most, by 5.0 standard deviations: more than noise" in said(
+        replace(result, convergence=moving))
+
+
+def test_the_torque_that_is_drawn_is_the_torque_that_was_fitted(result: Result) -> None:
+    """After the low-pass: what is left in the figure has the root mean square of the table, and nothing is aliased."""
+    (course,) = result.courses
+    inside = course.left[(course.t > 0.1) & (course.t < course.t[-1] - 0.1)]  # the ends, known badly, are not fitted
+    np.testing.assert_allclose(np.sqrt(np.nanmean(np.square(inside), axis=0)), result.torque_rms["identify"], rtol=0.1)
+    np.testing.assert_allclose(course.left, course.measured - course.model, atol=1e-9)

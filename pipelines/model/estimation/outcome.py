@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import Validity
@@ -12,10 +13,11 @@ from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.logs import Fitted, Motions
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed
+from pipelines.signal.filters import choose_decimation, design_low_pass, zero_phase
 
 __all__ = ["Course", "Direction", "Estimated", "course", "parameters", "torques", "validity"]
 
-_POINTS = 1500  # of a figure
+_POINTS = 6000  # of a figure
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,10 @@ class Direction:
 
 @dataclass(frozen=True)
 class Course:
-    """One log's torques, thinned out for the figures."""
+    """One log's torques for the figures, after the low-pass of the fit; NaN between stretches and where torque is spoilt.
+
+    Of a long log the lowest and the highest of each stretch of time, so that nothing is hidden and nothing aliased.
+    """
 
     name: str
     role: str
@@ -49,6 +54,7 @@ class Course:
     measured: Array  # [N m] (points, joints)
     model: Array
     friction: Array
+    left: Array  # measured - model
 
 
 def parameters(fitted: Fitted, arm: Arm) -> tuple[Estimated, ...]:
@@ -81,9 +87,46 @@ def torques(arm: Arm, log: ExperimentLog, motion: Reconstructed) -> ArmTorque:
                        (parts.inertia, parts.coriolis, parts.gravity, parts.friction, parts.effects)))
 
 
-def course(log: ExperimentLog, parts: ArmTorque) -> Course:
-    every = max(1, log.n_samples // _POINTS)
-    return Course(log.name, log.role, log.t[::every] - log.t[0], log.tau[::every], parts.total[::every], parts.friction[::every])
+def course(log: ExperimentLog, found: Reconstructed, parts: ArmTorque, cutoff_hz: float | None) -> Course:
+    """The torques of `log` along its time, as the fit saw them."""
+    good, rate = found.good, 1.0 / log.sample_time
+    low_pass = None if cutoff_hz is None else design_low_pass(cutoff_hz, rate)
+    every = 1 if cutoff_hz is None else max(1, choose_decimation(cutoff_hz, rate) // 2)
+    pieces = []
+    for run in good.runs:
+        rows = good.kept[run]
+        tau, spoilt = good.log.tau[run], (good.missing | good.spikes | good.saturated)[run]
+        torques = np.hstack([_bridged(tau, spoilt), parts.total[rows], parts.friction[rows]])
+        if low_pass is not None and len(torques) > low_pass.padding:
+            torques = zero_phase(torques, low_pass)
+        torques[:, :log.n_joints][spoilt] = np.nan
+        left = torques[:, :log.n_joints] - torques[:, log.n_joints:2 * log.n_joints]
+        piece = np.column_stack([log.t[rows] - log.t[0], torques, left])[::every]
+        pieces += [piece, np.full((1, piece.shape[1]), np.nan)]
+    whole = _extremes(np.concatenate(pieces[:-1]), _POINTS)
+    t, torques = whole[:, 0], whole[:, 1:]
+    measured, model, friction, left = (np.ascontiguousarray(part) for part in np.split(torques, 4, axis=1))
+    return Course(log.name, log.role, t, measured, model, friction, left)
+
+
+def _bridged(x: Array, bad: npt.NDArray[np.bool_]) -> Array:
+    """`x` (samples, joints) with straight lines where it is bad."""
+    out, place = x.copy(), np.arange(len(x))
+    for column, ill in zip(out.T, bad.T, strict=True):
+        if ill.any():
+            column[ill] = 0.0 if ill.all() else np.interp(place[ill], place[~ill], column[~ill])
+    return out
+
+
+def _extremes(rows: Array, points: int) -> Array:
+    """Time beside columns (samples, 1 + columns), thinned to the lowest and the highest of each column in a bucket of time."""
+    size = 2 * -(-len(rows) // points)
+    if len(rows) <= points:
+        return rows
+    buckets = rows[:len(rows) // size * size].reshape(-1, size, rows.shape[1])
+    low, high = np.fmin.reduce(buckets, axis=1), np.fmax.reduce(buckets, axis=1)
+    low[:, 0], high[:, 0] = buckets[:, size // 4, 0], buckets[:, 3 * size // 4, 0]
+    return np.stack([low, high], axis=1).reshape(-1, rows.shape[1])
 
 
 def validity(motions: Motions) -> Validity:
