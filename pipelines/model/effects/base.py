@@ -100,7 +100,8 @@ class Hooks:
 
     The first axis of every array holds replicas, so that many simulations run at once. `states` numbers of memory each
     replica keeps, zero or `start` at the start; `rate` moves them in continuous time, `update` once per control sample
-    (a delay line): after `sensor` was asked, before the command acts. The motion handed in is the true one with ddq
+    (a delay line): after `sensor` was asked, before the command acts. A command is the torque as it reaches this effect:
+    of several the last one meets it first. The motion handed in is the true one with ddq
     zero: what multiplies acceleration goes to `inertia` or `arm`.
     """
 

@@ -9,7 +9,7 @@ Effects enter through their hooks, in the order in which they act; what is frict
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -119,21 +119,26 @@ class MovingPlant:
 
     def rates(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
         """d(states)/dt (replicas, states)."""
-        out = np.zeros_like(states)
-        motion = self.motion(t, q, dq)
-        for hook, own in self._hooked:
+        out, motion = np.zeros_like(states), self.motion(t, q, dq)
+        for hook, own, torque in self._on_its_way(motion, states, command):
             if hook.rate:
-                out[:, own] = hook.rate(motion, command.T, states[:, own])
+                out[:, own] = hook.rate(motion, torque, states[:, own])
         return out
 
     def updated(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
         """The states after a control sample was taken (replicas, states)."""
-        out = states.copy()
-        motion = self.motion(t, q, dq)
-        for hook, own in self._hooked:
+        out, motion = states.copy(), self.motion(t, q, dq)
+        for hook, own, torque in self._on_its_way(motion, states, command):
             if hook.update:
-                out[:, own] = hook.update(motion, command.T, states[:, own])
+                out[:, own] = hook.update(motion, torque, states[:, own])
         return out
+
+    def _on_its_way(self, motion: Motion, states: Array, command: Array) -> Iterator[tuple[Hooks, slice, Array]]:
+        """Every hook with its memories and the torque (replicas, joints) that reaches it."""
+        torque = command.T
+        for hook, own in reversed(self._hooked):
+            yield hook, own, torque
+            torque = hook.actuator(torque, motion, states[:, own]) if hook.actuator else torque
 
     def at_start(self, t: Array, q: Array, dq: Array) -> Array:
         """The states (replicas, states) before the first sample."""

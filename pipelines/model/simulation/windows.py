@@ -8,6 +8,7 @@ time, no tracking error.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -52,8 +53,8 @@ def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: floa
     good: Mask = np.asarray(np.isfinite(tau).all(axis=1) & np.isfinite(motion.q).all(axis=1))
     if usable is not None:
         good = good & usable
-    good[1:] &= np.abs(np.diff(motion.t) - sample_time) < 0.5 * sample_time
-    first = _starts(good, length)
+    uneven = np.abs(np.diff(motion.t) - sample_time) > 0.5 * sample_time
+    first = _starts(good, uneven, length)
     if not len(first):
         raise InputRejected("T08", f"no window of {length} samples is without a gap", remedy="ask for shorter windows")
     tried = first[np.linspace(0, len(first) - 1, min(len(first), 32)).astype(int)]
@@ -67,10 +68,11 @@ def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: floa
     return Windows(q, dq, first, length, steps)
 
 
-def _starts(good: Mask, length: int) -> Indices:
-    """First samples of windows of `length` good samples that follow one another without overlap."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8))).reshape(-1, 2)
-    return np.concatenate([np.zeros(0, dtype=np.intp), *(np.arange(a, b - length + 1, length) for a, b in edges.tolist())])
+def _starts(good: Mask, uneven: Mask, length: int) -> Indices:
+    """First samples of windows of `length` good samples, side by side; `uneven` (samples - 1,) tells where the clock jumps."""
+    ends = [0, *(np.flatnonzero((good[1:] != good[:-1]) | uneven) + 1).tolist(), len(good)]
+    runs = [np.arange(a, b - length + 1, length) for a, b in pairwise(ends) if good[a]]
+    return np.concatenate([np.zeros(0, dtype=np.intp), *runs])
 
 
 def _steps(plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, length: int) -> int:
