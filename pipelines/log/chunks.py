@@ -1,4 +1,4 @@
-"""One column of samples as HDF5 stores it: bytes shuffled, deflated, checksummed.
+"""Store arrays as HDF5 does, in chunks: bytes shuffled, deflated, checksummed.
 
 HDF5 deflates every byte alike. The last digits of a measured number are noise, which no compression shortens: shuffled, they
 lie together, and here they are stored as they are. What deflate is still asked to do takes a third of the time, and every
@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import struct
 import zlib
-from itertools import groupby
+from itertools import groupby, product
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 
-__all__ = ["LEVEL", "packed"]
+__all__ = ["packed", "store"]
 
-LEVEL = 1  # of deflate
+_LEVEL = 1  # of deflate
 _SAMPLED = 2048  # bytes of a plane that are counted
 _NOISE = 1.15 / 256.0  # two bytes of noise are the same in one of 256 cases; up to this, deflate gains less than 3 %
 _FEW = 4096  # bytes of a plane that are soon deflated
@@ -27,9 +28,21 @@ _BLOCK = 65535  # [B] of a stored block at most
 Bytes = npt.NDArray[np.uint8]
 
 
-def packed(column: Array) -> bytes:
-    """The chunk of `column` (samples,) after the filters shuffle, deflate and fletcher32."""
-    planes = np.ascontiguousarray(np.ascontiguousarray(column, dtype="<f8").view(np.uint8).reshape(-1, 8).T)
+def store(group: Any, name: str, values: Array, chunk: tuple[int, ...]) -> Any:
+    """Write `values` as the data set `name` of `group`, in chunks of shape `chunk` with gzip, shuffle and fletcher32."""
+    dataset = group.create_dataset(name, shape=values.shape, dtype="<f8", chunks=chunk, compression="gzip",
+                                   compression_opts=_LEVEL, shuffle=True, fletcher32=True, track_times=False)
+    for corner in product(*(range(0, size, step) for size, step in zip(values.shape, chunk, strict=True))):
+        piece = values[tuple(slice(k, k + step) for k, step in zip(corner, chunk, strict=True))]
+        if piece.shape != chunk:  # one at the edge is as large as the others
+            piece = np.pad(piece, [(0, step - size) for size, step in zip(piece.shape, chunk, strict=True)])
+        dataset.id.write_direct_chunk(corner, packed(piece))
+    return dataset
+
+
+def packed(values: Array) -> bytes:
+    """The chunk of `values` after the filters shuffle, deflate and fletcher32."""
+    planes = np.ascontiguousarray(np.ascontiguousarray(values, dtype="<f8").reshape(-1, 1).view(np.uint8).T)
     stream = _deflated(planes)
     return stream + struct.pack("<I", fletcher32(stream))
 
@@ -42,7 +55,7 @@ def _deflated(planes: Bytes) -> bytes:
         if noisy:
             parts += (_stored(data[k:k + _BLOCK]) for k in range(0, len(data), _BLOCK))
         else:
-            squeeze = zlib.compressobj(LEVEL, wbits=-zlib.MAX_WBITS)
+            squeeze = zlib.compressobj(_LEVEL, wbits=-zlib.MAX_WBITS)
             parts += (squeeze.compress(data), squeeze.flush(zlib.Z_FULL_FLUSH))
     return b"".join((*parts, b"\x01\x00\x00\xff\xff", struct.pack(">I", zlib.adler32(planes.data))))
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log import canonical, schema
-from pipelines.log.chunks import LEVEL, packed
+from pipelines.log.chunks import store
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 
 __all__ = ["as_reals", "read_parts", "refuse_oversize", "write"]
@@ -47,16 +47,7 @@ def write(path: Path, log: ExperimentLog) -> None:
 def _write_samples(signals: Any, name: str, values: Array) -> Any:
     if values.size == 0:
         return signals.create_dataset(name, data=values, dtype="<f8", track_times=False)
-    length = min(_CHUNK, len(values))
-    dataset = signals.create_dataset(name, shape=values.shape, dtype="<f8", chunks=(length,) + (1,) * (values.ndim - 1),
-                                     compression="gzip", compression_opts=LEVEL, shuffle=True, fletcher32=True, track_times=False)
-    for first in range(0, len(values), length):
-        rows = values[first:first + length]
-        for place in np.ndindex(values.shape[1:]):
-            column = np.zeros(length)  # the last chunk is as long as the others
-            column[:len(rows)] = rows[:, *place]
-            dataset.id.write_direct_chunk((first, *place), packed(column))
-    return dataset
+    return store(signals, name, values, (min(_CHUNK, len(values)),) + (1,) * (values.ndim - 1))
 
 
 def _write_attributes(owner: Any, attributes: dict[str, object]) -> None:

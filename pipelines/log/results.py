@@ -21,12 +21,14 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from pipelines.log.chunks import store
 from pipelines.log.experiment import Array
 
 __all__ = ["NOT_STORED", "decode", "encode", "json_text", "read_series", "write_series"]
 
 NOT_STORED: Final[Mapping[str, object]] = {"stored": False}
 _INLINE = 64
+_CHUNK = 65536  # numbers
 _SERIES = "$series"
 
 T = TypeVar("T")
@@ -100,8 +102,8 @@ def write_series(path: Path, series: Mapping[str, Array]) -> None:
     with h5py.File(path, "w", libver=("v110", "v110")) as file:
         file.attrs["format"] = "rrrid-result"
         for name, values in series.items():
-            file.create_dataset(name, data=values, compression="gzip", compression_opts=1, shuffle=True, fletcher32=True,
-                                track_times=False)
+            rows = max(1, _CHUNK * len(values) // max(values.size, 1))
+            store(file, name, values, (min(rows, len(values)), *values.shape[1:]))
 
 
 def read_series(path: Path) -> dict[str, Array]:

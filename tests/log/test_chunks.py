@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from pipelines.log.chunks import fletcher32, packed
+from pipelines.log.chunks import fletcher32, packed, store
 
 FILTERS = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
 
@@ -65,3 +65,17 @@ def test_packed_is_as_small(tmp_path: Path) -> None:
         for name, column in _signals(20000).items():
             theirs = file.create_dataset(name, data=column, chunks=column.shape, **FILTERS).id.get_storage_size()
             assert len(packed(column)) < 1.04 * theirs + 40, name
+
+
+@pytest.mark.parametrize(("shape", "chunk"), [((10,), (10,)), ((10,), (4,)), ((70000, 2), (65536, 1)), ((7, 5, 3), (2, 5, 3)),
+                                              ((5, 4), (3, 3))])
+def test_every_chunk_finds_its_place(tmp_path: Path, shape: tuple[int, ...], chunk: tuple[int, ...]) -> None:
+    """Chunks that do not divide the array, of any number of dimensions, of arrays in either order of memory."""
+    values = np.random.default_rng(13).standard_normal(shape)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        store(file, "c", values, chunk)
+        store(file, "fortran", np.asfortranarray(values), chunk)
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert np.array_equal(file["c"][()], values)
+        assert np.array_equal(file["fortran"][()], values)
+        assert (file["c"].chunks, file["c"].shuffle, file["c"].fletcher32, file["c"].compression_opts) == (chunk, True, True, 1)
