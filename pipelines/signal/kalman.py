@@ -7,6 +7,7 @@ as None, because a NaN would poison every later state without a word.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.chain import held_input, transition
 
-__all__ = ["Reference", "Textbook"]
+__all__ = ["ExtendedTextbook", "Reference", "Textbook"]
 
 Array = npt.NDArray[np.float64]
 
@@ -77,3 +78,34 @@ class Textbook:
         seen = [value if np.isfinite(value) else None for value in y.tolist()]
         means, covariances, _, _ = kalman.batch_filter(seen, Fs=f, Qs=q, update_first=True)
         return kalman, (means, covariances), (f, q)
+
+
+@dataclass(frozen=True)
+class ExtendedTextbook:
+    """filterpy's extended filter of which the first state is measured; `advance` as in `pipelines.signal.extended`."""
+
+    advance: Callable[[Array, float], tuple[Array, Array]]
+    process: Array  # (n, n) covariance that every step adds
+    noise_variance: float
+
+    def filter(self, y: Array, u: Array, mean: Array, covariance: Array) -> Reference:
+        """Updated states of `y` (samples,), NaN where missing, under the input `u` (samples,)."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            from filterpy.kalman import ExtendedKalmanFilter
+        n = len(mean)
+        kalman = ExtendedKalmanFilter(dim_x=n, dim_z=1)
+        kalman.x, kalman.P = np.array(mean, dtype=np.float64)[:, None], np.array(covariance, dtype=np.float64)
+        kalman.Q, kalman.R = self.process, np.array([[self.noise_variance]])
+        kalman.F = np.eye(n)
+        seen = np.eye(n)[:1]
+        states, covariances = np.empty((len(y), n)), np.empty((len(y), n, n))
+        for k in range(len(y)):
+            if np.isfinite(y[k]):
+                kalman.update(np.array([[y[k]]]), lambda x: seen, lambda x: x[:1])
+            states[k], covariances[k] = kalman.x[:, 0], kalman.P
+            ahead, moving = self.advance(kalman.x[:, 0], float(u[k]))
+            kalman.F[:len(moving)] = moving
+            kalman.P = kalman.F @ kalman.P @ kalman.F.T + kalman.Q  # filterpy's own predict_x is linear
+            kalman.x = ahead[:, None]
+        return Reference(states, covariances)

@@ -17,7 +17,7 @@ from pipelines.model.friction.one_joint import OneJoint, gravity_names
 from pipelines.model.friction.weak_form import Stretch, Windows
 from pipelines.model.rigid.body import Array
 
-__all__ = ["LawEquations", "LawFit", "Number", "Predicted", "fit_law", "posture_groups"]
+__all__ = ["LawEquations", "LawFit", "Number", "Predicted", "alike", "fit_law", "posture_groups"]
 
 _ALIKE = 0.02  # [rad] by which locked joints may stand apart and the inertia still be the same
 _SCANNED = 120  # rows that a scan for starts looks at
@@ -206,13 +206,18 @@ def posture_groups(stretches: Sequence[Stretch]) -> tuple[tuple[float, ...], ...
     """Postures of the locked joints that are apart."""
     found: list[tuple[float, ...]] = []
     for stretch in stretches:
-        if not any(_apart(stretch.posture, posture) < _ALIKE for posture in found):
+        if not any(alike(stretch.posture, posture) for posture in found):
             found.append(stretch.posture)
     return tuple(found)
 
 
 def nearest(posture: tuple[float, ...], known: Sequence[tuple[float, ...]]) -> int:
     return min(range(len(known)), key=lambda k: _apart(posture, known[k]))
+
+
+def alike(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether inertia and gravity may be taken as the same."""
+    return _apart(a, b) < _ALIKE
 
 
 def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:

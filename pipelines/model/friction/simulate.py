@@ -44,17 +44,21 @@ def simulate_joint(stretch: Stretch, fit: LawFit, friction: bool = True) -> Simu
     weight = gravity_columns(stretch.q, stretch.revolute) @ np.array(joint.gravity)
     if stretch.held:
         weight[:-1] = 0.5 * (weight[1:] + weight[:-1])
-    stretch = replace(stretch, tau=stretch.tau - weight - stretch.sway() @ coupling)
-    joint = joint.carrying(joint.inertia, tuple(0.0 for _ in joint.gravity))
+    given = weight + stretch.sway() @ coupling
     if joint.inertia <= 0.0:
         lost = np.full(len(stretch.t), np.nan)
         return Simulated(lost, lost)
+    if friction and (fit.law.sees_load or not fit.law.pointwise):
+        return _hooked(stretch, joint, fit, given)
+    stretch = replace(stretch, tau=stretch.tau - given)
     if not friction:
-        return _stepped(stretch, joint, lambda q, v: 0.0, 1)
-    if fit.law.pointwise and not fit.law.sees_load:
-        slope = _steepest(fit) * float(np.median(np.diff(stretch.t))) / joint.inertia
-        return _stepped(stretch, joint, _table(fit, stretch), int(np.clip(math.ceil(slope / _STABLE), 1, _MOST_STEPS)))
-    return _hooked(stretch, joint, fit)
+        return _stepped(stretch, joint, _none, 1)
+    slope = _steepest(fit) * float(np.median(np.diff(stretch.t))) / joint.inertia
+    return _stepped(stretch, joint, _table(fit, stretch), int(np.clip(math.ceil(slope / _STABLE), 1, _MOST_STEPS)))
+
+
+def _none(_q: float, _v: float) -> float:
+    return 0.0
 
 
 def _torque(stretch: Stretch) -> tuple[list[float], list[float]]:
@@ -141,7 +145,7 @@ def _row(fit: LawFit, position: float, speed: Array) -> Array:
     return np.asarray(fit.law.columns(motion, fit.joint, fit.theta) @ fit.amplitudes)
 
 
-def _hooked(stretch: Stretch, joint: OneJoint, fit: LawFit) -> Simulated:
+def _hooked(stretch: Stretch, joint: OneJoint, fit: LawFit, given: Array) -> Simulated:
     """By the hooks of each effect, two steps of Heun a sample: for laws with memory or load."""
     effects = zip(fit.law.shaped(fit.theta), fit.law.values(fit.theta, fit.amplitudes), strict=True)
     hooks = [effect.simulate(joint, values) for effect, values in effects]
@@ -153,11 +157,11 @@ def _hooked(stretch: Stretch, joint: OneJoint, fit: LawFit) -> Simulated:
     parts = int(np.clip(math.ceil(slope / _STABLE), 2, _MOST_STEPS))
     begin, _ = _torque(stretch)
     for k, step in enumerate(np.diff(stretch.t).tolist()):
-        h, command = step / parts, np.array([[begin[k]]])
+        h, command, other = step / parts, np.array([[begin[k]]]), float(given[k])
         for _ in range(parts):
-            a1, r1 = _rates(joint, hooks, states, q, v, command)
+            a1, r1 = _rates(joint, hooks, states, (q, v), command, other)
             ahead = [z + h * r for z, r in zip(states, r1, strict=True)]
-            a2, r2 = _rates(joint, hooks, ahead, q + h * v, v + h * a1, command)
+            a2, r2 = _rates(joint, hooks, ahead, (q + h * v, v + h * a1), command, other)
             q, v = q + h * v + 0.5 * h * h * a1, v + 0.5 * h * (a1 + a2)
             states = [z + 0.5 * h * (r + s) for z, r, s in zip(states, r1, r2, strict=True)]
         if not abs(v) < _FASTEST:
@@ -166,17 +170,15 @@ def _hooked(stretch: Stretch, joint: OneJoint, fit: LawFit) -> Simulated:
     return Simulated(out[:, 0], out[:, 1])
 
 
-def _rates(joint: OneJoint, hooks: list[Hooks], states: list[Array], q: float, v: float,
-           command: Array) -> tuple[float, list[Array]]:
-    """Acceleration, and the rates of the effects' states."""
-    motion = Motion(np.zeros(1), np.array([[q]]), np.array([[v]]), np.zeros((1, 1)))
-    load, applied = joint.torque(motion), command
+def _rates(joint: OneJoint, hooks: list[Hooks], states: list[Array], at: tuple[float, float], command: Array,
+           given: float) -> tuple[float, list[Array]]:
+    """Acceleration, and the rates of the effects' states, under `command` and a load that is `given`."""
+    motion = Motion(np.zeros(1), np.array([[at[0]]]), np.array([[at[1]]]), np.zeros((1, 1)))
+    load, applied = np.full((1, 1), given), command
     for hook, z in zip(hooks, states, strict=True):
         if hook.load is not None:
             load = load + hook.load(motion, z)
-    # friction that grows with load takes its part of what is left after the rest
-    for hook, z in zip(hooks, states, strict=True):
-        if hook.actuator is not None:
+        if hook.actuator is not None:  # friction that grows with load: what it leaves of the command
             applied = hook.actuator(applied, motion, z)
     rates = [hook.rate(motion, command, z) if hook.rate is not None else np.zeros_like(z)
              for hook, z in zip(hooks, states, strict=True)]
