@@ -29,7 +29,7 @@ Average = Annotated[bool | None, typer.Option("--average/--no-average",
                                               help="Mean of the periods of a periodic log, where they are alike. [average]")]
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
-STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps", "simulate")
+STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps", "simulate", "design-excitation")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
                   pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -175,6 +175,45 @@ def simulate(
     _go(STAGE, tuple(like or ()), common, {
         "model": model, "fault": tuple(fault or ()) or None, "replicas": replicas, "seed": seed,
         "noise": numbers(noise, "--noise"), "windowed": windowed, "window": window, "steps": steps})
+
+
+@app.command("design-excitation", cls=StageCommand)
+@with_common
+def design_excitation(
+    common: Common,
+    name: Annotated[str | None, typer.Argument(metavar="ROBOT", show_default=False,
+                                               help="A description, a URDF or a shipped name. [robot.toml here, else rrr]")] = None,
+    purpose: Annotated[str | None, typer.Option("--for", help="excitation, friction, frf or hold. [excitation]")] = None,
+    criterion: Annotated[str | None, typer.Option(help="default (A with condition 3), condition, frobenius, E, D or A.")] = None,
+    cond_max: Annotated[float | None, typer.Option(help="Ceiling on the condition number. [default: 3]")] = None,
+    harmonics: Annotated[list[str] | None, typer.Option(help="Harmonics: one number, or one a joint.")] = None,
+    frequency: Annotated[list[str] | None, typer.Option(help="Fundamental [Hz]: one, or one a joint. [0.1]")] = None,
+    keep_out: Annotated[list[str] | None, typer.Option(help="Bands without harmonics [Hz]: 4,6 or 4,6,11,13.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Time to search, in seconds of computing. [30]")] = None,
+    evaluations: Annotated[int | None, typer.Option(help="Search so many evaluations instead: repeatable exactly.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the search. [1]")] = None,
+    symmetric: Annotated[bool | None, typer.Option("--symmetric", help="Mirror-symmetric links: p4 = p15 = 0.")] = None,
+    model: Annotated[str | None, typer.Option(help="Model that predicts torque. [the described links]")] = None,
+    after: Annotated[list[Path] | None, typer.Option(readable=False, help="Earlier logs, or a result of frf. Repeatable.")] = None,
+    home: Annotated[list[str] | None, typer.Option(help="Posture to start from [rad], one a joint: 0,-1.57,0.")] = None,
+    no_rest: Annotated[bool, typer.Option("--no-rest", help="In motion at both ends, with run-in and run-out.")] = False,
+    periods: Annotated[int | None, typer.Option(help="How often the period is repeated. [1]")] = None,
+    friction: Annotated[bool | None, typer.Option("--friction/--no-friction", help="Count columns of friction as well.")] = None,
+    tip_speed: Annotated[float | None, typer.Option(help="Limit on the speed of the tip [m/s].")] = None,
+    tip_box: Annotated[list[str] | None, typer.Option(help="Box for the tip [m]: x from,to, y from,to, z from,to.")] = None,
+    recipe: Annotated[str | None, typer.Option(help="Recipe of import: controller.csv in its order, units and rate.")] = None,
+) -> None:
+    """Design the excitation, or another experiment, that tells most within the robot's limits."""
+    from pipelines.design_excitation import STAGE
+    from rrrid_cli.options import whole_numbers
+
+    _go(STAGE, tuple(after or ()), common, {
+        "robot": name, "purpose": purpose, "criterion": criterion, "cond_max": cond_max,
+        "harmonics": whole_numbers(harmonics, "--harmonics"), "frequency": numbers(frequency, "--frequency"),
+        "keep_out": numbers(keep_out, "--keep-out"), "seconds": seconds, "evaluations": evaluations, "seed": seed,
+        "symmetric": symmetric, "model": model, "home": numbers(home, "--home"), "rest": False if no_rest else None,
+        "periods": periods, "friction": friction, "tip_speed": tip_speed, "tip_box": numbers(tip_box, "--tip-box"),
+        "recipe": recipe})
 
 
 @app.command()

@@ -14,7 +14,7 @@ import typer
 from pipelines.errors import UsageError
 from rrrid_cli.conversion import plainly
 
-__all__ = ["Common", "LogPaths", "StageCommand", "StageGroup", "numbers", "with_common"]
+__all__ = ["Common", "LogPaths", "StageCommand", "StageGroup", "numbers", "whole_numbers", "with_common"]
 
 LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
                                                   readable=False)]  # rrrid says it better: exit 6, RRID-F13
@@ -58,6 +58,15 @@ def numbers(texts: list[str] | None, where: str) -> tuple[float, ...] | None:
     except ValueError:
         raise UsageError("C02", f"'{','.join(texts)}' is no list of numbers", where=where,
                          remedy="write for example 50,60,70") from None
+
+
+def whole_numbers(texts: list[str] | None, where: str) -> tuple[int, ...] | None:
+    """The same for whole numbers."""
+    found = numbers(texts, where)
+    if found is not None and any(value != int(value) for value in found):
+        raise UsageError("C02", f"'{','.join(texts or ())}' is no list of whole numbers", where=where,
+                         remedy="write for example 20,20,10")
+    return None if found is None else tuple(map(int, found))
 
 
 def _flag(words: str, *names: str) -> Any:

@@ -12,6 +12,7 @@ __all__ = ["CODES", "title_of"]
 CODES: Final[dict[str, str]] = {
     "C01": "unknown name in a configuration or recipe", "C02": "value out of bounds", "C03": "not a TOML file",
     "C04": "no such file or shipped name", "C05": "output folder is not free", "C06": "nothing matched", "C07": "not a path",
+    "C08": "limits that no motion keeps",
     "D01": "isolated missing samples", "D02": "missing channel or block", "D03": "infinite, huge or filler values",
     "D04": "constant channel", "D05": "torque saturation", "D06": "glitches", "D07": "encoder wrap or counter rollover",
     "D08": "encoder resolution", "D09": "insufficient excitation", "D10": "speed never changes sign",

@@ -85,7 +85,7 @@ def _prose(text: object) -> str:
 
 def _section_words(section: Section) -> dict[str, object]:
     return {"title": printable(section.title), "text": [_prose(words) for words in section.text],
-            "tables": [_table_words(table) for table in section.tables]}
+            "warning": _prose(section.warning), "tables": [_table_words(table) for table in section.tables]}
 
 
 def _table_words(table: Table) -> dict[str, object]:

@@ -39,12 +39,13 @@ class Figure:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with paragraphs, then tables, then figures."""
+    """A heading with a warning in bold where there is one, paragraphs, then tables, then figures."""
 
     title: str
     text: tuple[str, ...] = ()
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = ()
+    warning: str = ""
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,14 @@ class SpentError(Exception):
 class Budget:
     """Count evaluations; end the search at a number of them, or after seconds of computing."""
 
-    def __init__(self, seconds: float | None, evaluations: int | None, tell: Callable[[int], None] = lambda done: None) -> None:
-        """One of both may be None; `tell` is called about every second with the evaluations so far."""
-        self.seconds, self.limit = seconds, evaluations
+    def __init__(self, seconds: float | None, evaluations: int | None, tell: Callable[[int], None] = lambda done: None,
+                 reserve: float = 0.0) -> None:
+        """One of both may be None; `tell` is called about every second with the evaluations so far.
+
+        Args:
+            reserve: of the seconds, what so many evaluations take is left for what comes after the search.
+        """
+        self.seconds, self.limit, self.reserve = seconds, evaluations, reserve
         self.done = 0
         self._tell, self._start, self._told = tell, time.process_time(), 0.0
 
@@ -35,8 +40,11 @@ class Budget:
             SpentError: nothing is left.
         """
         elapsed = self.elapsed
-        if (self.limit is not None and self.done >= self.limit) or (
-                self.limit is None and self.seconds is not None and elapsed >= self.seconds):
+        if self.limit is not None:
+            spent = self.done >= self.limit
+        else:
+            spent = self.seconds is not None and elapsed + self.reserve * elapsed / max(self.done, 1) >= self.seconds
+        if spent and (self.limit is not None or self.done > self.reserve):
             raise SpentError
         self.done += 1
         if elapsed - self._told >= _TELL_EVERY:

@@ -18,9 +18,9 @@ from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.rigid.rrr import RRR
 
-__all__ = ["ArmColumns", "arm_columns"]
+__all__ = ["SHARPNESS", "ArmColumns", "arm_columns"]
 
-_SHARPNESS = 20.0  # w [s/rad] of Coulomb friction: its change of sign then takes several samples of the design
+SHARPNESS = 20.0  # w [s/rad] of Coulomb friction: its change of sign then takes several samples of the design
 
 
 class Rows(Protocol):
@@ -49,7 +49,7 @@ class ArmColumns:
         rigid = self.rigid.rows(motion)
         if not self.friction:
             return rigid
-        return tuple(np.concatenate([own, np.stack([np.tanh(_SHARPNESS * v), v, np.ones_like(v)])])
+        return tuple(np.concatenate([own, np.stack([np.tanh(SHARPNESS * v), v, np.ones_like(v)])])
                      for own, v in zip(rigid, motion[1], strict=True))
 
     def adjoint(self, motion: Array, bars: tuple[Array, ...]) -> Array:
@@ -58,8 +58,8 @@ class ArmColumns:
             return self.rigid.adjoint(motion, bars)
         out = self.rigid.adjoint(motion, tuple(bar[:-3] for bar in bars))
         for j, bar in enumerate(bars):
-            level = np.tanh(_SHARPNESS * motion[1, j])
-            out[1, j] += bar[-3] * _SHARPNESS * (1.0 - level * level) + bar[-2]
+            level = np.tanh(SHARPNESS * motion[1, j])
+            out[1, j] += bar[-3] * SHARPNESS * (1.0 - level * level) + bar[-2]
         return out
 
 

@@ -15,18 +15,18 @@ import numpy as np
 
 from pipelines.fit.design.barrier import barrier, cost_of_bounds
 from pipelines.fit.design.goal import Goal
-from pipelines.model.excitation.columns import ArmColumns
+from pipelines.model.excitation.columns import SHARPNESS, ArmColumns
 from pipelines.model.excitation.limits import Limit, Limits, middle_and_half
 from pipelines.model.excitation.space import MotionSpace
 from pipelines.model.excitation.tip import TipMotion, tip_motion
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.geometry import SerialChain
 
-__all__ = ["ArmProblem", "DesignProblem", "grams_of"]
+__all__ = ["ROOMY", "ArmProblem", "DesignProblem", "grams_of"]
 
-_ROOMY = 0.7  # of the limits: where a start begins
-_INSIDE = 0.97  # each step of drawing a motion back into its limits
-_STEPS = 200
+ROOMY = 0.7  # of the limits: where a start begins
+_INSIDE = 0.999  # of the limits: a motion that is drawn back keeps them
+_STEPS = 12  # of bisection
 
 
 def grams_of(columns: tuple[np.ndarray, ...], rows: tuple[Array, ...], count: int) -> Array:
@@ -46,6 +46,7 @@ class ArmProblem:
     limits: Limits
     beta: Array | None  # (all columns,) what is believed of the parameters: predicts torque
     goal: Goal
+    drag: Array | None = None  # (joints, 2) Coulomb [N m] and viscous friction [N m s/rad] that no column stands for
 
     @cached_property
     def listed(self) -> tuple[Limit, ...]:
@@ -67,17 +68,18 @@ class ArmProblem:
     def tip_limited(self) -> bool:
         return self.limits.tip_speed is not None or self.limits.tip_box is not None
 
-    def torque(self, rows: tuple[Array, ...]) -> Array:
+    def torque(self, rows: tuple[Array, ...], dq: Array) -> Array:
         """τ (joints, samples) of what is believed."""
         beta = self.beta if self.beta is not None else np.zeros(len(self.columns.names))
-        return np.stack([beta[own] @ row for own, row in zip(self.columns.columns, rows, strict=True)])
+        tau = np.stack([beta[own] @ row for own, row in zip(self.columns.columns, rows, strict=True)])
+        return tau if self.drag is None else tau + self.drag[:, :1] * np.tanh(SHARPNESS * dq) + self.drag[:, 1:] * dq
 
     def signals(self, motion: Array, rows: tuple[Array, ...]) -> tuple[Array, TipMotion | None]:
         """What the limits are about, (limits, samples), in their order; of the tip's speed its square."""
         position, speed, acceleration, torque = self.watched
         parts = [motion[0, position], motion[1, speed], motion[2, acceleration]]
         if len(torque):
-            parts.append(self.torque(rows)[torque])
+            parts.append(self.torque(rows, motion[1])[torque])
         tip = tip_motion(self.chain, motion[0], motion[1]) if self.tip_limited else None
         if tip is not None and self.limits.tip_speed is not None:
             parts.append((tip.velocity**2).sum(axis=0)[None])
@@ -92,6 +94,9 @@ class ArmProblem:
         for target, own in zip((out[0], out[1], out[2], on_torque), self.watched, strict=True):
             target[own] += bars[first:first + len(own)]
             first += len(own)
+        if self.drag is not None:
+            level = np.tanh(SHARPNESS * motion[1])
+            out[1] += on_torque * (self.drag[:, :1] * SHARPNESS * (1.0 - level * level) + self.drag[:, 1:])
         if tip is not None:
             on_speed = np.zeros_like(tip.velocity)
             if self.limits.tip_speed is not None:
@@ -158,29 +163,30 @@ class DesignProblem:
         found = cost_of_bounds(signals, *self.arm.bounds)
         return np.asarray(found / max(float(found.sum()), 1e-300))
 
-    def start(self, rng: np.random.Generator) -> Array:
-        """A random motion within the limits, as large as it may be about where it begins."""
-        x = self.space.random(rng, *self.around)
-        return self.drawn_in(self._grown(x), _ROOMY)
-
-    def _grown(self, x: Array) -> Array:
-        """As large as the limits that grow with it allow, if a random motion falls short of them."""
-        for _ in range(_STEPS):
-            if float(self.nearness(x).max(initial=0.0)) > _ROOMY:
-                break
-            x = self.space.shrunk(x, 1.3)
-        return x
+    def start(self, rng: np.random.Generator, reach: float = ROOMY) -> Array:
+        """A random motion as large as leaves each limit approached to less than `reach`."""
+        return self.sized(self.space.random(rng, *self.around), reach, 64.0)
 
     def disturbed(self, x: Array, size: float, rng: np.random.Generator) -> Array:
         """x with noise of `size` times what its coefficients are worth, within the limits."""
         if size > 0.0:
             x = self.space.project(x + rng.normal(size=x.shape) * (3.0 * size * float(np.abs(x).mean())))
-        return self.drawn_in(x, 1.0)
+        return self.sized(x, _INSIDE, 1.0)
 
-    def drawn_in(self, x: Array, reach: float) -> Array:
-        """x made smaller until its nearest limit is approached to less than `reach`; at a standstill where nothing helps."""
+    def sized(self, x: Array, reach: float, largest: float) -> Array:
+        """x made smaller, or up to `largest` times as large, as long as its limits are approached to less than `reach`.
+
+        Where not even a standstill keeps them, the standstill.
+        """
+        good, bad = 0.0, largest
+        factor = 1.0
         for _ in range(_STEPS):
-            if float(self.nearness(x).max(initial=0.0)) < reach:
-                return x
-            x = self.space.shrunk(x, _INSIDE)
-        return self.space.shrunk(x, 0.0)
+            if float(self.nearness(self.space.shrunk(x, factor)).max(initial=0.0)) < reach:
+                good = factor
+                if factor >= largest:
+                    break
+                factor = min(2.0 * factor, largest) if bad >= largest else 0.5 * (good + bad)
+            else:
+                bad = min(bad, factor)
+                factor = 0.5 * (good + bad)
+        return self.space.shrunk(x, good)

@@ -1,0 +1,298 @@
+"""Design the experiment that tells most about the arm, within its limits.
+
+Reads    a robot description; optionally a model, earlier logs, results of frf, a recipe
+Writes   trajectory.h5 (a planned log), controller.csv, coefficients.json, result.json, result.h5, report.html
+Source   Kostić et al. 2004, Section IV.C.3, eq. (22), Figs. 8 and 9; Swevers et al. 1997
+
+`purpose` plans the other experiments of the workflow instead: logs/<name>.h5, one an experiment.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import Check, NothingMatched, RrridError, UsageError
+from pipelines.log.atomic import write_file
+from pipelines.log.experiment import ExperimentLog, Signal
+from pipelines.log.files import write_log
+from pipelines.log.model_file import read_model
+from pipelines.log.recording.controller_side import controller_table, write_controller_table
+from pipelines.log.recording.recipe import Recipe
+from pipelines.log.results import json_text
+from pipelines.log.robot import RobotDescription
+from pipelines.log.robot_files import load_robot, robot_sources
+from pipelines.log.text import read_small_text
+from pipelines.model.arm import Arm
+from pipelines.model.excitation.columns import arm_columns
+from pipelines.model.excitation.design import Design, Effort, design
+from pipelines.model.excitation.earlier import USED, first_mode, information_of
+from pipelines.model.excitation.others import Plan, frf_plans, friction_plans, hold_plans
+from pipelines.model.excitation.outcome import excitation
+from pipelines.model.excitation.rehearse import rehearse
+from pipelines.model.excitation.result import CostOfLimit, Result
+from pipelines.model.excitation.task import Task, Wishes, plan_task
+from pipelines.model.excitation.trajectory import Trajectory
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.choose import rigid_body
+from pipelines.model.writing.planned import planned_log
+from pipelines.report.excitation_report import excitation_report
+from pipelines.report.report import Report
+from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+
+__all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
+
+PURPOSES = ("excitation", "friction", "frf", "hold")
+_REHEARSED = 10.0  # [s]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to design for which robot, and how long to search."""
+
+    robot: str | None = None  # a description, a URDF or a shipped name; None: robot.toml here, else the shipped rrr
+    purpose: str = "excitation"
+    criterion: str = "default"  # A-optimal with a condition number of 3 at most; or condition, frobenius, E, D, A
+    cond_max: float | None = None
+    harmonics: tuple[int, ...] | None = None  # one, or one a joint
+    frequency: tuple[float, ...] = (0.1,)  # [Hz] fundamental: one, or one a joint
+    keep_out: tuple[float, ...] = ()  # [Hz] bands without harmonics: from, to, from, to, …
+    seconds: float = 30.0  # of computing
+    evaluations: int | None = None  # instead of seconds: the same number and seed give the same design again
+    seed: int = 1
+    symmetric: bool = False  # p4 = p15 = 0
+    model: str | None = None  # predicts torque and friction
+    home: tuple[float, ...] | None = None  # [rad]
+    rest: bool = True
+    periods: int = 1
+    sample_time: float = 1e-3  # [s]
+    friction: bool | None = None  # count columns of friction; None: on every arm but the paper's, which has tests of its own
+    noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
+    torque_share: float = 0.9  # of the torque limit that the plan may use
+    tip_speed: float | None = None  # [m/s]
+    tip_box: tuple[float, ...] | None = None  # [m]
+    recipe: str | None = None  # whose inverse writes controller.csv
+    mode_factor: float = 3.0  # the top harmonic stays so many times below the first mode that --after knows
+    rehearse: bool = True
+
+    @property
+    def wishes(self) -> Wishes:
+        bands = tuple(zip(self.keep_out[::2], self.keep_out[1::2], strict=False))
+        return Wishes(self.criterion, self.cond_max, self.harmonics, self.frequency, bands, None, self.rest, self.home,
+                      self.symmetric, self.friction, self.noise, self.torque_share, self.tip_speed, self.tip_box,
+                      self.sample_time, self.periods)
+
+
+@dataclass(frozen=True)
+class Material:
+    """What was read."""
+
+    robot: RobotDescription
+    arm: Arm | None
+    recipe: Recipe | None
+    modes: tuple[Mapping[str, Any], ...]  # results of frf
+    tell: Any = field(compare=False)
+
+
+def read(request: Request, settings: Settings) -> Inputs:
+    """The robot, its model, the recipe, and the earlier logs and results among the request's paths.
+
+    Raises:
+        UsageError: C04, no such file; C02, a model of another robot.
+    """
+    named = settings.robot or request.robot or ("robot.toml" if Path("robot.toml").is_file() else "rrr")
+    robot = load_robot(named)
+    sources = [path for path in robot_sources(named) if path.is_file()]
+    arm = _arm(settings.model, robot)
+    recipe = None
+    if settings.recipe is not None:
+        from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
+
+        path = find_recipe(settings.recipe)
+        recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)
+        sources.append(path)
+    modes = tuple(found for path in request.paths if (found := _frf_result(path)) is not None)
+    logs = _earlier(request, settings, robot)
+    if settings.model is not None and Path(settings.model).is_file():
+        sources.append(Path(settings.model).absolute())
+    sources = [*logs.sources, *(path.absolute() for path in sources)]
+    return Inputs(logs.logs, logs.rejected, logs.checks, tuple(sources), logs.hashes, robot=robot,
+                  material=Material(robot, arm, recipe, modes, request.tell), label=settings.purpose, robot_name=robot.name)
+
+
+def _arm(model: str | None, robot: RobotDescription) -> Arm | None:
+    """The model given, else the one of the described links, else none."""
+    if model is not None:
+        arm = Arm.from_model(read_model(model), model)
+        if arm.n_joints != robot.n_joints:
+            raise UsageError("C02", f"the model has {arm.n_joints} joints, the robot {robot.n_joints}", where="--model",
+                             remedy="give a model of this robot")
+        return arm
+    return Arm.from_links(robot) if all(joint.link is not None for joint in robot.joints) else None
+
+
+def _frf_result(path: Path) -> Mapping[str, Any] | None:
+    """result.json of `frf`, named itself or in the folder named."""
+    file = path / "result.json" if path.is_dir() else path
+    if file.name != "result.json" or not file.is_file():
+        return None
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) and found.get("command") == "frf" else None
+
+
+def _earlier(request: Request, settings: Settings, robot: RobotDescription) -> Inputs:
+    """The logs among the paths; a folder that holds none may hold a result of frf."""
+    paths = tuple(path for path in request.paths if path.name != "result.json")
+    if not paths:
+        return Inputs()
+    try:
+        found = read_logs(replace(request, paths=paths, robot=None), settings)
+    except NothingMatched:
+        if any(_frf_result(path) is not None for path in paths):
+            return Inputs()
+        raise
+    for opened in found.logs:
+        if opened.log.n_joints != robot.n_joints:
+            raise UsageError("C02", f"{opened.path.name} has {opened.log.n_joints} joints, the robot {robot.n_joints}",
+                             where="--after", remedy="name logs of this robot")
+    return found
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Decide what was left open, search, judge, rehearse.
+
+    Raises:
+        UsageError: C02, settings that do not fit; C08, limits that no motion keeps: says which.
+    """
+    given: Material = inputs.material
+    if settings.purpose not in PURPOSES:
+        raise UsageError("C02", f"'{settings.purpose}' is no experiment to design", where="--for",
+                         remedy=f"one of: {', '.join(PURPOSES)}; the writing task comes with its own command")
+    if len(settings.keep_out) % 2:
+        raise UsageError("C02", "bands to stay out of are pairs of frequencies", where="--keep-out", remedy="write 5,8 [Hz]")
+    mode = first_mode(given.modes)
+    wishes = replace(settings.wishes, top_hz=None if mode is None else mode / settings.mode_factor)
+    logs = [o.log for o in inputs.logs if o.log.origin != "planned" and o.log.experiment in USED and o.log.role == "identify"]
+    told = None
+    if logs and settings.purpose == "excitation":
+        friction = plan_task(given.robot, given.arm, wishes).problem.columns.friction
+        told = information_of(logs, arm_columns(rigid_body(given.robot), friction=friction))
+    task = plan_task(given.robot, given.arm, wishes, told)
+    if settings.purpose != "excitation":
+        return _plans(task, settings, given)
+    found = design(task, Effort(settings.seconds, settings.evaluations, given.tell), settings.seed)
+    return _result(task, found, settings, given, tuple(log.name for log in logs), mode)
+
+
+def _result(task: Task, found: Design, settings: Settings, given: Material, after: tuple[str, ...], mode: float | None) -> Result:
+    given.tell("judging the design")
+    judged = excitation(task, found, settings.seed)
+    trajectory, rehearsal, failed = found.trajectory, None, ""
+    t, motion = trajectory.sampled(settings.sample_time)
+    if task.arm is not None and settings.rehearse:
+        given.tell("rehearsing in simulation")
+        try:
+            rehearsal = rehearse(task.arm, settings.sample_time, motion, task.problem.goal.noise, settings.seed, _REHEARSED)
+        except RrridError as problem:  # a model whose simulation runs away is worth saying, and no reason to lose the design
+            failed = problem.message
+    log = planned_log(f"{task.robot.name} {settings.criterion} excitation", task.robot, _joint_motion(t, motion), "excitation",
+                      "identify")
+    log = replace(log, period=trajectory.series.period if task.rest else None)
+    goal = task.problem.goal
+    return Result(
+        robot=task.robot.name, joints=tuple(j.name for j in task.robot.joints), purpose="excitation",
+        criterion=settings.criterion, ceiling=goal.ceiling, condition_number=judged.condition_number,
+        lower_bound=judged.lower_bound, predicted_relative_std=judged.predicted_relative_std, frobenius=judged.frobenius,
+        smallest_singular_value=judged.smallest_singular_value, log_determinant=judged.log_determinant,
+        limits=tuple(CostOfLimit(p.joint, p.quantity, p.peak, p.limit, p.unit, p.share, p.cost) for p in found.peaks),
+        evaluations=found.evaluations, found_at=found.found_at, seed=settings.seed, interrupted=found.interrupted,
+        reached=found.reached, shrunk=found.shrunk, singular_values=judged.singular_values, parameters=judged.parameters,
+        random=judged.random, course=judged.course, period=trajectory.series.period, periods=trajectory.periods,
+        run_in=trajectory.run_in, duration=trajectory.duration, sample_time=settings.sample_time,
+        home=None if task.home is None else tuple(map(float, task.home)), noise=tuple(map(float, goal.noise)),
+        friction_columns=task.problem.columns.friction, torque_checked=task.arm is not None, torque_share=settings.torque_share,
+        after=after, first_mode=mode, rehearsal=rehearsal, rehearsal_failed=failed, plans=(),
+        logs=(("trajectory", log),), table=controller_table(given.recipe, task.robot, lambda at: trajectory.at(at)[0].T,
+                                                            trajectory.duration, settings.sample_time),
+        coefficients=_coefficients(task, trajectory))
+
+
+def _joint_motion(t: Array, motion: Array) -> Motion:
+    q, dq, ddq = (np.ascontiguousarray(part.T) for part in motion)
+    return Motion(t, q, dq, ddq)
+
+
+def _coefficients(task: Task, trajectory: Trajectory) -> dict[str, object]:
+    """Eq. (22), joint by joint, at the harmonics each one has."""
+    series, used = trajectory.series, task.harmonics.used
+    joints = []
+    for j, joint in enumerate(task.robot.joints):
+        own = np.flatnonzero(used[j])
+        joints.append({"joint": j + 1, "name": joint.name, "q0": float(series.offset[j]), "harmonics": (own + 1).tolist(),
+                       "a": series.cosine[j, own].tolist(), "b": series.sine[j, own].tolist()})
+    return {"formula": "q = q0 + sum_j (a_j sin(w_j t) - b_j cos(w_j t))/w_j, w_j = 2 pi j / period", "period": series.period,
+            "units": {"period": "s", "q0": "rad", "a": "rad/s", "b": "rad/s"}, "run_in": trajectory.run_in,
+            "periods": trajectory.periods, "joints": joints}
+
+
+def _plans(task: Task, settings: Settings, given: Material) -> Result:
+    """The other experiments of the workflow."""
+    plans = {"friction": lambda: friction_plans(task), "frf": lambda: frf_plans(task, settings.seed),
+             "hold": lambda: hold_plans(task, settings.seed)}[settings.purpose]()
+    return Result.of_plans(task, settings.purpose, settings.seed, settings.sample_time, plans,
+                           tuple((plan.name, _log_of(plan, task)) for plan in plans))
+
+
+def _log_of(plan: Plan, task: Task) -> ExperimentLog:
+    log = planned_log(f"{task.robot.name} {plan.name}", task.robot, _joint_motion(plan.t, plan.motion), plan.experiment, "identify")
+    signals = dict(log.signals)
+    if plan.v is not None:
+        signals["v"] = Signal(plan.v, "rad/s^2", "injected excitation")
+    return replace(log, signals=signals, joint=plan.joint, posture=plan.posture, period=plan.period)
+
+
+def write(result: Result, folder: Path, request: Request) -> None:
+    """trajectory.h5, controller.csv and coefficients.json; of other purposes logs/ alone."""
+    for name, log in result.logs:
+        path = f"{name}.{request.format}" if result.purpose == "excitation" else f"logs/{slug(name)}.{request.format}"
+        write_log(folder / path, log)
+    if result.table is not None:
+        write_controller_table(folder / "controller.csv", result.table)
+    if result.coefficients is not None:
+        text = json_text(result.coefficients)
+        write_file(folder / "coefficients.json", lambda draft: _text(draft, text))
+
+
+def _text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def _checks(result: Result) -> tuple[Check, ...]:
+    found = []
+    if not result.reached:
+        dear = result.dearest
+        found.append(Check.of("C08", "warn", f"a condition number of {result.ceiling:g} was not reached"
+                              f"{f'; the {dear} is most in the way' if dear else ''}", where=result.robot, gate=True,
+                              remedy="search longer, give more harmonics, or widen that limit"))
+    if result.rehearsal_failed:
+        found.append(Check.of("D17", "warn", f"the rehearsal failed: {result.rehearsal_failed}", where=result.robot,
+                              remedy="check the model before the robot moves"))
+    return tuple(found)
+
+
+def report(result: Result) -> Report:
+    """The motion, how near it comes to its limits, and what it will tell."""
+    return excitation_report(result)
+
+
+STAGE = Stage("design-excitation", "Design the excitation", Settings, compute, report, read, write,
+              lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks)
+

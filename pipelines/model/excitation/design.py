@@ -1,0 +1,150 @@
+"""Search the best experiment, finish it, and make sure that it keeps every limit.
+
+    found = design(task, Effort(seconds=30), seed=1)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pipelines.errors import Interrupted, UsageError
+from pipelines.fit.design.budget import Budget
+from pipelines.fit.design.search import Best, Round, polish, search
+from pipelines.model.excitation.problem import DesignProblem
+from pipelines.model.excitation.run_in import with_run_in
+from pipelines.model.excitation.space import MotionSpace
+from pipelines.model.excitation.task import Task
+from pipelines.model.excitation.trajectory import Trajectory
+from pipelines.model.excitation.verify import GRID, Peak, peaks, worst
+from pipelines.model.rigid.body import Array
+from pipelines.signal.fourier import good_size
+
+__all__ = ["Design", "Effort", "design", "landscape"]
+
+_COARSE, _FINE, _FINISH = 8, 10, 20  # samples of a period for each harmonic
+_FEWEST = 200  # samples of a period: fewer do not show what friction does
+_FIFTH = 5  # of the harmonics in the coarse problem
+_FINISHING = (Round(600, 1e-4, 30), Round(2000, 2e-5, 50), Round(4000, 5e-6, 60))
+_FINISH_EVALUATIONS = 200
+_SHRINKINGS = 60
+_FAR = 100.0  # a score beyond: the design is not what was asked for
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to search: evaluations where given, else seconds of computing."""
+
+    seconds: float = 30.0
+    evaluations: int | None = None
+    tell: Callable[[str], None] = field(default=lambda words: None, compare=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A motion that keeps its limits, and how it was found."""
+
+    trajectory: Trajectory
+    evaluations: int  # of the search: as many give the same design again
+    found_at: int  # evaluation of the best one
+    interrupted: bool
+    peaks: tuple[Peak, ...]
+    shrunk: float  # what the motion was multiplied by so that its limits hold between samples
+    cost: tuple[float, ...]  # of each limit, a share of what all cost
+    reached: bool  # what was asked for: a ceiling on the condition number
+
+
+def landscape(task: Task, share: int = 1, density: int = _FINE) -> DesignProblem:
+    """The design problem on a `share`-th of the harmonics, with `density` samples a period for each."""
+    top = task.harmonics.used.shape[1]
+    count = top if share == 1 else max(min(top, 5), top // share)
+    used = task.harmonics.used[:, :count]
+    harmonics = task.harmonics.up_to(count) if used.any(axis=1).all() and used.sum(axis=1).min() > 1 else task.harmonics
+    space = MotionSpace(harmonics, task.speed, rest=task.rest, home=task.home)
+    samples = good_size(max(density * harmonics.used.shape[1], _FEWEST * density // _FINE if top < 40 else 1))
+    return DesignProblem(task.problem, space, samples, task.around)
+
+
+def design(task: Task, effort: Effort, seed: int = 0) -> Design:
+    """Search, finish, verify.
+
+    Raises:
+        UsageError: C08, no motion keeps the limits: says which one is in the way.
+    """
+    fine, coarse, finish = landscape(task), landscape(task, _FIFTH, _COARSE), landscape(task, 1, _FINISH)
+    _refuse_impossible(fine, np.random.default_rng(seed))
+    best = Best()
+    budget = Budget(effort.seconds, effort.evaluations, lambda done: effort.tell(_progress(task, done, best)),
+                    reserve=2.0 * _FINISH_EVALUATIONS)
+    interrupted = False
+    try:
+        search(coarse, fine, lambda x: fine.space.point(coarse.space.series(x)), budget, np.random.default_rng(seed), best)
+    except Interrupted:  # whoever stops the search wants what it has found by then
+        if best.x is None:
+            raise
+        interrupted = True
+    x = best.x if best.x is not None else fine.start(np.random.default_rng(seed))
+    ended = Best()
+    polish(finish, x, _FINISHING, Budget(None, _FINISH_EVALUATIONS), ended)
+    x = x if ended.x is None else ended.x
+    x, factor = _within(task, finish, x)
+    trajectory = Trajectory(finish.space.series(x), task.periods)
+    if not task.rest:
+        trajectory = with_run_in(task, trajectory)
+    found = _peaks(task, trajectory)
+    cost = tuple(float(c) for c in finish.cost(finish.sized(x, 0.9999, 1.0)))
+    return Design(trajectory, budget.done, best.evaluation, interrupted,
+                  tuple(replace(peak, cost=share) for peak, share in zip(found, cost, strict=True)), factor, cost,
+                  best.score < _FAR)
+
+
+def _progress(task: Task, done: int, best: Best) -> str:
+    if not np.isfinite(best.score):
+        return f"evaluation {done}: first starts"
+    if best.score > _FAR:
+        return f"evaluation {done}: condition number {np.exp(best.score - 1e3):.3f} so far"
+    figure = {"condition": f"condition number {best.score:.4f}"}.get(
+        task.problem.goal.criterion, f"{task.problem.goal.criterion} criterion {best.score:.4f}")
+    return f"evaluation {done}: best {figure}, found at {best.evaluation}"
+
+
+def _refuse_impossible(fine: DesignProblem, rng: np.random.Generator) -> None:
+    """C08 where a limit is broken at a standstill already, wherever the arm may stand."""
+    least, where = np.inf, 0
+    for _ in range(50):
+        near = fine.nearness(fine.space.shrunk(fine.space.random(rng, *fine.around), 0.0))
+        if not near.size or near.max() < 1.0:
+            return
+        if near.max() < least:
+            least, where = float(near.max()), int(near.argmax())
+    limit = fine.arm.listed[where]
+    place = f"the {limit.quantity} limit of joint {limit.joint}" if limit.joint else f"the limit of {limit.quantity}"
+    raise UsageError("C08", f"no motion keeps {place}, {limit.low:.4g} to {limit.high:.4g} {limit.unit}: at a standstill it is "
+                     f"exceeded already", where="limits", remedy="start elsewhere (--home), or correct that limit")
+
+
+def _within(task: Task, finish: DesignProblem, x: Array) -> tuple[Array, float]:
+    """x made smaller until its limits hold between samples too, on the grid of `GRID`."""
+    whole = 1.0
+    for _ in range(_SHRINKINGS):
+        nearest = worst(_peaks(task, Trajectory(finish.space.series(x), 1)))
+        if nearest is None or nearest.share <= 1.0:
+            return x, whole
+        factor = min(1.0 / nearest.share, 0.9999)
+        x, whole = finish.space.shrunk(x, factor), whole * factor
+    return finish.space.shrunk(x, 0.0), 0.0
+
+
+def _peaks(task: Task, trajectory: Trajectory) -> tuple[Peak, ...]:
+    """Of one period, and of the run-in and run-out where there are any."""
+    series = trajectory.series
+    found = peaks(task.problem.limits, task.problem.chain, series.samples(good_size(round(series.period / GRID))), task.arm,
+                  periodic=True)
+    if trajectory.run_in == 0.0:
+        return found
+    t = np.arange(round(trajectory.run_in / GRID) + 1, dtype=np.float64) * GRID
+    ends = [peaks(task.problem.limits, task.problem.chain, trajectory.at(at), task.arm, periodic=False)
+            for at in (t, trajectory.duration - t[::-1])]
+    return tuple(max(group, key=lambda peak: peak.share) for group in zip(found, *ends, strict=True))

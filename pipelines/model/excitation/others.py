@@ -1,0 +1,219 @@
+"""Plans of the other experiments of the workflow: friction, frequency responses, static postures.
+
+    friction    one joint at speeds over two decades, both directions, each held as long as its range allows
+    frf         one joint turning slowly there and back, with a random-phase multisine to excite what bends
+    hold        static postures that together tell most about gravity
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.errors import UsageError
+from pipelines.model.excitation.task import Task
+from pipelines.model.excitation.trajectory import quintic
+from pipelines.model.rigid.body import Array
+
+__all__ = ["Plan", "frf_plans", "friction_plans", "hold_plans"]
+
+_LEVELS = 9  # speeds over two decades
+_SHARE = 0.8  # of the speed limit
+_ACCELERATION = 0.4  # of the acceleration that limits allow
+_HELD = (0.15, 3.0)  # [s] a speed is held: shorter says nothing, longer nothing new
+_USED_RANGE = 0.8  # of the position range
+_FREE = 4.0 * np.pi  # [rad] range of a joint that turns freely
+_PEAK = 1.5  # of 3 s² - 2 s³, times its mean slope
+_SLOW = 0.05  # of the speed limit: the turn of an frf experiment
+_FRF_TORQUE = 0.1  # of the torque limit, rms of the excitation
+_FRF_PERIOD = 5.0  # [s]
+_FRF_BAND = (1.0, 0.4)  # [Hz] lowest line; highest, of the sample rate
+_POSTURES, _CANDIDATES, _DWELL = 8, 400, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """One experiment to record."""
+
+    name: str
+    experiment: str
+    joint: int | None  # 1-based
+    posture: Array | None  # (joints,) [rad]
+    t: Array  # [s]
+    motion: Array  # (3, joints, samples)
+    v: Array | None = None  # (samples, joints) [rad/s^2] injected excitation
+    period: float | None = None  # [s]
+    words: str = ""
+
+
+def friction_plans(task: Task) -> tuple[Plan, ...]:
+    """One experiment a joint; the others stay at home."""
+    home = _home(task)
+    return tuple(_friction(task, j, home) for j in range(task.robot.n_joints))
+
+
+def _home(task: Task) -> Array:
+    if task.home is None:
+        raise UsageError("C02", "these experiments need a posture where the other joints stay", where="--no-rest",
+                         remedy="leave --no-rest out, or give --home")
+    return task.home
+
+
+def _friction(task: Task, j: int, home: Array) -> Plan:
+    low, high = task.robot.joints[j].position
+    room = _USED_RANGE * (high - low) if np.isfinite(high - low) else _FREE
+    centre = 0.5 * (low + high) if np.isfinite(high - low) else home[j]
+    rate, parts, held = _acceleration(task, j, home), [], []
+    place = float(home[j])
+    for speed in np.geomspace(0.01, 1.0, _LEVELS) * _SHARE * task.speed[j]:
+        ramp = max(_PEAK * speed / rate, 0.05)
+        hold = min(room / speed - ramp, _HELD[1])
+        if hold < _HELD[0]:
+            continue
+        start = float(centre - 0.5 * speed * (hold + ramp))
+        parts += [_move(place, start, rate), *_stroke(start, float(speed), ramp, float(hold))]
+        place = start
+        held.append(float(speed))
+    if not held:
+        raise UsageError("C08", f"joint {j + 1} has too small a range to hold any speed", where="position limits",
+                         remedy="widen them, or record friction by hand")
+    parts.append(_move(place, float(home[j]), rate))
+    motion = _joined(task, parts)
+    whole = np.zeros((3, task.robot.n_joints, motion.shape[1]))
+    whole[0] = home[:, None]
+    whole[:, j] = motion
+    t = np.arange(motion.shape[1], dtype=np.float64) * task.sample_time
+    return Plan(f"friction-{j + 1}", "friction", j + 1, None, t, whole,
+                words=f"{len(held)} speeds from {held[0]:.3g} to {held[-1]:.3g} rad/s, each both ways")
+
+
+def _acceleration(task: Task, j: int, home: Array) -> float:
+    """What joint j may use [rad/s^2]: a part of its limit, and of what its torque leaves beyond gravity."""
+    joint = task.robot.joints[j]
+    bounds = [joint.acceleration if np.isfinite(joint.acceleration) else float(task.speed[j]) / 0.3]
+    if task.arm is not None and np.isfinite(joint.torque):
+        inertia = float(task.arm.body.mass_matrix(home[None], task.arm.p)[0, j, j])
+        bounds.append(0.5 * joint.torque / max(inertia, 1e-9))
+    return _ACCELERATION * min(bounds)
+
+
+def _move(start: float, end: float, rate: float) -> tuple[Array, float]:
+    """From rest to rest: (polynomial (6,), duration [s]), no faster than `rate` allows."""
+    duration = max(float(np.sqrt(5.774 * abs(end - start) / rate)), 0.2)  # a quintic's largest acceleration
+    return quintic(np.array([[start], [0.0], [0.0]]), np.array([[end], [0.0], [0.0]]), duration)[:, 0], duration
+
+
+def _stroke(start: float, speed: float, ramp: float, hold: float) -> list[tuple[Array, float]]:
+    """There and back at constant speed, as polynomials in s with their durations."""
+    there = start + speed * (hold + ramp)
+    parts = []
+    for place, v in ((start, speed), (there, -speed)):
+        up = quintic(np.array([[place], [0.0], [0.0]]), np.array([[place + 0.5 * v * ramp], [v], [0.0]]), ramp)[:, 0]
+        line = np.array([place + 0.5 * v * ramp, v * hold, 0.0, 0.0, 0.0, 0.0])
+        down = quintic(np.array([[place + v * (0.5 * ramp + hold)], [v], [0.0]]),
+                       np.array([[place + v * (ramp + hold)], [0.0], [0.0]]), ramp)[:, 0]
+        parts += [(up, ramp), (line, hold), (down, ramp)]
+    return parts
+
+
+def _joined(task: Task, parts: list[tuple[Array, float]]) -> Array:
+    """Position, speed, acceleration (3, samples) of polynomials one after another."""
+    ends = np.cumsum([duration for _, duration in parts])
+    t = np.arange(int(ends[-1] / task.sample_time) + 1) * task.sample_time
+    which = np.minimum(np.searchsorted(ends, t, side="right"), len(parts) - 1)
+    length = np.array([duration for _, duration in parts])[which]
+    s = (t - (ends - np.array([duration for _, duration in parts]))[which]) / length
+    c = np.stack([polynomial for polynomial, _ in parts])[which].T
+    k = np.arange(6)[:, None]
+    powers = s[None] ** k
+    first = (c[1:] * k[1:] * powers[:5]).sum(axis=0) / length
+    second = (c[2:] * (k[2:] * (k[2:] - 1)) * powers[:4]).sum(axis=0) / length**2
+    return np.stack([(c * powers).sum(axis=0), first, second])
+
+
+def frf_plans(task: Task, seed: int) -> tuple[Plan, ...]:
+    """One experiment a joint: there and back through its range at low speed, with a random-phase multisine.
+
+    The slow turn keeps friction from sticking; the multisine has equal lines, so every frequency gets as much (Pintelon &
+    Schoukens 2012, ch. 2).
+    """
+    home, n = _home(task), task.robot.n_joints
+    plans = []
+    for j in range(n):
+        low, high = task.robot.joints[j].position
+        room = _USED_RANGE * (high - low) if np.isfinite(high - low) else 2.0 * np.pi
+        centre = 0.5 * (low + high) if np.isfinite(high - low) else float(home[j])
+        speed = min(_SLOW * float(task.speed[j]), room / (2.0 * _FRF_PERIOD))
+        rate = _acceleration(task, j, home)
+        ramp = max(_PEAK * speed / rate, 0.1)
+        hold = max(room / speed - ramp, 1.0)
+        start = centre - 0.5 * speed * (hold + ramp)
+        motion = _joined(task, _stroke(start, speed, ramp, hold))
+        whole = np.zeros((3, n, motion.shape[1]))
+        whole[0] = home[:, None]
+        whole[:, j] = motion
+        v = np.zeros((motion.shape[1], n))
+        v[:, j] = _multisine(motion.shape[1], task.sample_time, np.random.default_rng([seed, j])) * _strength(task, j, home)
+        t = np.arange(motion.shape[1], dtype=np.float64) * task.sample_time
+        plans.append(Plan(f"frf-{j + 1}", "frf", j + 1, home, t, whole, v, _FRF_PERIOD,
+                          f"{speed:.3g} rad/s there and back, lines from {_FRF_BAND[0]:g} to "
+                          f"{_FRF_BAND[1] / task.sample_time:g} Hz every {1.0 / _FRF_PERIOD:g} Hz"))
+    return tuple(plans)
+
+
+def _strength(task: Task, j: int, home: Array) -> float:
+    """rms of the excitation [rad/s^2]."""
+    joint = task.robot.joints[j]
+    if task.arm is not None and np.isfinite(joint.torque):
+        return _FRF_TORQUE * joint.torque / max(float(task.arm.body.mass_matrix(home[None], task.arm.p)[0, j, j]), 1e-9)
+    return _FRF_TORQUE * _acceleration(task, j, home) / _ACCELERATION
+
+
+def _multisine(samples: int, sample_time: float, rng: np.random.Generator) -> Array:
+    """Lines of equal amplitude and random phase, rms 1, periodic."""
+    period = round(_FRF_PERIOD / sample_time)
+    spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
+    lines = np.arange(int(_FRF_BAND[0] * _FRF_PERIOD), int(_FRF_BAND[1] * period))
+    spectrum[lines] = np.exp(2j * np.pi * rng.uniform(size=len(lines)))
+    one = np.fft.irfft(spectrum, period)
+    return np.asarray(np.resize(one / np.sqrt(np.mean(one**2)), samples))
+
+
+def hold_plans(task: Task, seed: int) -> tuple[Plan, ...]:
+    """Postures chosen one by one, each the one that adds most to log det of what postures tell about gravity."""
+    rng, n = np.random.default_rng(seed), task.robot.n_joints
+    low, high = task.around
+    candidates = rng.uniform(low - 0.5 * (high - low), high + 0.5 * (high - low), (_CANDIDATES, n))
+    bounds = np.array([joint.position for joint in task.robot.joints])
+    candidates = np.clip(candidates, bounds[:, 0] + 0.02, bounds[:, 1] - 0.02)
+    rows, kept = _static_rows(task, candidates)
+    if not kept.any():
+        raise UsageError("C08", "no posture can be held within the torque limits", where=task.robot.name,
+                         remedy="correct the torque limits or the model")
+    rows, candidates = rows[kept], candidates[kept]
+    matrix = 1e-6 * np.eye(rows.shape[2])
+    plans = []
+    for k in range(min(_POSTURES, len(candidates))):
+        gain = [np.linalg.slogdet(np.eye(n) + row @ np.linalg.solve(matrix, row.T))[1] for row in rows]
+        best = int(np.argmax(gain))
+        matrix += rows[best].T @ rows[best]
+        t = np.arange(round(_DWELL / task.sample_time) + 1, dtype=np.float64) * task.sample_time
+        motion = np.zeros((3, n, len(t)))
+        motion[0] = candidates[best][:, None]
+        plans.append(Plan(f"hold-{k + 1}", "hold", None, candidates[best], t, motion,
+                          words=", ".join(f"{value:.3f}" for value in candidates[best]) + " rad"))
+    return tuple(plans)
+
+
+def _static_rows(task: Task, q: Array) -> tuple[Array, np.ndarray]:
+    """Rows (postures, joints, parameters) of what stands still, noise-weighed, and which postures the drives can hold."""
+    body = task.problem.columns
+    still = np.zeros((3, q.shape[1], len(q)))
+    still[0] = q.T
+    rows = np.zeros((len(q), q.shape[1], len(body.names)))
+    found = tuple(row.copy() for row in body.rows(still))
+    for j, (own, row) in enumerate(zip(body.columns, found, strict=True)):
+        rows[:, j, own] = row.T / task.problem.goal.noise[j]
+    tau = task.problem.torque(found, still[1])
+    return rows, np.asarray((np.abs(tau) < task.problem.limits.torque[:, None]).all(axis=0))

@@ -1,0 +1,211 @@
+"""The report on a designed experiment: what it will tell, how near it comes to its limits, and what was not checked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipelines.model.excitation.result import DrawnPlan, Result
+from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
+from pipelines.report.report import Figure, Report, Section, Table, Tone
+from pipelines.report.sections import joint_signal_figure
+from pipelines.report.style import format_number
+
+__all__ = ["excitation_report"]
+
+_UNCHECKED = "Self-collision is not checked, nor is collision with anything around the robot."
+_AIMS = {"default": "the smallest relative standard deviation with a bounded condition number",
+         "A": "the smallest relative standard deviation", "D": "the smallest confidence ellipsoid",
+         "E": "the best known worst direction",
+         "condition": "the smallest condition number", "frobenius": "the smallest Frobenius condition number"}
+_DRAWN_PLANS = 6
+_DEAR = 0.02  # share of the cost that is worth naming
+
+
+def excitation_report(result: Result) -> Report:
+    """The motion, its limits, what it tells; of other experiments their plans."""
+    if result.purpose != "excitation":
+        return _plans_report(result)
+    sections = (_safety(result), _motion(result), _limits(result), _told(result), _certificate(result), _comparison(result))
+    return Report("Excitation", _verdict(result), _tone(result), _key_figures(result), tuple(s for s in sections if s is not None))
+
+
+def _tone(result: Result) -> Tone:
+    if not result.reached or (result.rehearsal is not None and not result.rehearsal.safe) or result.rehearsal_failed:
+        return "attention"
+    return "good" if result.torque_checked else "attention"
+
+
+def _verdict(result: Result) -> str:
+    said = [f"The excitation has the condition number {format_number(result.condition_number)}"]
+    if result.predicted_relative_std is not None and result.torque_checked:
+        said.append(f"and will show the parameters to {format_number(100 * result.predicted_relative_std, 3)} % (predicted, root "
+                    "mean square of their relative standard deviations)")
+    text = " ".join(said)
+    if not result.reached and result.ceiling is not None:
+        dear = result.dearest
+        text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"
+    if not result.torque_checked:
+        text += "; torque limits could not be checked, for neither a model nor the links are known"
+    if result.interrupted:
+        text += "; the search was interrupted, this is its best by then"
+    return text + "."
+
+
+def _key_figures(result: Result) -> Table:
+    start = "at rest at home" if result.home is not None and not result.run_in else (
+        f"run-in and run-out of {result.run_in:.3g} s" if result.run_in else "at rest")
+    rows: list[tuple[str, str | float | int | None]] = [
+        ("aim", _AIMS.get(result.criterion, result.criterion)), ("condition number of Φ", result.condition_number)]
+    if result.lower_bound is not None:
+        rows.append(("no motion of this arm can be below", result.lower_bound))
+    if result.torque_checked:
+        rows.append(("relative standard deviation, predicted [%]", 100 * (result.predicted_relative_std or math.nan)))
+    rows += [("Frobenius condition number", result.frobenius), ("smallest singular value of Φ/√n", result.smallest_singular_value),
+             ("log det of the information matrix", result.log_determinant),
+             ("duration", f"{result.periods} × {result.period:g} s{f' and twice {result.run_in:.3g} s' if result.run_in else ''}"),
+             ("start and end", start), ("evaluations, seed", f"{result.evaluations}, {result.seed}")]
+    if result.after:
+        rows.append(("information added of", ", ".join(result.after[:6])))
+    if result.first_mode is not None:
+        rows.append(("first mode known [Hz]", result.first_mode))
+    return Table(("what", "figure"), tuple(rows))
+
+
+def _safety(result: Result) -> Section:
+    text, tables = [], []
+    found = result.rehearsal
+    if found is None:
+        text.append(f"The rehearsal in simulation failed: {result.rehearsal_failed}." if result.rehearsal_failed else
+                    "It was not rehearsed in simulation, for no model of the arm is known." if not result.torque_checked else
+                    "It was not rehearsed in simulation.")
+    else:
+        end = "no drive saturates, no joint exceeds its speed" if found.safe else "a drive saturates or a joint exceeds its speed"
+        text.append(f"Its first {found.seconds:.3g} s were rehearsed in simulation under PD control of 8 Hz a joint, without "
+                    f"feed-forward: {end}. Another controller will follow otherwise.")
+        tables.append(Table(("joint", "away, rms [rad]", "away, most [rad]", "torque, peak [N m]", "limit [N m]",
+                             "speed, peak [rad/s]", "limit [rad/s]", "saturated [%]"), tuple(
+            (name, found.position_rms[j], found.position_max[j], found.torque_peak[j], found.torque_limit[j], found.speed_peak[j],
+             found.speed_limit[j], 100 * found.saturated[j]) for j, name in enumerate(result.joints))))
+    return Section("Before the robot moves", tuple(text), tuple(tables), warning=_UNCHECKED)
+
+
+def _ends(result: Result, quantity: str) -> tuple[list[float], list[float]]:
+    """Limits (low, high) of a quantity, joint by joint; infinite where open."""
+    low, high = [-math.inf] * len(result.joints), [math.inf] * len(result.joints)
+    for one in result.limits:
+        if one.quantity == quantity and one.joint is not None:
+            (high if one.limit > 0.0 else low)[one.joint - 1] = one.limit
+            if quantity != "position":  # the other end is as far
+                (low if one.limit > 0.0 else high)[one.joint - 1] = -one.limit
+    return low, high
+
+
+def _motion(result: Result) -> Section | None:
+    c = result.course
+    if c is None:
+        return None
+    kinds = [("position", "positions", c.q, "position [rad]", "Positions over one period, as Fig. 8 of the paper."),
+             ("speed", "speeds", c.dq, "speed [rad/s]", "Speeds; dashed, limits that they come near to."),
+             ("acceleration", "accelerations", c.ddq, "acceleration [rad/s²]", "Accelerations and their limits.")]
+    if c.tau is not None:
+        kinds.append(("torque", "torques", c.tau, "torque [N m]", f"Torques that the model expects; dashed, "
+                      f"{100 * result.torque_share:.0f} % of the limits, what the plan may use."))
+    figures: list[Figure] = []
+    for quantity, name, values, label, caption in kinds:
+        low, high = _ends(result, quantity)
+        figures.append(limited_figure(name, caption, c.t, values, low, high, label, result.joints))
+    shown = c.amplitude.max(axis=1) > 1e-12
+    figures.append(spectrum_figure("spectrum", "Which frequencies move each joint: amplitude of its speed.", c.hertz[shown],
+                                   c.amplitude[shown], result.joints))
+    return Section("The motion", (), (), tuple(figures))
+
+
+def _limits(result: Result) -> Section:
+    rows = tuple(("tip" if one.joint is None else result.joints[one.joint - 1], one.quantity, one.peak, one.limit, one.unit,
+                  100 * one.share, 100 * one.cost) for one in result.limits)
+    dear = [one for one in sorted(result.limits, key=lambda one: -one.cost) if one.cost > _DEAR][:3]
+    named = ", ".join(f"{one.quantity} of {'the tip' if one.joint is None else result.joints[one.joint - 1]}" for one in dear)
+    text = ["Limits hold between samples too: positions, speeds and accelerations are trigonometric polynomials, and on a grid of "
+            "0.1 ms these exceed their largest sample by a known factor at most; of torque and tip half a step between samples is "
+            "added."]
+    if named:
+        text.append(f"What limits the design most: {named}. The cost is the share of what the criterion would gain, were that "
+                    "limit a little wider.")
+    if not result.torque_checked:
+        text.append("Torque limits were not checked: give a model, or describe the links.")
+    elif result.torque_share < 1.0:
+        text.append(f"Of every torque limit the plan uses {100 * result.torque_share:.0f} %; the rest is left to the controller.")
+    return Section("Limits", tuple(text), (Table(("joint", "of", "peak", "limit", "unit", "used [%]", "cost [%]"), rows),))
+
+
+def _told(result: Result) -> Section:
+    rows = tuple((p.name, p.value, p.std, p.unit, None if not p.value else 100 * p.std / abs(p.value)) for p in result.parameters)
+    relative = [(p.name, 100 * p.std / abs(p.value)) for p in result.parameters if p.value]
+    noise = ", ".join(format_number(value, 3) for value in result.noise)
+    text = (f"Standard deviations are those of one experiment whose torque has white noise of {noise} N m (standard deviation, "
+            f"joint by joint), sampled every {1e3 * result.sample_time:g} ms. What the model lacks adds to them.",
+            "A small condition number is no aim in itself: it presses all singular values down to the smallest.")
+    figures = [singular_value_figure("singular-values", "Singular values of Φ: the smallest belongs to the direction known worst.",
+                                     result.singular_values)]
+    if relative:
+        names, percent = zip(*relative, strict=True)
+        figures.append(relative_std_figure(
+            "relative-std", "Predicted standard deviation of every parameter, relative to its value.", names, percent))
+    columns = ("parameter", "believed value", "predicted std", "unit", "relative [%]")
+    return Section("What it will tell", text, (Table(columns, rows),), tuple(figures))
+
+
+def _certificate(result: Result) -> Section | None:
+    if result.lower_bound is None or result.condition_number is None:
+        return None
+    above = 100 * (result.condition_number / result.lower_bound - 1.0)
+    return Section("Certificate", (
+        f"No motion of this arm has a condition number below √(3/2) = {result.lower_bound:.5f}; this one has "
+        f"{result.condition_number:.4f}, {above:.3g} % above.",
+        "Why: let M = ΦᵀΦ/n, λ its smallest eigenvalue, and b the acceleration of the third link, q̈₂ + q̈₃, with the mean square Z.",
+        "First, Z is at least λ. Take the parameter vector that has 1/√2 at p12 and p13 and zero elsewhere. Its torque is "
+        "(q̈₂ + q̈₃)/√2 at joint 2 and the same at joint 3: p12's column is q̈₂ at joint 2, p13's is q̈₃ at joint 2 and b at joint 3. "
+        "The mean square of that torque is Z/2 + Z/2 = Z, and no unit vector gives less than λ.",
+        "Second, the columns of p7, p8 and p9. At joint 1, the mean squares of p8's and p9's column add up to that of b² + "
+        "(q̇₂ + q̇₃)⁴, for their sines and cosines complete each other: at least Z. At joints 2 and 3 both columns are q̈₁ times a cosine and a "
+        "sine, which complete each other too: twice the mean square of q̈₁, and that mean square is the diagonal element of p7. So "
+        "M₈₈ + M₉₉ ≥ 2 M₇₇ + Z.",
+        "Every diagonal element is at least λ, so M₇₇ ≥ λ, and with Z ≥ λ the sum is at least 3 λ. The larger of the two is at "
+        "least 1.5 λ, and so is the largest eigenvalue. The condition number of Φ is the root of their ratio.",
+        "The argument holds for any motion whatever, periodic or not, and with further columns as well, for these only widen "
+        "the range of the eigenvalues."))
+
+
+def _comparison(result: Result) -> Section | None:
+    r = result.random
+    if r is None or result.predicted_relative_std is None:
+        return None
+    rows = (("this design", result.condition_number, 100 * result.predicted_relative_std),
+            (f"random, median of {r.count}", r.condition_median, 100 * r.relative_std_median),
+            (f"random, best condition of {r.count}", r.condition_best, None))
+    times = r.relative_std_median / result.predicted_relative_std
+    return Section("Beside random motions", (
+        f"Random coefficients, scaled until a limit is met: their standard deviation is "
+        f"{format_number(times, 2)} times this design's.",),
+        (Table(("motion", "condition number", "relative std, predicted [%]"), rows),))
+
+
+def _plans_report(result: Result) -> Report:
+    what = {"friction": "friction", "frf": "frequency responses", "hold": "static postures"}[result.purpose]
+    verdict = f"{len(result.plans)} experiments for {what} are planned, {result.duration:.3g} s altogether."
+    rows = tuple((p.name, p.joint, p.seconds, p.speed_peak, p.acceleration_peak, p.words) for p in result.plans)
+    table = Table(("experiment", "joint", "duration [s]", "speed, peak [rad/s]", "acceleration, peak [rad/s^2]", "what"), rows)
+    moving = [p for p in result.plans if p.speed_peak > 0.0][:_DRAWN_PLANS]
+    sections = [Section("Before the robot moves", (), (), warning=_UNCHECKED), Section("Experiments", (), (table,))]
+    if moving:
+        sections.append(Section("Motions", (), (), tuple(_plan_figure(p, result) for p in moving)))
+    return Report("Planned experiments", verdict, "neutral", None, tuple(sections))
+
+
+def _plan_figure(plan: DrawnPlan, result: Result) -> Figure:
+    own = np.ptp(plan.q, axis=0) > 0.0
+    names = tuple(name for name, moves in zip(result.joints, own, strict=True) if moves)
+    return joint_signal_figure(plan.name, f"{plan.name}: {plan.words}.", plan.t, plan.q[:, own], "rad", quantity="position",
+                               names=names)
