@@ -31,7 +31,7 @@ def healthy() -> Recording:
 
 def with_fault(name: str, joint: int, strength: float) -> Fault:
     peak = tuple(np.abs(healthy().tau).max(axis=0).tolist())
-    return make(name, machine(), joint, seed=4, strength=strength, peak_torque=peak)
+    return make(name, machine(), joint, seed=4, strength=strength, peak_torque=peak, duration=SECONDS)
 
 
 def moved(name: str, joint: int, strength: float) -> np.ndarray:
