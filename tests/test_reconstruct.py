@@ -24,7 +24,7 @@ from pipelines.stage import Outcome, Request, run_stage
 from rrrid_cli.main import app
 from tests.fault_table import FAULTS
 from tests.faulty import good_path
-from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest, rows
+from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest, rows, with_signal
 
 Settings = reconstruct.Settings
 
@@ -200,12 +200,43 @@ def test_far_from_the_encoder_is_an_alarm(tmp_path: Path) -> None:
     assert any(check.code == "RRID-D12" and check.gate for check in stiff.result.checks)
 
 
-def test_periods_are_compared_and_not_averaged(tmp_path: Path) -> None:
-    """The report claims no more than is done with them."""
-    report = stage(tmp_path, make_log(good_path(), duration=15.0, period=5.0)).report
-    text = " ".join(text for section in report.sections for text in section.text)
+@pytest.mark.parametrize("average", [True, False])
+def test_periods_are_compared_and_their_mean_is_better_known(average: bool, tmp_path: Path) -> None:
+    """Three periods: deviations of the mean are those of a sample over √3; the derived log holds every sample either way."""
+    log = make_log(good_path(), duration=15.0, period=5.0)
+    outcome = stage(tmp_path, log, settings=Settings(average=average))
+    text = " ".join(text for section in outcome.report.sections for text in section.text)
     assert "3 periods were compared: their scatter is the noise floor" in text
-    assert "averaged" not in text
+    found = outcome.result.logs[0]
+    assert ("not averaged, as asked for" in text) == (found.mean is None) == (not average)
+    if found.mean is not None:
+        assert found.mean.periods == 3
+        np.testing.assert_allclose(found.mean.speed_std, found.speed_std / np.sqrt(3.0), rtol=1e-6)
+    assert motion_of(open_log(outcome.folder / "logs/log-0.h5").log, Settings(average=not average)).derived
+
+
+def test_a_period_that_is_none_is_said(tmp_path: Path) -> None:
+    """T10: the attribute period is 4 s where the motion repeats after 5."""
+    outcome = stage(tmp_path, make_log(good_path(), duration=15.0, period=4.0))
+    (check,) = [check for check in outcome.result.checks if check.code == "RRID-T10"]
+    assert "differs from one period to the next" in check.message
+    assert outcome.result.logs[0].mean is None
+
+
+@pytest.mark.parametrize("resolution", [2e-3, 5e-3])
+def test_a_coarse_encoder_is_no_alarm(resolution: float, tmp_path: Path) -> None:
+    """An encoder of 2 mrad is up to 1 mrad from the motion, which is no fault of the reconstruction; beyond a step it is one."""
+    log = good_log()
+    coarse = with_signal(log, q=resolution * np.rint(good_path()(log.t)[0] / resolution))
+    outcome = stage(tmp_path, coarse)
+    found = outcome.result.logs[0]
+    assert (found.reconstruction_error_max > 5e-4).any()
+    assert reconstruct.exit_code(outcome.result, True) == 0
+    assert not any(check.code == "RRID-D12" for check in outcome.result.checks)
+    far = replace(found, reconstruction_error_max=np.array([1.1 * resolution, 1e-5, 1e-5]))
+    assert reconstruct.exit_code(replace(outcome.result, logs=(far,)), True) == 1
+    verdict = reconstruct.report(replace(outcome.result, logs=(far,))).verdict
+    assert "its steps allow for" in verdict
 
 
 def test_plans_have_no_motion(tmp_path: Path) -> None:

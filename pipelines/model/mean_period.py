@@ -25,6 +25,7 @@ from pipelines.log.derive import recording
 from pipelines.log.doctor.faults import Mask, quantum
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog, Signal
+from pipelines.log.limits import shorter_than_period
 from pipelines.model.motion import Mean, Measured, Reconstructed, Reconstruction, encoder_resolution, measured, reconstruct
 from pipelines.model.rigid.body import Motion
 from pipelines.signal.filters import passed_both_ways
@@ -115,8 +116,7 @@ def doubts(floor: NoiseFloor | None, where: object, averaged: bool = True) -> li
 
 
 def _two_periods(log: ExperimentLog, found: Reconstructed) -> bool:
-    t = found.good.log.t
-    return log.period is not None and float(np.ptp(t)) + log.sample_time >= 2.0 * log.period * (1.0 - 1e-9)
+    return log.period is not None and not shorter_than_period(found.good.log.t, log.sample_time, 2.0 * log.period)
 
 
 def _fold(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> _Folded | str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -189,3 +190,14 @@ def test_options_of_the_observer(good: ExperimentLog, tmp_path: Path) -> None:
     assert (about[0]["order"], about[0]["bandwidth"], about[1]["jerk_std"]) == (3, [30, 40, 50], [1000])
     wrong = rrrid("estimate-bps", "logs", "--out", "o", "--bandwidth", "1,2", cwd=tmp_path)
     assert (wrong.returncode, "RRID-C02" in wrong.stderr) == (2, True)
+
+
+def test_a_least_speed_beyond_every_speed_names_the_joint(good: ExperimentLog, tmp_path: Path) -> None:
+    """T08: which joint is never that fast, and how fast it is at most."""
+    fastest = np.abs(np.gradient(good.q, good.t, axis=0)).max(axis=0)
+    settings = replace(SYMMETRIC, min_speed=(0.1, 50.0, 0.1))
+    with pytest.raises(InputRejected, match=r"T08 .* joint 2 .* --min-speed asks for 50") as refused:
+        stage(tmp_path, good, settings=settings)
+    said = re.search(r"largest speed is (\S+) rad/s", str(refused.value))
+    assert said is not None
+    assert float(said.group(1)) == pytest.approx(fastest[1], rel=0.05)

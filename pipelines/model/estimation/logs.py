@@ -94,6 +94,7 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
         recipe.check(log)
     recipe = with_cutoff(recipe, motions, columns)
     equations = equations_of(motions, recipe, columns, rows)
+    _fast_enough(equations, motions)
     _enough(equations, motions[0][0])
     found = estimate(equations, columns, weighted)
     return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, equations), weighted)
@@ -106,6 +107,20 @@ def with_cutoff(recipe: Recipe, motions: Motions, columns: Columns) -> Recipe:
     asked = [_condition(log, found, recipe, columns).cutoff_hz for log, found in motions]
     known = [cutoff for cutoff in asked if cutoff is not None]
     return replace(recipe, cutoff_hz=max(known) if known else None)
+
+
+def _fast_enough(equations: Sequence[LogEquations], motions: Motions) -> None:
+    """T08: no sample of any log is as fast as the least speed asked for."""
+    slow = np.all([one.rows.slow.all(axis=0) for one in equations], axis=0)
+    if not slow.any():
+        return
+    j = int(np.argmax(slow))
+    fastest = max(float(np.abs(found.motion.dq[found.good.kept, j]).max()) for _, found in motions)
+    unit = "rad/s" if motions[0][0].robot.joints[j].revolute else "m/s"
+    asked = np.broadcast_to(np.array(equations[0].conditioning.min_speed), len(slow))[j]
+    raise InputRejected("T08", f"no equation of joint {j + 1} is left: its largest speed is {fastest:.3g} {unit}, --min-speed asks "
+                        f"for {asked:g}", where=motions[0][0].source or motions[0][0].name,
+                        remedy="give less; one value a joint, where their speeds differ")
 
 
 def _enough(equations: Sequence[LogEquations], log: ExperimentLog) -> None:

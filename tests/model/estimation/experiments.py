@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -14,7 +15,16 @@ from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.rigid.body import Motion
 from sample_logs.make_model import synthetic_arm
-from sample_logs.make_samples import Fourier, from_rest, recorded, within_limits
+from sample_logs.make_samples import (
+    NOISE,
+    Fourier,
+    averaged_torque,
+    from_rest,
+    quantised,
+    recorded,
+    torque_step,
+    within_limits,
+)
 
 COULOMB = (4.8, 2.4, 1.2)  # [N m]
 VISCOUS = (0.6, 0.3, 0.12)  # [N m s/rad]
@@ -53,6 +63,29 @@ def experiment(seed: int, role: str = "identify", moving: Array | None = None, d
     """10 s at 1 kHz: encoders of 1e-5 rad, torque noise of 20, 10, 5 mN m, torque averaged over each sample."""
     return recorded(arm(), motion_of(seed, moving), duration, np.random.default_rng([4, seed]), name=f"excitation-{seed}",
                     experiment="excitation", role=role, period=10.0)
+
+
+@lru_cache(maxsize=8)
+def one_period(seed: int) -> tuple[Array, Array]:
+    """Position and torque of 10 s at 1 kHz, without noise, from a moment in which no joint rests."""
+    motion, t = motion_of(seed), np.arange(10_000, dtype=np.float64) * 1e-3
+    return np.roll(motion(t).q, 3000, axis=0), np.roll(averaged_torque(arm(), motion, t), 3000, axis=0)
+
+
+def periodic(seed: int, periods: int, encoder: float = 3e-6, role: str = "identify",
+             spoil: Callable[[Array, Array], None] | None = None) -> ExperimentLog:
+    """So many periods of 10 s, with noise on the position [rad] and the amplifier's on the torque.
+
+    Args:
+        spoil: changes position and torque in place, before noise and counting.
+    """
+    rng, log = np.random.default_rng([9, seed]), experiment(seed, role)
+    q, tau = (np.tile(x, (periods, 1)) for x in one_period(seed))
+    if spoil is not None:
+        spoil(q, tau)
+    values = {"t": np.arange(len(q), dtype=np.float64) * 1e-3, "q": quantised(q + encoder * rng.standard_normal(q.shape), 1e-5),
+              "tau": quantised(tau + NOISE * rng.standard_normal(q.shape), torque_step(log.robot))}
+    return replace(log, signals={name: replace(log.signals[name], values=x) for name, x in values.items()}, name=f"periodic-{seed}")
 
 
 def truth(names: list[str]) -> Array:
