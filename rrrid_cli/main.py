@@ -29,7 +29,7 @@ Average = Annotated[bool | None, typer.Option("--average/--no-average",
                                               help="Mean of the periods of a periodic log, where they are alike. [average]")]
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
-STAGES = ("run", "inspect", "import", "convert", "reconstruct", "estimate-bps", "simulate", "design-excitation")
+STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
                   pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -105,6 +105,20 @@ def convert(
     from pipelines.convert import STAGE
 
     _go(STAGE, tuple(logs), common, {"to": to}, {"to": common.format})
+
+
+@app.command("fit-friction", cls=StageCommand)
+@with_common
+def fit_friction(
+    logs: LogPaths, common: Common,
+    law: Annotated[str | None, typer.Option(help="Law to fit, as the ladder names it. [the simplest that is not worse]")] = None,
+    method: Annotated[str | None, typer.Option(help="varpro, output-error, or ekf (the paper's). [varpro]")] = None,
+    window: Annotated[float | None, typer.Option(help="Windows of the equations [s]. [0.02]")] = None,
+) -> None:
+    """Fit the friction law of each joint that was driven alone, and choose it."""
+    from pipelines.fit_friction import STAGE
+
+    _go(STAGE, tuple(logs), common, {"law": law, "method": method, "window": window})
 
 
 @app.command(cls=StageCommand)

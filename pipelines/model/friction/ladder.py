@@ -23,7 +23,6 @@ _SURE = 2.0  # standard errors of a difference: beyond, it is one
 _WORTH = 0.01  # of the mean square: a smaller difference is none, however sure
 _BLOCKS = 20  # of the rows that judge
 _FOLDS = 10
-_SEEN = 0.9  # share of a number that must lie in directions that the rows show
 _FURTHER = 2  # causes beside the first
 
 
@@ -110,13 +109,12 @@ def _beside(judge: Judge, best: Tried, cause: str) -> Tried:
     known = {place.name if place.name == "sharpness" else (place.effects, place.name): value
              for place, value in zip(best.law.places, best.fit.theta, strict=True)}
     longest = max(judge.identify.stretches, key=lambda stretch: len(stretch.t))
-    starts: list[Array] = []
+    starts: dict[bytes, Array] = {}
     for theta in law.starts(longest.nodes, judge.identify.joint):
         begin = np.array([known.get(place.name if place.name == "sharpness" else (place.effects, place.name), value)
                           for place, value in zip(law.places, theta, strict=True)])
-        if not any(np.array_equal(begin, other) for other in starts):
-            starts.append(begin)
-    return judge.try_law(law, starts)
+        starts[begin.tobytes()] = begin
+    return judge.try_law(law, list(starts.values()))
 
 
 def _best(tried: Sequence[Tried]) -> Tried:
@@ -152,10 +150,9 @@ def _held_out(fit: LawFit) -> Array:
 
 
 def _fault(fit: LawFit) -> str:
-    """Why a law cannot be chosen: a number that the rows do not show, or one that its cause cannot have."""
-    numbers = fit.numbers
-    unseen = [number.name for number in numbers if number.seen < _SEEN]
-    if unseen:
-        return f"{', '.join(unseen)} cannot be told from the rest"
-    below = [number.name for number in numbers if number.value < number.low - _SURE * number.std]
+    """Why a law cannot be chosen: a number that its cause cannot have.
+
+    Numbers that the rows hardly show are no fault: a law that has too many of them judges no better than a simpler one.
+    """
+    below = [number.name for number in fit.numbers if number.value < number.low - _SURE * number.std]
     return f"{', '.join(below)} would be negative" if below else ""

@@ -1,0 +1,203 @@
+"""Fit the friction law of each joint, and choose it.
+
+Reads    "friction" logs of role "identify", each of one joint driven alone; those of role "validate" judge; "hold" logs
+Writes   result.json, result.h5, model.json with the friction, logs/ with its torque, report.html
+Source   Kostić et al. 2004, Section IV.B, eq. (10)-(11), Table III, Figs. 5 and 6
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
+from pipelines.log.atomic import write_file
+from pipelines.log.canonical import digest_of
+from pipelines.log.derive import derive, recording
+from pipelines.log.doctor.checks import Subject, check_log
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import write_log
+from pipelines.log.model_file import Source, model_text
+from pipelines.log.results import encode
+from pipelines.log.robot import RobotDescription
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
+from pipelines.model.estimation.outcome import validity
+from pipelines.model.friction.findings import findings
+from pipelines.model.friction.fit_law import LawFit
+from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
+from pipelines.model.friction.laws import LADDER, Law, law_named
+from pipelines.model.friction.methods import METHODS, by_method
+from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.friction.result import JointResult, Result, joint_result
+from pipelines.model.motion import reconstruct
+from pipelines.model.parameter import Parameter
+from pipelines.model.rigid.body import Motion
+from pipelines.model.rigid.choose import rigid_body
+from pipelines.model.tuned import Reconstruction
+from pipelines.report.friction_report import friction_report
+from pipelines.report.report import Report
+from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+
+__all__ = ["STAGE", "Result", "Settings", "compute", "report"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which law, fitted how, over which windows."""
+
+    law: str | None = None  # a law of the ladder, or several joined by "+"; None: the simplest that is not measurably worse
+    method: str = "varpro"  # how its numbers are found in the end: varpro, output-error or ekf
+    window: float = 0.02  # [s] of the equations
+    order: int = Reconstruction.order  # of the smoother that motion begins with
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Fit every joint that was driven alone.
+
+    Raises:
+        NothingMatched: C06, no friction log to fit.
+        UsageError: C02, settings that do not fit, or logs of several robots.
+        InputRejected: the doctor rejects a log: its first reason; T08, too few windows are left.
+    """
+    law = _law(settings)
+    measured = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
+    logs = [log for log in measured if log.experiment in ("friction", "hold")]
+    identify = [log for log in logs if log.role == "identify" and log.experiment == "friction"]
+    if not identify:
+        kinds = ", ".join(sorted({f"{o.log.experiment} ({o.log.role})" for o in inputs.logs})) or "none"
+        raise NothingMatched("C06", f"no friction log of role identify; there are: {kinds}", where=inputs.label,
+                             remedy="drive each joint alone, the others held, and record it as experiment 'friction'")
+    if len({log.robot_text for log in logs}) > 1:
+        raise UsageError("C02", "logs of several robots", where=inputs.label,
+                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+    used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
+    seen, said = _examined(used, Reconstruction(order=settings.order))
+    joints = [by_method(fit_joint(part, settings.window, law), settings.method) for part in _by_joint(seen)]
+    found = tuple(check for joint in joints for check in findings(joint))
+    robot = identify[0].robot
+    results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method) for joint in joints)
+    arm = _arm(identify[0], joints)
+    motions = tuple(pair for joint in joints for pair in joint.logs.identify)
+    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
+    model = arm.to_model(validity=validity(motions), sources=sources, notes=_notes(arm, results))
+    return Result(identify[0].robot_name, results, "one joint at a time", model=model, doctor=(*said, *found),
+                  derived=tuple(_derived(pair, joint, arm, settings) for joint in joints
+                                for pair in (*joint.logs.identify, *joint.logs.validate)))
+
+
+def _law(settings: Settings) -> Law | None:
+    if settings.method not in METHODS:
+        raise UsageError("C02", f"'{settings.method}' is no method", where="--method", remedy=f"one of {', '.join(METHODS)}")
+    if not 1e-3 <= settings.window <= 1.0:
+        raise UsageError("C02", f"windows of {settings.window:g} s", where="--window", remedy="give 0.001 to 1 s")
+    if settings.law is None:
+        return None
+    names = [law.name for law in LADDER]
+    parts = settings.law.split("+")
+    known = [name for law in LADDER for name in (law.name, *law.members)]
+    if unknown := [part for part in parts if part not in known]:
+        raise UsageError("C02", f"'{unknown[0]}' is no friction law{did_you_mean(unknown[0], known)}", where="--law",
+                         remedy=f"one of {', '.join(names)}, or several joined by +")
+    return law_named(settings.law) or Law(settings.law, tuple(dict.fromkeys(parts)))
+
+
+def _examined(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[list[Seen], tuple[Check, ...]]:
+    """The motion of every log, and what the doctor says of it."""
+    seen, said = [], []
+    for log in logs:
+        subject = Subject(recording(log))
+        checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
+        if reject := next((check for check in checks if check.level == "reject"), None):
+            raise reject.as_error()
+        seen.append((log, reconstruct(log, how, subject.good)))
+        said += checks
+    return seen, tuple(said)
+
+
+def _by_joint(seen: Sequence[Seen]) -> list[JointLogs]:
+    hold = tuple(pair for pair in seen if pair[0].experiment == "hold")
+    alone = [pair for pair in seen if pair[0].experiment == "friction"]
+    joints = sorted({log.joint for log, _ in alone if log.joint is not None and log.role == "identify"})
+    return [JointLogs(joint, tuple(pair for pair in alone if (pair[0].joint, pair[0].role) == (joint, "identify")),
+                      tuple(pair for pair in alone if (pair[0].joint, pair[0].role) == (joint, "validate")), hold)
+            for joint in joints]
+
+
+def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:
+    """The arm with this friction; its base parameters are those of the described links, else unknown: zero, and said to be."""
+    body = rigid_body(log.robot)
+    known = body.known_parameters()
+    base = tuple(Parameter(p.name, 0.0 if known is None else float(known[i]), None, p.unit,
+                           origin="assumed" if known is None else "known", visible=known is not None)
+                 for i, p in enumerate(body.parameters))
+    laws = [acting for joint in joints for acting in acting_laws(joint.fit, joint.logs.joint)]
+    friction = [law for law in laws if not acts_at_rest(law.effect, log.robot)]
+    return Arm(log.robot_name, body, base, tuple(friction), tuple(law for law in laws if law not in friction))
+
+
+def acts_at_rest(effect: Effect, robot: RobotDescription) -> bool:
+    """An offset is no friction: its torque is there without motion."""
+    joint = replace(effect, joint=1)
+    still = np.zeros((2, 1))
+    return bool(joint.columns(Motion(np.arange(2.0), still, still, still), OneJoint.of(robot, 1, 1.0)).any())
+
+
+def acting_laws(fit: LawFit, joint: int) -> list[Acting]:
+    """The law's effects at their joint of the arm, with their numbers."""
+    std = {number.name: number.std for number in fit.numbers}
+    shared = {name.partition(".")[2]: value for name, value in std.items() if name.endswith(".sharpness")}
+    found = []
+    for effect, values in zip(fit.law.shaped(fit.theta), fit.law.values(fit.theta, fit.amplitudes), strict=True):
+        own = {name: std.get(f"{effect.name}.{name}", shared.get(name)) for name in values}
+        found.append(Acting.of(find_effect(effect.name)(joint=joint), values, {k: s for k, s in own.items() if s is not None},
+                               revolute=fit.joint.revolute))
+    return found
+
+
+def _notes(arm: Arm, joints: Sequence[JointResult]) -> tuple[str, ...]:
+    notes = ["friction fitted by rrrid fit-friction, joint by joint"]
+    if arm.body.known_parameters() is None:
+        notes.append("base parameters were not fitted and are not known: zero stands for them; rrrid estimate-bps finds them")
+    return tuple(notes)
+
+
+def _derived(pair: Seen, joint: JointFit, arm: Arm, settings: Settings) -> tuple[str, ExperimentLog]:
+    log, motion = pair
+    how = Reconstruction(order=settings.order)
+    friction = arm.friction_torque(motion.motion)
+    only = np.zeros_like(friction)  # of the joint that was driven: at rest eq. (10) has none
+    only[:, joint.logs.joint - 1] = friction[:, joint.logs.joint - 1]
+    with_motion = derive(log, "reconstruct", how.as_settings(), motion.signals())
+    return slug(log.name), derive(with_motion, "fit-friction", encode(settings)[0], {"tau_friction_model": only})
+
+
+def write(result: Result, folder: Path, request: Request) -> None:
+    """model.json, and every log with the torque of friction."""
+    write_file(folder / "model.json", lambda draft: _text(draft, model_text(result.model)))
+    for name, log in result.derived:
+        write_log(folder / f"logs/{name}.{request.format}", log)
+
+
+def _text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def report(result: Result) -> Report:
+    """The verdict, Table III, Figs. 5 and 6, the curve with its band, the ladder."""
+    return friction_report(result)
+
+
+def _onward(result: Result, inputs: Inputs) -> Inputs:
+    """Later stages take the friction as known where every joint has its law."""
+    arm = Arm.from_model(result.model)
+    return replace(inputs, material=arm) if len(result.joints) == arm.n_joints else inputs
+
+
+STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report, read_logs, write,
+              lambda result, check: int(check and any(found.gate for found in result.doctor)),
+              lambda result: result.doctor, _onward)

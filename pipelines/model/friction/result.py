@@ -1,0 +1,186 @@
+"""The result of a friction fit: everything computed, nothing drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipelines.errors import Check
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.model_file import ModelFile
+from pipelines.log.results import NOT_STORED
+from pipelines.model.friction.joint import JointFit, fractions
+from pipelines.model.friction.one_joint import gravity_names
+
+__all__ = ["Event", "JointResult", "Posture", "Result", "Rung", "Series", "Validation", "Value", "joint_result"]
+
+_POINTS = 1500  # of a figure
+_CURVE = 401
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its uncertainty."""
+
+    value: float
+    std: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Root mean square errors of the simulated speed [rad/s], Fig. 6."""
+
+    velocity_error_with: float | None  # None: the simulation ran away
+    velocity_error_without: float | None
+    by: str  # the log
+    held_out: bool
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A law of the ladder. Torques are means over windows."""
+
+    law: str
+    size: int  # numbers that were fitted
+    identify_rms: float  # [N m]
+    validate_rms: float
+    alike: bool  # not measurably worse than the best
+    chosen: bool
+    reason: str  # why it cannot be chosen
+
+
+@dataclass(frozen=True)
+class Posture:
+    """What depends on where the other joints stand."""
+
+    others: tuple[float, ...]  # [rad]
+    inertia: Value
+    gravity: dict[str, Value]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Break-away torque in one direction."""
+
+    direction: int
+    torque: Value
+    events: int
+
+
+@dataclass(frozen=True)
+class Missing:
+    """Something these logs do not show, and what to record."""
+
+    what: str
+    record: str
+
+
+@dataclass(frozen=True)
+class Series:
+    """What figures are drawn from."""
+
+    speed: Array  # [rad/s] (points,) of the curve
+    curve: Array  # [N m]
+    band: Array  # [N m] one standard deviation
+    map_speed: Array  # [rad/s] (classes,)
+    map_odd: Array  # [N m]
+    map_std: Array
+    map_even: Array
+    t: Array  # [s] (samples,) of the judged log, thinned out
+    torque: Array  # [N m]
+    friction: Array  # simulated
+    gravity: Array
+    inertial: Array
+    q: Array  # [rad] measured
+    dq: Array  # [rad/s]
+    q_with: Array  # simulated with friction
+    dq_with: Array
+    q_without: Array
+    dq_without: Array
+
+
+@dataclass(frozen=True)
+class JointResult:
+    """One joint."""
+
+    joint: int
+    name: str
+    law: str
+    method: str
+    parameters: dict[str, Value]
+    inertia: Value
+    gravity: dict[str, Value]  # c of sin q, c' of cos q; a prismatic joint's weight
+    postures: tuple[Posture, ...]
+    validation: Validation
+    ladder: tuple[Rung, ...]
+    judged_by: str  # "logs" | "blocks"
+    unseen: tuple[Missing, ...]
+    break_away: tuple[Event, ...]
+    held: tuple[float, float] | None  # [N m] carried at rest
+    driven: tuple[float, float]  # [rad/s] slowest and fastest
+    logs: tuple[str, ...]
+    series: Series
+
+
+@dataclass(frozen=True)
+class Result:
+    """Every joint that was driven."""
+
+    robot: str
+    joints: tuple[JointResult, ...]
+    source: str  # "one joint at a time" | "all joints at once"
+    doctor: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False, kw_only=True)
+    model: ModelFile = field(metadata=NOT_STORED, repr=False)
+    derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)
+
+
+def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
+    """What is kept of one joint's fit."""
+    fit, ladder = joint.fit, joint.ladder
+    unit = "N m" if fit.joint.revolute else "N"
+    several = len(fit.law.members) > 1
+    parameters = {number.name if several else number.name.partition(".")[2]: Value(number.value, number.std if number.seen > 0.0 else None, number.unit)
+                  for number in fit.numbers}
+    postures = tuple(_posture(joint, k) for k in range(len(fit.postures)))
+    driven = joint.driven
+    errors = [_finite(driven.error(simulated)) for simulated in (driven.with_friction, driven.without)]
+    rungs = tuple(Rung(one.law.name, one.law.size, one.identify_rms, one.validate_rms, ladder.alike(one), one is ladder.chosen,
+                       one.reason) for one in ladder.tried)
+    events = tuple(Event(event.direction, Value(event.torque, event.std, unit), event.events) for event in joint.break_away)
+    return JointResult(
+        joint.logs.joint, name, fit.law.name, method, parameters, postures[0].inertia, postures[0].gravity, postures,
+        Validation(errors[0], errors[1], driven.stretch.name, driven.judging), rungs, ladder.by,
+        tuple(Missing(gap.what, gap.record) for gap in joint.unseen), events, joint.held,
+        (joint.covered.slowest, joint.covered.fastest),
+        tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)), _series(joint))
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _posture(joint: JointFit, k: int) -> Posture:
+    fit = joint.fit
+    names = gravity_names(fit.joint.revolute)
+    first = fit.rigid_size * k
+    inertia, torque = ("kg m^2", "N m") if fit.joint.revolute else ("kg", "N")
+    gravity = {name: Value(float(fit.found.beta[first + 1 + i]), float(fit.std[first + 1 + i]), torque)
+               for i, name in enumerate(names)}
+    return Posture(fit.postures[k], Value(float(fit.found.beta[first]), float(fit.std[first]), inertia), gravity)
+
+
+def _series(joint: JointFit) -> Series:
+    driven, points = joint.driven, joint.map
+    stretch = driven.stretch
+    fastest = joint.covered.fastest
+    side = np.concatenate([[0.0], np.geomspace(1e-3 * fastest, fastest, _CURVE // 2)])
+    speed = np.concatenate([-side[:0:-1], side])
+    friction, gravity, inertial = fractions(joint)
+    every = max(1, len(stretch.t) // _POINTS)
+    thin = [np.asarray(x[::every]) for x in (
+        stretch.t - stretch.t[0], stretch.tau, friction, gravity, inertial, stretch.q, stretch.dq, driven.with_friction.q,
+        driven.with_friction.dq, driven.without.q, driven.without.dq)]
+    return Series(speed, joint.fit.curve(speed), joint.fit.curve_std(speed), points.speed, points.odd, points.odd_std, points.even,
+                  *thin)
