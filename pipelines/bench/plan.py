@@ -15,7 +15,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.log.urdf import chain_from_urdf
 
-__all__ = ["Attached", "Base", "Mobility", "Plan", "PlannedJoint", "Shaft", "Twist", "plan_of"]
+__all__ = ["Attached", "Base", "Mobility", "Plan", "PlannedJoint", "Twist", "plan_of"]
 
 INNER_STEP = 2.5e-4  # [s] at most
 _Z = np.array([0.0, 0.0, 1.0])

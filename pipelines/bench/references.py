@@ -39,7 +39,10 @@ def home(machine: Machine) -> Array:
 
 
 def within_torque(machine: Machine, reference: Reference, centre: Array, part: float = 0.7) -> Reference:
-    """The motion shrunk towards the posture `centre` (n,) until it needs at most `part` of every torque limit."""
+    """The motion shrunk towards the posture `centre` (n,) until it needs at most `part` of every torque limit.
+
+    Joints that need too much shrink by a tenth at a time, the others, which load them, by a hundredth.
+    """
     rigid, limit = RigidDynamics(machine.robot), part * np.array(machine.torque_limit)
     laws = [law.law() for law in machine.friction]
     sparse = slice(None, None, max(1, reference.samples // 1500))
@@ -49,7 +52,9 @@ def within_torque(machine: Machine, reference: Reference, centre: Array, part: f
         needed = np.abs(rigid.torque(reference.q[sparse], dq, reference.ddq[sparse]) + friction).max(axis=0)
         if (needed <= limit).all() or np.abs(reference.dq).max() < 1e-3:
             return reference
-        reference = replace(reference, q=centre + 0.9 * (reference.q - centre), dq=0.9 * reference.dq, ddq=0.9 * reference.ddq)
+        shrunk = np.where(needed > limit, 0.9, 0.99)
+        reference = replace(reference, q=centre + shrunk * (reference.q - centre), dq=shrunk * reference.dq,
+                            ddq=shrunk * reference.ddq)
 
 
 def fourier(machine: Machine, rng: np.random.Generator, period: float = 10.0, periods: int = 2, centre: Array | None = None,

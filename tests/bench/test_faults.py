@@ -11,6 +11,7 @@ from scipy.signal import lsim
 
 from pipelines.bench.controllers import Decentralised, OpenLoop
 from pipelines.bench.faults.backlash import Backlash
+from pipelines.bench.faults.base_resonance import BaseResonance
 from pipelines.bench.faults.cogging import Cogging
 from pipelines.bench.faults.drive_lag import DriveLag
 from pipelines.bench.faults.encoder_eccentricity import EncoderEccentricity
@@ -87,6 +88,20 @@ def test_elastic_joint_rings_at_its_free_resonance() -> None:
     expected = math.sqrt(k * (1 / motor + 1 / 0.7)) / (2 * math.pi)
     assert abs(found - expected) < 2e-3 * expected
     assert abs(speed.mean() - 10.0 * 5e-3 / 0.8) < 0.02 * speed.mean()
+
+
+def test_a_soft_base_rings_at_its_own_pole() -> None:
+    """After a kick the table turns against its base, which rings as e^(-ζωt) sin(ω√(1-ζ²) t), whatever the table's inertia."""
+    w, zeta, inertia, kick = 2 * math.pi * 28.0, 0.08, 8.0, 10.0 * 1e-3
+    torque = np.zeros((300, 1))
+    torque[0] = 10.0
+    for table in (0.4, 0.8):
+        recording = run(turntable(table), OpenLoop(torque, (True,)), at_rest(np.zeros(1), 0.3),
+                        [BaseResonance(None, 28.0, zeta, inertia)])
+        t = recording.t[1:] - 5e-4  # the middle of the kick
+        wd = w * math.sqrt(1 - zeta**2)
+        base = -kick / (inertia * wd) * np.exp(-zeta * w * t) * np.sin(wd * t)
+        np.testing.assert_allclose(recording.true_q[1:, 0], kick / table * t - base, atol=2e-3 * kick / (inertia * wd))
 
 
 def test_in_the_gap_the_motor_is_alone() -> None:

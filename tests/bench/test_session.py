@@ -99,7 +99,7 @@ def test_references_keep_the_limits(machine: Machine, plans: list[Experiment]) -
 def test_friction_logs_go_through_two_decades_of_speed_both_ways(machine: Machine) -> None:
     """Of the open joint alone; the held ones stay within 0.05 rad of where they are."""
     for joint in (1, 2, 3):
-        log, = record(machine, [], [experiments.friction(machine, joint, 2, duration=16.0)])
+        log, = record(machine, [], [experiments.friction(machine, joint, 2, duration=10.0)])
         speed = np.gradient(log.q[:, joint - 1], 1e-3)
         for way in (speed, -speed):
             moving = way[way > 0.01]
