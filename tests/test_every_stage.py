@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 
 from pipelines.errors import Check
-from pipelines.log.files import open_log
+from pipelines.log.files import open_log, write_log
 from pipelines.log.results import decode, encode, read_series
 from pipelines.log.table import write_csv
 from pipelines.report.report import Report
 from pipelines.stage import Request, Stage, run_stage
 from rrrid_cli.main import STAGES
+from tests.controlled import controlled_log
 from tests.log.recording.good import RECIPE, good, text, write
 from tests.log.recording.good import run as run_import
 from tests.repairs import REPAIRS, Repair
@@ -48,6 +49,9 @@ def _run(module: str, tmp_path: Path, samples: Path) -> tuple[Any, Any]:
     if module == "import_log":
         recipe = _recording(tmp_path / "data", samples)
         settings, paths = dataclasses.replace(settings, recipe=str(recipe), source=recipe.parent), ()
+    if module == "simulate":
+        write_log(tmp_path / "waving.h5", controlled_log(400))
+        settings, paths = dataclasses.replace(settings, model="rrr"), (tmp_path / "waving.h5",)
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out"), settings)
 
 

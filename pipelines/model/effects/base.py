@@ -188,7 +188,8 @@ class Effect(ABC):
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """How it enters the forward simulation; by default as a load."""
-        return Hooks(load=lambda motion, _: self.torque(motion, arm, values))
+        shaped, amplitudes = self.at(values), self.amplitudes(values)
+        return Hooks(load=lambda motion, _: np.asarray(shaped.columns(motion, arm) @ amplitudes))
 
     def speed_curve(self, values: Values) -> SpeedCurve | None:
         """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
@@ -201,7 +202,8 @@ class Effect(ABC):
     def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
         """`columns`, each (samples,), as (samples, joints, columns): they act on its own joint only."""
         rows = np.zeros((len(columns[0]), arm.n_joints, len(columns)))
-        rows[:, self._index] = np.stack(columns, axis=-1)
+        for k, column in enumerate(columns):
+            rows[:, self._index, k] = column
         return rows
 
     @property

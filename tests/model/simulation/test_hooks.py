@@ -244,6 +244,6 @@ class _Uncurved(Effect):
         assert self.inner is not None
         return self.inner.columns(motion, arm)
 
-    def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         assert self.inner is not None
-        return self.inner.torque(motion, arm, values)
+        return self.inner.simulate(arm, values)

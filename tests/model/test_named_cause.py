@@ -1,0 +1,53 @@
+"""Causes as they are written on the command line."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipelines.errors import UsageError
+from pipelines.model.named_cause import acting_cause
+
+REVOLUTE = (True, True, False)
+
+
+def test_a_cause_with_its_numbers() -> None:
+    """Joint, amplitudes and non-linear numbers; what is not given keeps its default."""
+    found = acting_cause("coulomb:2:level=1.5", REVOLUTE)
+    assert (found.effect.name, found.effect.joint, found.values) == ("coulomb", 2, {"level": 1.5, "sharpness": 100.0})
+    found = acting_cause("coulomb:1:level=1, sharpness=50", REVOLUTE)
+    assert found.values == {"level": 1.0, "sharpness": 50.0}
+    assert {q.origin for q in found.parameters} == {"assumed"}
+
+
+def test_units_follow_the_kind_of_joint() -> None:
+    """A prismatic joint has N where a turning one has N m."""
+    assert acting_cause("coulomb:3:level=1", REVOLUTE).parameters[0].unit == "N"
+
+
+@pytest.mark.parametrize(("text", "code", "words"), [
+    ("", "C01", "is not a cause"),
+    ("coulom:2:level=1", "C01", "did you mean 'coulomb'"),
+    ("coulomb", "C02", "takes a joint"),
+    ("coulomb:level=1", "C02", "takes a joint"),
+    ("coulomb:2:3:level=1", "C02", "takes a joint"),
+    ("coulomb:0:level=1", "C02", "no joint of this arm"),
+    ("coulomb:4:level=1", "C02", "no joint of this arm"),
+    ("coulomb:-1:level=1", "C02", "no joint of this arm"),
+    ("coulomb:x:level=1", "C02", "no joint of this arm"),
+    ("coulomb:²:level=1", "C02", "no joint of this arm"),
+    ("coulomb:2", "C02", "how strong"),
+    ("coulomb:2:", "C02", "takes a joint"),
+    ("coulomb:2:lvel=1", "C01", "did you mean 'level'"),
+    ("coulomb:2:level", "C02", "takes a joint"),
+    ("coulomb:2:level=", "C02", "not a number"),
+    ("coulomb:2:level=one", "C02", "not a number"),
+    ("coulomb:2:level=nan", "C02", "not a number"),
+    ("coulomb:2:level=-1", "C02", "out of range"),
+    ("coulomb:2:level=1e9", "C02", "out of range"),
+])
+def test_anything_else_is_refused(text: str, code: str, words: str) -> None:
+    """With a code, and a hint where a name is nearly right."""
+    with pytest.raises(UsageError, match=words) as refused:
+        acting_cause(text, REVOLUTE)
+    assert refused.value.code == f"RRID-{code}"
+    assert refused.value.remedy
