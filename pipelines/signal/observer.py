@@ -30,6 +30,7 @@ __all__ = ["Observer", "Start", "Track", "design", "observe"]
 Array = npt.NDArray[np.float64]
 
 BLOCK = 32  # samples: longer blocks cost arithmetic, shorter ones carries
+STARTS = 16  # kept: more different ones than that do not come again
 CHUNK = 512 * BLOCK  # samples worked on at once
 
 
@@ -125,6 +126,25 @@ class Observer:
     def diffuse_std(self) -> Array:
         """Standard deviations of the states after such a start, (order, settled, joints)."""
         return seg.deviations(self, self.diffuse_opening.covariance(self))
+
+    @cached_property
+    def _openings(self) -> dict[tuple[bytes, int], tuple[Opening, Array]]:
+        return {}
+
+    def opening(self, excess: Array | None, count: int) -> tuple[Opening, Array]:
+        """The return over `count` samples from a start of covariance P + `excess`, and the deviations (order, count, joints).
+
+        No sample decides them, only what was known before: logs that start alike share them, as gaps of one length do.
+        """
+        if excess is None:
+            return self.diffuse_opening, self.diffuse_std
+        key = excess.tobytes(), count
+        if key not in self._openings:
+            if len(self._openings) >= STARTS:
+                self._openings.clear()
+            start = seg.opening(self, excess, count)
+            self._openings[key] = start, seg.deviations(self, start.covariance(self))
+        return self._openings[key]
 
     def pick(self, joints: npt.NDArray[np.intp]) -> Observer:
         """The observer of some of the joints."""
@@ -272,9 +292,7 @@ def filter_run(observer: Observer, y: Run, prior: Prior, out: Array) -> tuple[Ar
             after = after_rest(observer, rest, after)
         head[:, :, a:b] = out[:, :, a:min(b, head.shape[2])]
         out[:, 0, a:b] += y.offset[:, None]
-    start = (observer.diffuse_opening if prior.excess is None
-             else seg.opening(observer, prior.excess, min(samples, observer.settled)))
+    start, std = observer.opening(prior.excess, min(samples, observer.settled))
     offset, count = seg.offsets(observer, start, prior, y, head), head.shape[2]
     out[:, :, :count] += (start.felt[:, :count] @ offset[..., None])[..., 0].swapaxes(1, 2) * observer.rate[..., None]
-    std = observer.diffuse_std if prior.excess is None else seg.deviations(observer, start.covariance(observer))
     return std[:, :count], seg.after(start, offset[:, -1], after, samples)

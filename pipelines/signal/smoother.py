@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from pipelines.signal import blocks
 from pipelines.signal import segments as seg
-from pipelines.signal.observer import BLOCK, Observer, Start, Track, advance, block_starts, checked, chunks, filter_run
+from pipelines.signal.observer import BLOCK, STARTS, Observer, Start, Track, advance, block_starts, checked, chunks, filter_run
 from pipelines.signal.segments import Part, Piece, Prior, Run
 
 __all__ = ["Smoother", "smooth", "smooth_in_parts", "twicing_growth"]
@@ -87,10 +87,19 @@ class Smoother:
         return self.parts.setdefault(joints.tobytes(), Smoother(self.observer.pick(joints)))
 
     @cached_property
-    def open_ends(self) -> tuple[Array, Array, Array]:
-        """`_ends` of a long log between two unknown ends: it needs no data and is kept."""
-        size = self.observer.settled
-        return _ends(self.observer, seg.diffuse(self.observer), np.zeros_like(self.observer.filter.prior), 2 * size)
+    def _starts(self) -> dict[bytes, tuple[Array, Array, Array]]:
+        return {}
+
+    def ends(self, excess: Array | None) -> tuple[Array, Array, Array]:
+        """`_ends` of a long log from a start of this excess (None: unknown) to an unknown end: no sample decides it, it is kept."""
+        key = b"" if excess is None else excess.tobytes()
+        if key not in self._starts:
+            if len(self._starts) >= STARTS:
+                self._starts.clear()
+            f = self.observer.filter
+            first = seg.diffuse(self.observer) if excess is None else excess
+            self._starts[key] = _ends(self.observer, first, np.zeros_like(f.prior), 2 * self.observer.settled)
+        return self._starts[key]
 
 
 def smooth(y: Array, observer: Observer | Smoother, start: Start | None = None, out: Array | None = None) -> Track:
@@ -191,9 +200,10 @@ def _smooth_run(smoother: Smoother, y: Run, stretch: _Stretch, later: _Later,
     weigh = np.linalg.inv(eye + later.information @ f.prior)
     pull = later.pull + (later.information @ stretch.shift[..., None])[..., 0]
     adjoint = _stationary(smoother, y, stretch.prior.mean, (weigh @ pull[..., None])[..., 0], out)
-    usual = stretch.prior.excess is None and samples >= 2 * reach and not later.information.any()
+    open_end = samples >= 2 * reach and not later.information.any()
     excess = seg.diffuse(observer) if stretch.prior.excess is None else stretch.prior.excess
-    known, felt, covariance = smoother.open_ends if usual else _ends(observer, excess, weigh @ later.information, samples)
+    known, felt, covariance = (smoother.ends(stretch.prior.excess) if open_end else
+                               _ends(observer, excess, weigh @ later.information, samples))
     offset = seg.spread(excess, known) @ adjoint[..., None]
     count = felt.shape[1]
     out[:, :, :count] += (felt @ offset[:, None])[..., 0].swapaxes(1, 2) * observer.rate[..., None]
