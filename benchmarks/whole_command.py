@@ -121,8 +121,8 @@ def _errors(folder: Path, methods: list[str]) -> list[float]:
 
     from pipelines.log.model_file import read_model
     from pipelines.model.arm import Arm
+    from sample_logs.make_closed_form import from_rest, within_limits
     from sample_logs.make_model import synthetic_arm
-    from sample_logs.make_samples import from_rest, within_limits
 
     truth = synthetic_arm()
     rng = np.random.default_rng([22, 2])

@@ -14,8 +14,8 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_closed_form import NOISE, SAMPLE_TIME, Fourier, averaged_torque, closed_form_logs, torque_step
 from sample_logs.make_model import synthetic_arm
-from sample_logs.make_samples import NOISE, SAMPLE_TIME, Fourier, averaged_torque, closed_form_logs, torque_step
 
 FILES = ["excitation-1.h5", "excitation-2.h5", "free-1.h5", "friction-1.h5", "friction-2.h5", "friction-3.h5",
          "hold-1.h5"]

@@ -16,7 +16,7 @@ from pipelines.log.files import Opened
 from pipelines.model.estimation.floor import Beside
 from pipelines.report.bps_report import bps_report
 from pipelines.stage import Inputs, Request, run_stage
-from sample_logs.make_samples import NOISE, torque_step
+from sample_logs.make_closed_form import NOISE, torque_step
 from tests.estimate_bps.estimates import SYMMETRIC, contents, stage
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment, periodic, truth

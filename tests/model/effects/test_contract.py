@@ -12,8 +12,8 @@ import pytest
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity
 from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_closed_form import Fourier
 from sample_logs.make_model import synthetic_arm
-from sample_logs.make_samples import Fourier
 
 Values = Mapping[str, float]
 

@@ -14,8 +14,7 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.rigid.body import Motion
-from sample_logs.make_model import synthetic_arm
-from sample_logs.make_samples import (
+from sample_logs.make_closed_form import (
     NOISE,
     Fourier,
     averaged_torque,
@@ -25,6 +24,7 @@ from sample_logs.make_samples import (
     torque_step,
     within_limits,
 )
+from sample_logs.make_model import synthetic_arm
 
 COULOMB = (4.8, 2.4, 1.2)  # [N m]
 VISCOUS = (0.6, 0.3, 0.12)  # [N m s/rad]
