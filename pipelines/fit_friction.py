@@ -85,7 +85,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     motions = tuple(pair for joint in joints for pair in joint.logs.identify)
     sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
     model = arm.to_model(validity=validity(motions), sources=sources, notes=_notes(arm, results))
-    return Result(identify[0].robot_name, results, "one joint at a time", model=model, doctor=(*said, *found),
+    return Result(identify[0].robot_name, results, "one joint at a time", (*said, *found), model=model,
                   derived=tuple(_derived(pair, joint, arm, settings) for joint in joints
                                 for pair in (*joint.logs.identify, *joint.logs.validate)))
 
@@ -199,5 +199,5 @@ def _onward(result: Result, inputs: Inputs) -> Inputs:
 
 
 STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report, read_logs, write,
-              lambda result, check: int(check and any(found.gate for found in result.doctor)),
-              lambda result: result.doctor, _onward)
+              lambda result, check: int(check and any(found.gate for found in result.checks)),
+              lambda result: result.checks, _onward)

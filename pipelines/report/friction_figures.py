@@ -55,7 +55,7 @@ def fraction_figure(name: str, caption: str, series: Series, revolute: bool) -> 
     """Torque and its friction, gravity and inertial fractions, Fig. 5."""
 
     def draw(drawing: Drawing) -> None:
-        axes = drawing.subplots(4, 1, sharex=True)
+        axes = drawing.subplots(4, 1, sharex=True, sharey=True)
         rows = (("torque", series.torque, style.BLACK), ("friction", series.friction, style.GREEN),
                 ("gravity", series.gravity, style.PURPLE), ("inertia", series.inertial, style.BLUE))
         for axis, (label, values, color) in zip(axes, rows, strict=True):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from pipelines.model.friction.result import JointResult, Result
+from pipelines.model.friction.result import JointResult, Result, Value
 from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
 from pipelines.report.report import Report, Section, Table, Tone
+from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number, with_std
 
 __all__ = ["friction_report"]
@@ -15,6 +16,8 @@ _GOOD = 0.05  # of the speed error without friction: what the law has to leave
 def friction_report(result: Result) -> Report:
     """The verdict first; then every joint's law, figures and ladder."""
     sections = [_summary(result), *(section for joint in result.joints for section in _joint_sections(joint))]
+    if result.checks:
+        sections.append(Section("What the logs say of themselves", (), (checks_table(result.checks),)))
     return Report("Friction", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
 
 
@@ -28,13 +31,17 @@ def _ratio(joint: JointResult) -> float | None:
     return judged.velocity_error_with / judged.velocity_error_without if judged.velocity_error_without > 0.0 else None
 
 
+def _gravity(joint: JointResult) -> list[tuple[str, Value]]:
+    return [(name, joint.gravity[name]) for name in ("sine", "cosine", "constant") if name in joint.gravity]
+
+
 def _well(joint: JointResult) -> bool:
     ratio = _ratio(joint)
     return ratio is not None and ratio <= _GOOD
 
 
 def _tone(result: Result) -> Tone:
-    if any(check.gate for check in result.doctor or ()):
+    if any(check.gate for check in result.checks):
         return "bad"
     return "good" if all(_well(joint) for joint in result.joints) and not any(j.unseen for j in result.joints) else "attention"
 
@@ -43,7 +50,9 @@ def _verdict(result: Result) -> str:
     laws = "; ".join(f"{joint.name}: {_plain(joint.law)}" for joint in result.joints)
     poor = [joint.name for joint in result.joints if not _well(joint)]
     open_ = [joint.name for joint in result.joints if joint.unseen]
-    words = f"Friction of {len(result.joints)} {'joint' if len(result.joints) == 1 else 'joints'}. {laws}."
+    words = f"{laws[:1].upper()}{laws[1:]}."
+    if gates := [check.message for check in result.checks if check.gate]:
+        words = f"{gates[0][:1].upper()}{gates[0][1:]}. {words}"
     if poor:
         words += f" The simulation of {', '.join(poor)} does not follow the measurement well."
     if open_:
@@ -58,7 +67,7 @@ def _plain(law: str) -> str:
 def _key_figures(result: Result) -> Table:
     rows = []
     for joint in result.joints:
-        gravity = ", ".join(with_std(value.value, value.std) for value in joint.gravity.values())
+        gravity = ", ".join(with_std(value.value, value.std) for _, value in _gravity(joint))
         ratio = _ratio(joint)
         rows.append((joint.name, _plain(joint.law), with_std(joint.inertia.value, joint.inertia.std), gravity,
                      None if ratio is None else 100.0 * ratio))
@@ -68,14 +77,14 @@ def _key_figures(result: Result) -> Table:
 
 def _summary(result: Result) -> Section:
     """Table III, which the print of the paper has lost."""
-    names = list(dict.fromkeys(name for joint in result.joints for name in joint.parameters))
+    names = sorted({name for joint in result.joints for name in joint.parameters})
     rows = []
     for name in names:
         having = [joint.parameters.get(name) for joint in result.joints]
         unit = next(value.unit for value in having if value is not None)
         rows.append((name, *(None if value is None else with_std(value.value, value.std) for value in having), unit))
     rows.append(("J", *(with_std(joint.inertia.value, joint.inertia.std) for joint in result.joints), "kg m^2"))
-    for name in dict.fromkeys(key for joint in result.joints for key in joint.gravity):
+    for name in dict.fromkeys(key for joint in result.joints for key, _ in _gravity(joint)):
         found = [joint.gravity.get(name) for joint in result.joints]
         rows.append((f"gravity, {name}", *(None if v is None else with_std(v.value, v.std) for v in found), "N m"))
     text = ("Compare curves, not labels: several sets of numbers give one curve.",)

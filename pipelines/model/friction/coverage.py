@@ -22,7 +22,6 @@ _ENOUGH = 5  # rows in a class
 _DECADES, _SPEEDS = 1.6, 7
 _STILL = 2e-3  # of the fastest speed
 _REST = 1.0  # [s] of standing still
-_SEEN = 0.9  # share of a number that lies in directions which the rows show
 _VAGUE = 0.5  # of a value, its standard deviation: hardly known
 _WORDS = "drive the joint alone at 7 to 10 constant speeds over two decades, in both directions, with ramps from rest"
 
@@ -71,7 +70,7 @@ def unseen(covered: Coverage, ladder: Ladder) -> tuple[Unseen, ...]:
     elif min(covered.forth, covered.back) < _SPEEDS or covered.decades < _DECADES:
         found.append(Unseen(f"speeds cover {covered.decades:.1f} decades, {covered.forth} steps of five a decade forth and "
                             f"{covered.back} back", _WORDS))
-    vague = [number.name for number in ladder.chosen.fit.numbers if number.seen < _SEEN or number.std > _VAGUE * abs(number.value)]
+    vague = [number.name for number in ladder.chosen.fit.numbers if not number.known or number.std > _VAGUE * abs(number.value)]
     if vague:
         found.append(Unseen(f"{', '.join(vague)} of the chosen law {'are' if len(vague) > 1 else 'is'} hardly known", _WORDS))
     for rival in ladder.rivals:

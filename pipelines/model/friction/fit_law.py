@@ -19,6 +19,7 @@ from pipelines.model.rigid.body import Array
 
 __all__ = ["LawEquations", "LawFit", "Number", "Predicted", "alike", "fit_law", "posture_groups"]
 
+_SEEN = 0.9  # share of a number that must lie in directions which the rows show
 _ALIKE = 0.02  # [rad] by which locked joints may stand apart and the inertia still be the same
 _SCANNED = 120  # rows that a scan for starts looks at
 _STARTS = 2
@@ -35,6 +36,11 @@ class Number:
     unit: str
     low: float  # what it cannot be below
     seen: float  # 1 where the logs show it, 0 where they say nothing
+
+    @property
+    def known(self) -> bool:
+        """Whether the logs tell it from the others; else its value is one of many that give the same curve."""
+        return self.seen >= _SEEN
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ _WORTH = 0.01  # of the mean square: a smaller difference is none, however sure
 _BLOCKS = 20  # of the rows that judge
 _FOLDS = 10
 _FURTHER = 2  # causes beside the first
+_HOPEFUL = 3  # of them are fitted at a time, those that explain most to first order
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +94,12 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
         best = _best(tried)
         if best.law.name in ("viscous", "coulomb", "coulomb+viscous"):
             break  # no single cause helps: two would be chance
-        more = [_beside(judge, best, cause) for cause in causes if cause not in best.law.members]
+        beside = [_beside(judge, best, cause) for cause in causes if cause not in best.law.members]
+        gains = [_gain(judge, best, law, starts) for law, starts in beside]
+        hopeful = [k for k in sorted(range(len(gains)), key=lambda k: -gains[k])[:_HOPEFUL] if gains[k] > 0.5 * _WORTH]
+        more = [judge.try_law(*beside[k]) for k in hopeful]
         tried += more
-        if _alike(best.residual, _best(tried).residual):
+        if not more or _alike(best.residual, _best(tried).residual):
             break
     best = _best(tried)
     able = [one for one in tried if not one.reason and _alike(one.residual, best.residual)]
@@ -103,18 +107,35 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
     return Ladder(tuple(tried), chosen, best, "logs" if judge.validate is not None else "blocks")
 
 
-def _beside(judge: Judge, best: Tried, cause: str) -> Tried:
-    """`best` with one more cause, begun from where it stands."""
+def _beside(judge: Judge, best: Tried, cause: str) -> tuple[Law, list[Array]]:
+    """The law of `best` with one more cause, and where a search for it may begin: the new numbers on their grid."""
     law = with_further(best.law, cause)
     known = {place.name if place.name == "sharpness" else (place.effects, place.name): value
              for place, value in zip(best.law.places, best.fit.theta, strict=True)}
     longest = max(judge.identify.stretches, key=lambda stretch: len(stretch.t))
     starts: dict[bytes, Array] = {}
-    for theta in law.starts(longest.nodes, judge.identify.joint):
+    for theta in law.starts(longest.nodes, judge.identify.joint, 1.0):
         begin = np.array([known.get(place.name if place.name == "sharpness" else (place.effects, place.name), value)
                           for place, value in zip(law.places, theta, strict=True)])
         starts[begin.tobytes()] = begin
-    return judge.try_law(law, list(starts.values()))
+    return law, list(starts.values())
+
+
+def _gain(judge: Judge, best: Tried, law: Law, starts: Sequence[Array]) -> float:
+    """Share of what `best` leaves that the new columns of `law` explain: below `_WORTH` it can never be told from `best`.
+
+    To first order: what of each column lies outside everything that the fitted law can already do, ∂ŷ/∂(β, θ).
+    """
+    found = best.fit.found
+    before = linear_part(found.jacobian, found.residual)
+    arms = judge.identify.arms(found.beta)
+    own = best.law.amplitudes
+    gain = 0.0
+    for theta in starts:
+        more = judge.identify.build(law, arms, theta)[:, own:]
+        after = linear_part(np.hstack([found.jacobian, more]), found.residual)
+        gain = max(gain, before.rss - after.rss)
+    return gain / before.rss if before.rss > 0.0 else 0.0
 
 
 def _best(tried: Sequence[Tried]) -> Tried:

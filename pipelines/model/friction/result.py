@@ -131,7 +131,7 @@ class Result:
     robot: str
     joints: tuple[JointResult, ...]
     source: str  # "one joint at a time" | "all joints at once"
-    doctor: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False, kw_only=True)
+    checks: tuple[Check, ...]  # of the logs, and what the fit says of them
     model: ModelFile = field(metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)
 
@@ -141,8 +141,8 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
     fit, ladder = joint.fit, joint.ladder
     unit = "N m" if fit.joint.revolute else "N"
     several = len(fit.law.members) > 1
-    parameters = {number.name if several else number.name.partition(".")[2]: Value(number.value, number.std if number.seen > 0.0 else None, number.unit)
-                  for number in fit.numbers}
+    parameters = {number.name if several else number.name.partition(".")[2]:
+                  Value(number.value, number.std if number.known else None, number.unit) for number in fit.numbers}
     postures = tuple(_posture(joint, k) for k in range(len(fit.postures)))
     driven = joint.driven
     errors = [_finite(driven.error(simulated)) for simulated in (driven.with_friction, driven.without)]
