@@ -7,8 +7,10 @@ quantisation, whose flips would hide it; two runs with different noise say what 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.model.rigid.body import Array
@@ -18,7 +20,7 @@ from pipelines.model.simulation.run import Noise, run
 
 __all__ = ["Step", "choose_step"]
 
-_STRETCH = 0.4  # [s] length of a stretch that is tried
+_STRETCH = 0.25  # [s] length of a stretch that is tried
 _SHARE = 0.1  # of the noise difference that the step may cause
 _CANDIDATES = (1, 2, 4, 8, 16, 32, 64)  # steps a sample
 _AMPLE = 8  # steps a sample, where noise is what matters
@@ -44,7 +46,7 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
     """
     one = plant if plant.p.ndim == 1 else replace(plant, p=plant.p[0])
     stretches = [experiment.part(first, samples) for first, samples in _stretches(experiment)]
-    random = _noise_difference(one, stretches, noise or Noise.none(experiment.n_joints))
+    random = _noise_difference(one, stretches[:2], noise or Noise.none(experiment.n_joints))
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two counts that have nothing to do with each other
     allowed = np.maximum(_SHARE * np.maximum(random, counted), _UNHEARD)
     calm = [_without_steps(stretch) for stretch in stretches]
@@ -61,12 +63,20 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
 
 
 def _stretches(experiment: Experiment) -> list[tuple[int, int]]:
-    """The first one, where the arm starts, and the one in which joints reverse most often, where friction turns over."""
+    """Where the arm starts, where joints reverse most often and friction turns over, and where they are fastest, accelerate
+    hardest, or are driven hardest."""
     length = min(experiment.n_samples, max(2, round(_STRETCH / experiment.sample_time)))
-    reversals = (np.diff(np.signbit(experiment.dq_ref), axis=0) != 0).sum(axis=1)
-    inside = np.convolve(reversals, np.ones(length))[length - 1:len(reversals)]
-    busiest = int(np.argmax(inside)) if len(inside) else 0
-    return [(0, length)] if busiest == 0 else [(0, length), (busiest, length)]
+    speed = experiment.dq_ref
+    activities = [np.diff(np.signbit(speed), axis=0) != 0, speed[1:] ** 2, np.diff(speed, axis=0) ** 2]
+    if experiment.tau is not None:
+        activities.append(experiment.tau[1:] ** 2)
+    starts = [int(np.argmax(np.convolve(_share(x), np.ones(length - 1), mode="valid"))) for x in activities]
+    return [(first, length) for first in dict.fromkeys([0, *starts])]
+
+
+def _share(activity: npt.NDArray[Any]) -> Array:
+    """(samples,) of (samples, joints): each joint's part of what it does in all, summed over the joints."""
+    return np.asarray((activity / np.maximum(activity.sum(axis=0), 1e-300)).sum(axis=1))
 
 
 def _without_steps(experiment: Experiment) -> Experiment:

@@ -71,7 +71,7 @@ def test_no_step_is_small_enough_for_a_jump() -> None:
     sharp = replace(arm, friction=(*arm.friction[:2], Acting(law, (arm.friction[2].parameters[0], replace(
         arm.friction[2].parameters[1], value=1e8)))))
     with pytest.raises(InputRejected, match="sharpness") as refused:
-        choose_step(Plant.of(sharp), experiment(PD, 400))
+        choose_step(Plant.of(sharp), experiment(PD, 120))
     assert refused.value.code == "RRID-D17"
 
 
