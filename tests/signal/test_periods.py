@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfreqz
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.periods import average_periods
+from pipelines.signal.filters import passed_both_ways
+from pipelines.signal.periods import average_periods, mean_of_periods, passed_std
 
 
 def periodic(samples: int, size: float) -> np.ndarray:
@@ -77,3 +79,54 @@ def test_too_little_is_refused() -> None:
     for period in (0.0, -1.0, np.nan):
         with pytest.raises(UsageError):
             average_periods(x, 1000.0, period)
+
+
+LOW = passed_both_ways(np.arange(251) / 0.5, 40.0, 1000.0)
+
+
+def noisy(periods: int, seed: int = 4) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return periodic(500 * periods, 500) + np.array([0.1, 0.02]) * rng.standard_normal((500 * periods, 2))
+
+
+def test_what_a_low_pass_leaves_is_scipys() -> None:
+    """|H|² of the Butterworth filter, and white noise after it: σ √(mean |H|⁴) over all frequencies."""
+    sos = butter(4, 40.0, fs=1000.0, output="sos")
+    hz = np.arange(251) / 0.5
+    np.testing.assert_allclose(LOW[:-1], np.abs(sosfreqz(sos, hz[:-1], fs=1000.0)[1]) ** 2, rtol=1e-9, atol=1e-15)
+    every = np.abs(sosfreqz(sos, np.fft.fftfreq(20_000, 1e-3), fs=1000.0)[1]) ** 4
+    found = passed_std(average_periods(noisy(200), 1000.0, 0.5).rest, LOW)
+    np.testing.assert_allclose(found, np.array([0.1, 0.02]) * np.sqrt(every.mean()), rtol=0.03)
+
+
+def test_drift_is_told_from_noise() -> None:
+    """Periods that differ at random have order 1 within its deviation; a friction that falls from period to period has less."""
+    alike = average_periods(noisy(5), 1000.0, 0.5).repeats(LOW)
+    assert (np.abs(alike.order - 1.0) < 4.0 * alike.order_std).all()
+    np.testing.assert_allclose(alike.scatter, alike.white, rtol=0.2)
+    x = noisy(5)
+    x[:, 0] += 0.05 * (np.arange(2500) // 500) * np.sign(np.sin(2 * np.pi * np.arange(2500) / 500))
+    drifting = average_periods(x, 1000.0, 0.5).repeats(LOW)
+    assert drifting.order[0] < 0.5
+    assert abs(drifting.order[1] - 1.0) < 4.0 * drifting.order_std[1]
+
+
+def test_a_disturbance_below_the_noise_is_found_in_what_the_low_pass_leaves() -> None:
+    """A slow push of 0.1 where each sample has noise of 0.1: raw, its period is not odd; after the low-pass it is."""
+    x, slow = noisy(6), passed_both_ways(np.arange(251) / 0.5, 10.0, 1000.0)
+    x[1100:1400, 0] += 0.1
+    assert average_periods(x, 1000.0, 0.5).outliers == ()
+    assert average_periods(x, 1000.0, 0.5, amplitude=slow).outliers == (2,)
+
+
+def test_one_count_is_no_odd_period() -> None:
+    """Equal periods, but for one step of an encoder in one of them."""
+    x = np.round(periodic(2500, 500) / 1e-3) * 1e-3
+    x[1234, 0] += 1e-3
+    assert average_periods(x, 1000.0, 0.5, least=np.full(2, 1e-3 / np.sqrt(12.0))).outliers == ()
+
+
+def test_the_mean_of_some_periods() -> None:
+    """Of the signal itself, whatever it is: the third period alone."""
+    x = np.arange(2000.0)[:, None]
+    np.testing.assert_array_equal(mean_of_periods(x, 1000.0, 0.5, (2,))[:, 0], np.arange(1000.0, 1500.0))
