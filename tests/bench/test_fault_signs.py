@@ -89,7 +89,7 @@ def dahl(m: Measured, j: int, distance: float) -> np.ndarray:
 
 
 def drift(m: Measured, j: int, p: Answer) -> np.ndarray:
-    return p.relative_change * FV[j] * (1.0 - np.exp(-m.t / p.time_constant)) * m.dq[:, j]
+    return np.asarray(p.relative_change * FV[j] * (1.0 - np.exp(-m.t / p.time_constant)) * m.dq[:, j])
 
 
 Column = Callable[[Measured, int, Answer], np.ndarray]
