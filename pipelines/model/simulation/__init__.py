@@ -16,7 +16,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.accuracy import Step, choose_step
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.plant import Plant
-from pipelines.model.simulation.run import Noise, Simulated, run
+from pipelines.model.simulation.replicas import Noise, Simulated, run
 from pipelines.model.simulation.windows import Windows, simulate_windows
 
 __all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "run", "simulate", "simulate_windows"]

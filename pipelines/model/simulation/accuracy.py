@@ -16,7 +16,7 @@ from pipelines.errors import InputRejected
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.plant import Plant
-from pipelines.model.simulation.run import Noise, run
+from pipelines.model.simulation.replicas import Noise, run
 
 __all__ = ["Step", "choose_step"]
 

@@ -19,6 +19,8 @@ from pipelines.model.simulation.experiment import Experiment
 
 __all__ = ["Controlling"]
 
+_RIGID = ("inertia", "coriolis", "gravity")
+
 
 class Controlling:
     """The memory of the controllers of all replicas: observer, integral, delayed command. Joints first, replicas last."""
@@ -33,6 +35,7 @@ class Controlling:
         self._integral = np.zeros((n, replicas))
         self._estimate = _estimator(experiment, replicas)
         self._seen = _Observer.of(experiment, replicas) if law.law == "computed-torque" else None
+        self._rigid = _among(law.feedforward, _RIGID)
         self._feedforward = _feedforward(experiment)
         self._waiting = np.repeat(experiment.tau0[:, None], replicas, axis=1)  # of a delayed command
         self._limit = None if law.output_limit is None else law.output_limit[:, None]
@@ -67,10 +70,10 @@ class Controlling:
 
     def _linearising(self, k: int, e: Array, de: Array, r: Array) -> Array:
         experiment = self._experiment
-        t: Array = np.full(e.shape[1], experiment.start_time + k * experiment.sample_time, dtype=np.float64)
-        now = Motion(t, (experiment.q_ref[k][:, None] + e).T, (experiment.dq_ref[k][:, None] + de).T,
-                     np.ascontiguousarray(r.T))
-        torque = _parts(experiment, now, _among(experiment.controller.feedforward, ("inertia", "coriolis", "gravity"))).T
+        assert experiment.feedforward_arm is not None  # Experiment.of_log refuses the law without it
+        body, p = experiment.feedforward_arm.body, experiment.feedforward_arm.p
+        parts = body.torque_parts(experiment.q_ref[k] + e.T, experiment.dq_ref[k] + de.T, r.T, p)
+        torque = sum((getattr(parts, name) for name in self._rigid), np.zeros(e.T.shape)).T
         return np.ascontiguousarray(torque if self._feedforward is None else torque + self._feedforward[k][:, None])
 
     def _limited(self, torque: Array) -> Array:

@@ -25,7 +25,7 @@ from pipelines.model.simulation.accuracy import Step, choose_step
 from pipelines.model.simulation.course import Course, course
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.plant import Plant
-from pipelines.model.simulation.run import Noise, Simulated, run
+from pipelines.model.simulation.replicas import Noise, Simulated, run
 from pipelines.model.simulation.windows import Windows, simulate_windows
 
 __all__ = ["How", "Imitation", "imitate"]
