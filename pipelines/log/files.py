@@ -33,6 +33,7 @@ ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _PARQUET_MAGIC = b"PAR1"
 PROVENANCE = "provenance.json"
+PLANS = ("trajectory.h5", "trajectory.parquet")  # of design-excitation, beside its logs/
 
 
 @dataclass(frozen=True)
@@ -255,8 +256,10 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
             regular_file(path)
             found.append(path)
             continue
-        root = path / "logs" if (path / PROVENANCE).is_file() else path
+        own = (path / PROVENANCE).is_file()
+        root = path / "logs" if own else path
         found += sorted(_below(root, root.resolve(), checks))
+        found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
         raise NothingMatched("C06", "no log there", where=", ".join(map(str, inputs)), remedy="logs end in .h5 or .parquet")
     return tuple(dict.fromkeys(found)), tuple(checks)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["limited_figure", "relative_std_figure", "singular_value_figure", "spectrum_figure"]
 
+_WIDE = 30.0  # ratio from which a scale must be logarithmic
 _WORTH = 0.6  # of a limit: where a signal stays farther away, drawing the limit would flatten it
 
 
@@ -63,16 +64,18 @@ def spectrum_figure(name: str, caption: str, hertz: Array, amplitude: Array, joi
 
 
 def singular_value_figure(name: str, caption: str, values: Sequence[float]) -> Figure:
-    """Singular values, largest first, on a logarithmic scale."""
+    """Singular values, largest first; on a logarithmic scale where they differ much."""
 
     def draw(drawing: Drawing) -> None:
         axis = drawing.subplots()
         place = np.arange(1, len(values) + 1)
-        axis.vlines(place, 0.5 * min(values), values, color=style.GREY, linewidth=1.0)
+        wide = max(values) > _WIDE * min(values)
+        axis.vlines(place, 0.5 * min(values) if wide else 0.0, values, color=style.GREY, linewidth=1.0)
         axis.plot(place, values, "o", color=style.BLUE, markersize=4.5)
-        axis.set_yscale("log")
-        axis.set_ylim(0.5 * min(values), 2.0 * max(values))
-        style.log_ticks(axis.yaxis)
+        if wide:
+            axis.set_yscale("log")
+            style.log_ticks(axis.yaxis)
+        axis.set_ylim(0.5 * min(values) if wide else 0.0, (2.0 if wide else 1.1) * max(values))
         axis.set_xlabel("direction of the parameters")
         axis.set_ylabel("singular value of Φ / √n")
         axis.locator_params(axis="x", integer=True)

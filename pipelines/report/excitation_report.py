@@ -10,7 +10,7 @@ from pipelines.model.excitation.result import DrawnPlan, Result
 from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import joint_signal_figure
-from pipelines.report.style import format_number
+from pipelines.report.style import format_number, format_unit
 
 __all__ = ["excitation_report"]
 
@@ -20,6 +20,7 @@ _AIMS = {"default": "the smallest relative standard deviation with a bounded con
          "E": "the best known worst direction",
          "condition": "the smallest condition number", "frobenius": "the smallest Frobenius condition number"}
 _DRAWN_PLANS = 6
+_NEAR_BOUND = 1.5  # times: what is farther from the bound is no percentage of it
 _DEAR = 0.02  # share of the cost that is worth naming
 
 
@@ -81,7 +82,11 @@ def _safety(result: Result) -> Section:
                     "It was not rehearsed in simulation, for no model of the arm is known." if not result.torque_checked else
                     "It was not rehearsed in simulation.")
     else:
-        end = "no drive saturates, no joint exceeds its speed" if found.safe else "a drive saturates or a joint exceeds its speed"
+        fast = [f"{name} reaches {100 * v / limit:.3g} % of its speed limit" for name, v, limit in
+                zip(result.joints, found.speed_peak, found.speed_limit, strict=True) if v > limit]
+        full = [f"the drive of {name} saturates in {format_number(100 * share, 2)} % of the samples"
+                for name, share in zip(result.joints, found.saturated, strict=True) if share > 0.0]
+        end = ", ".join((*full, *fast)) or "no drive saturates, no joint exceeds its speed"
         text.append(f"Its first {found.seconds:.3g} s were rehearsed in simulation under PD control of 8 Hz a joint, without "
                     f"feed-forward: {end}. Another controller will follow otherwise.")
         tables.append(Table(("joint", "away, rms [rad]", "away, most [rad]", "torque, peak [N m]", "limit [N m]",
@@ -123,7 +128,7 @@ def _motion(result: Result) -> Section | None:
 
 
 def _limits(result: Result) -> Section:
-    rows = tuple(("tip" if one.joint is None else result.joints[one.joint - 1], one.quantity, one.peak, one.limit, one.unit,
+    rows = tuple(("tip" if one.joint is None else result.joints[one.joint - 1], one.quantity, one.peak, one.limit, format_unit(one.unit),
                   100 * one.share, 100 * one.cost) for one in result.limits)
     dear = [one for one in sorted(result.limits, key=lambda one: -one.cost) if one.cost > _DEAR][:3]
     named = ", ".join(f"{one.quantity} of {'the tip' if one.joint is None else result.joints[one.joint - 1]}" for one in dear)
@@ -141,7 +146,7 @@ def _limits(result: Result) -> Section:
 
 
 def _told(result: Result) -> Section:
-    rows = tuple((p.name, p.value, p.std, p.unit, None if not p.value else 100 * p.std / abs(p.value)) for p in result.parameters)
+    rows = tuple((p.name, p.value, p.std, format_unit(p.unit), None if not p.value else 100 * p.std / abs(p.value)) for p in result.parameters)
     relative = [(p.name, 100 * p.std / abs(p.value)) for p in result.parameters if p.value]
     noise = ", ".join(format_number(value, 3) for value in result.noise)
     text = (f"Standard deviations are those of one experiment whose torque has white noise of {noise} N m (standard deviation, "
@@ -160,18 +165,19 @@ def _told(result: Result) -> Section:
 def _certificate(result: Result) -> Section | None:
     if result.lower_bound is None or result.condition_number is None:
         return None
-    above = 100 * (result.condition_number / result.lower_bound - 1.0)
+    ratio = result.condition_number / result.lower_bound
+    beyond = f"{100 * (ratio - 1.0):.3g} % above" if ratio < _NEAR_BOUND else f"{ratio:.3g} times as much"
     return Section("Certificate", (
         f"No motion of this arm has a condition number below √(3/2) = {result.lower_bound:.5f}; this one has "
-        f"{result.condition_number:.4f}, {above:.3g} % above.",
+        f"{result.condition_number:.4f}, {beyond}.",
         "Why: let M = ΦᵀΦ/n, λ its smallest eigenvalue, and b the acceleration of the third link, q̈₂ + q̈₃, with the mean square Z.",
         "First, Z is at least λ. Take the parameter vector that has 1/√2 at p12 and p13 and zero elsewhere. Its torque is "
         "(q̈₂ + q̈₃)/√2 at joint 2 and the same at joint 3: p12's column is q̈₂ at joint 2, p13's is q̈₃ at joint 2 and b at joint 3. "
         "The mean square of that torque is Z/2 + Z/2 = Z, and no unit vector gives less than λ.",
         "Second, the columns of p7, p8 and p9. At joint 1, the mean squares of p8's and p9's column add up to that of b² + "
-        "(q̇₂ + q̇₃)⁴, for their sines and cosines complete each other: at least Z. At joints 2 and 3 both columns are q̈₁ times a cosine and a "
-        "sine, which complete each other too: twice the mean square of q̈₁, and that mean square is the diagonal element of p7. So "
-        "M₈₈ + M₉₉ ≥ 2 M₇₇ + Z.",
+        "(q̇₂ + q̇₃)⁴, for their sines and cosines complete each other: at least Z. At joints 2 and 3 both columns are q̈₁ times a "
+        "cosine and a sine, which complete each other too: twice the mean square of q̈₁, and that mean square is the diagonal "
+        "element of p7. So M₈₈ + M₉₉ ≥ 2 M₇₇ + Z.",
         "Every diagonal element is at least λ, so M₇₇ ≥ λ, and with Z ≥ λ the sum is at least 3 λ. The larger of the two is at "
         "least 1.5 λ, and so is the largest eigenvalue. The condition number of Φ is the root of their ratio.",
         "The argument holds for any motion whatever, periodic or not, and with further columns as well, for these only widen "

@@ -44,7 +44,7 @@ class Budget:
             spent = self.done >= self.limit
         else:
             spent = self.seconds is not None and elapsed + self.reserve * elapsed / max(self.done, 1) >= self.seconds
-        if spent and (self.limit is not None or self.done > self.reserve):
+        if spent and (self.limit is not None or self.done > 0):  # one at least: else there is nothing to answer with
             raise SpentError
         self.done += 1
         if elapsed - self._told >= _TELL_EVERY:

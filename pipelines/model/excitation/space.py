@@ -81,7 +81,7 @@ class MotionSpace:
 
     def __init__(self, harmonics: Harmonics, speed: Array, *, rest: bool, home: Array | None) -> None:
         """`speed` [rad/s] (joints,) that each joint may have; `home` [rad] (joints,): where it starts, None: anywhere."""
-        self.harmonics = harmonics
+        self.harmonics, self.home = harmonics, home
         n, top = harmonics.used.shape
         self.joints, self.width = n, 1 + 2 * top
         weight = 1.0 / np.sqrt(1.0 + (harmonics.omega / (2.0 * np.pi * _KNEE)) ** 2)
@@ -139,11 +139,13 @@ class MotionSpace:
     def random(self, rng: np.random.Generator, low: Array, high: Array) -> Array:
         """A random motion about a posture between `low` and `high` [rad] (joints,); its size is left to the limits."""
         x = rng.normal(size=(self.joints, self.width)) / math.sqrt(self.width)
-        x[:, 0] = rng.uniform(low, high)
+        x[:, 0] = rng.uniform(low, high) if self.home is None else self.home
         return self.project(x.ravel())
 
     def shrunk(self, x: Array, factor: float) -> Array:
         """The same motion about the same place, `factor` times as large."""
         rows = x.reshape(self.joints, self.width).copy()
         rows[:, 1:] *= factor
+        if self.home is not None:  # q0 - home = Σ b/w
+            rows[:, 0] = self.home + factor * (rows[:, 0] - self.home)
         return self.project(rows.ravel())

@@ -1,0 +1,131 @@
+"""The adjoint gradient against the complex step through an arm written again in complex arithmetic; and its speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.robot import RobotDescription
+from pipelines.model.excitation.columns import SHARPNESS, arm_columns
+from pipelines.model.excitation.problem import DesignProblem
+from pipelines.model.excitation.space import MotionSpace
+from pipelines.model.excitation.task import Task, Wishes, plan_task
+from pipelines.model.rigid.base import BaseArm
+from pipelines.model.rigid.choose import rigid_body
+from tests.model.excitation.arms import described, rrr, six_axes, sliding
+from tests.model.excitation.complex_arm import complex_regressor, complex_tip
+
+SHARP = 6
+WEIGHT = 0.03
+
+
+def _problem(task: Task, samples: int = 24) -> DesignProblem:
+    space = MotionSpace(task.harmonics, task.speed, rest=task.rest, home=task.home)
+    return DesignProblem(task.problem, space, samples, task.around)
+
+
+def _complex_value(task: Task, problem: DesignProblem, x: np.ndarray) -> complex:
+    """What is minimised, from eq. (22) on, in complex arithmetic."""
+    space, goal, columns = problem.space, task.problem.goal, task.problem.columns
+    top, n, m = len(space.harmonics.omega), space.joints, problem.samples
+    rows = x.reshape(n, -1) * space.scale
+    w, t = space.harmonics.omega[:, None], np.arange(m) * space.harmonics.period / m
+    a, b = rows[:, 1:1 + top], rows[:, 1 + top:]
+    c, s = np.cos(w * t), np.sin(w * t)
+    motion = np.stack([rows[:, :1] + a / w.T @ s - b / w.T @ c, a @ c + b @ s, (b * w.T) @ c - (a * w.T) @ s])
+    y = complex_regressor(rigid_body(task.robot), motion)
+    if columns.friction:
+        extra = np.zeros((m, n, 3 * n), dtype=complex)
+        for j in range(n):
+            extra[:, j, 3 * j:3 * j + 3] = np.stack([np.tanh(SHARPNESS * motion[1, j]), motion[1, j], np.ones(m)], axis=1)
+        y = np.concatenate([y, extra], axis=2)
+    grams = np.einsum("sja,sjb->jab", y, y) / m
+    power = np.linalg.matrix_power
+    plain = grams.sum(axis=0)[np.ix_(goal.plain, goal.plain)]
+    smooth = 0.5 * (np.log(np.trace(power(plain, SHARP))) + np.log(np.trace(power(np.linalg.inv(plain), SHARP)))) / SHARP
+    if goal.criterion == "condition":
+        value = smooth
+    else:
+        weighed = np.tensordot(goal.noise**-2.0, grams, axes=1)[np.ix_(goal.weighed, goal.weighed)]
+        value = 0.5 * np.log(np.sum(np.diag(np.linalg.inv(weighed)) / goal.sizes[goal.weighed] ** 2) / len(goal.judged))
+    if goal.ceiling is not None:
+        value = value + 10.0 * np.log(1.0 + np.exp(SHARP * (smooth - np.log(goal.ceiling)))) / SHARP
+    limits, beta = task.problem.limits, task.problem.beta
+    signals = [(motion[0, j], *limits.position[j]) for j in range(n) if np.isfinite(limits.position[j]).all()]
+    signals += [(motion[k, j], -one[j], one[j]) for k, one in ((1, limits.speed), (2, limits.acceleration)) for j in range(n)
+                if np.isfinite(one[j])]
+    if beta is not None:
+        tau = y @ beta
+        signals += [(tau[:, j], -limits.torque[j], limits.torque[j]) for j in range(n)]
+    if limits.tip_speed is not None:
+        place, velocity = complex_tip(rigid_body(task.robot), motion)
+        signals.append(((velocity**2).sum(axis=1), -limits.tip_speed**2, limits.tip_speed**2))
+        assert limits.tip_box is not None
+        signals += [(place[:, k], *limits.tip_box[k]) for k in range(3)]
+    walls = sum(-np.log(1.0 - ((y_ - 0.5 * (lo + hi)) / (0.5 * (hi - lo))) ** 2).mean() for y_, lo, hi in signals)
+    return complex(value + WEIGHT * walls)
+
+
+def _task(robot: RobotDescription, criterion: str, **wishes: object) -> Task:
+    given = Wishes(criterion=criterion, frequency=(0.5,), harmonics=(5,), **wishes)  # type: ignore[arg-type]
+    return plan_task(robot, described(robot) if criterion != "condition" else None, given)
+
+
+BOX = (-2.0, 2.1, -2.2, 2.0, -1.5, 2.5)
+TASKS = {
+    "RRR, condition": lambda: _task(rrr(), "condition", rest=False, symmetric=True),
+    "RRR, A below a ceiling, from rest at home, torque": lambda: _task(rrr(), "default"),
+    "RRR, tip": lambda: _task(rrr(), "A", tip_speed=40.0, tip_box=BOX, friction=True),
+    "six axes, friction, tip": lambda: _task(six_axes(), "A", rest=False, tip_speed=40.0, tip_box=BOX),
+    "six axes, condition": lambda: _task(six_axes(), "condition"),
+    "a sliding joint": lambda: _task(sliding(), "A", tip_speed=40.0, tip_box=BOX, rest=False),
+}
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_gradient_against_the_complex_step(name: str) -> None:
+    """Value to 1e-10 and derivative along random directions of the space to 1e-8."""
+    task = TASKS[name]()
+    problem, rng = _problem(task), np.random.default_rng(1)
+    x = problem.start(rng)
+    value, gradient, _ = problem.value(x, SHARP, WEIGHT)
+    assert np.isfinite(value)
+    assert _complex_value(task, problem, x.astype(complex)).real == pytest.approx(value, rel=1e-10)
+    origin = problem.space.project(np.zeros_like(x))
+    for _ in range(3):
+        d = problem.space.project(rng.normal(size=x.shape)) - origin
+        exact = _complex_value(task, problem, x + 1e-30j * d).imag / 1e-30
+        assert abs(float(gradient @ d) - exact) <= 1e-8 * float(np.linalg.norm(gradient) * np.linalg.norm(d))
+
+
+@pytest.mark.parametrize("robot", [rrr(), six_axes(), sliding()], ids=lambda robot: robot.name)
+def test_rows_are_the_regressor_s(robot: RobotDescription) -> None:
+    """Rows for the design are those of the package's regressor, in closed form and by the recursion."""
+    rng = np.random.default_rng(2)
+    for body in (rigid_body(robot), BaseArm(robot)):
+        columns = arm_columns(body, friction=False)
+        motion = rng.normal(size=(3, robot.n_joints, 50))
+        whole = body.regressor(*(part.T for part in motion))
+        for j, (own, row) in enumerate(zip(columns.columns, columns.rows(motion), strict=True)):
+            np.testing.assert_allclose(row.T, whole[:, j][:, own], atol=1e-12)
+            rest = np.setdiff1d(np.arange(whole.shape[2]), own)
+            assert not whole[:, j][:, rest].any()
+
+
+def test_steps_stay_in_the_space() -> None:
+    """Whatever is added along a gradient, the motion starts at rest at home and uses no forbidden harmonic."""
+    task = plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(30,), keep_out=((1.0, 1.5),), home=(0.3, -1.2, 0.4)))
+    problem = _problem(task, 400)
+    x = problem.start(np.random.default_rng(3))
+    _, gradient, _ = problem.value(x, SHARP, WEIGHT)
+    moved = problem.space.series(x - 1e-3 * gradient)
+    q, dq, ddq = moved.at(np.zeros(1))[:, :, 0]
+    np.testing.assert_allclose(q, [0.3, -1.2, 0.4], atol=1e-12)
+    np.testing.assert_allclose(np.concatenate([dq, ddq]), 0.0, atol=1e-10)
+    hertz = moved.omega / (2 * np.pi)
+    inside = (hertz > 1.0 - 1e-9) & (hertz < 1.5 + 1e-9)
+    assert inside.sum() == 6
+    assert not moved.cosine[:, inside].any()
+    assert not moved.sine[:, inside].any()
