@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -15,9 +16,9 @@ from pipelines.fit.varpro import Separable, SeparableFit, fit_separable, linear_
 from pipelines.model.friction.laws import Law, law_named
 from pipelines.model.friction.one_joint import OneJoint, gravity_names
 from pipelines.model.friction.weak_form import Stretch, Windows
-from pipelines.model.rigid.body import Array
+from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["LawEquations", "LawFit", "Number", "Predicted", "alike", "fit_law", "posture_groups"]
+__all__ = ["Equations", "LawEquations", "LawFit", "Number", "Predicted", "alike", "fit_law", "posture_groups"]
 
 _SEEN = 0.9  # share of a number that must lie in directions which the rows show
 _ALIKE = 0.02  # [rad] by which locked joints may stand apart and the inertia still be the same
@@ -137,6 +138,32 @@ class Predicted:
         return self.measured - self.model
 
 
+class Equations(Protocol):
+    """Rows of one joint that a law can be fitted to: those of a joint driven alone, or its rows among all joints'."""
+
+    @property
+    def y(self) -> Array: ...
+
+    @property
+    def width(self) -> int: ...
+
+    @property
+    def postures(self) -> tuple[tuple[float, ...], ...]: ...
+
+    @property
+    def nodes(self) -> Motion: ...
+
+    def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]: ...
+
+    def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array: ...
+
+    def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable: ...
+
+    def thinned(self, rows: int) -> Equations: ...
+
+    def predicted(self, fit: LawFit) -> Predicted: ...
+
+
 @dataclass(frozen=True, eq=False)
 class LawEquations:
     """Stretches of one joint, posture by posture."""
@@ -168,6 +195,15 @@ class LawEquations:
             part[:, self.width * k:self.width * (k + 1)] = stretch.rigid[::self.every]
             parts.append(part)
         return np.vstack(parts)
+
+    @property
+    def nodes(self) -> Motion:
+        """Motion of the longest stretch: where searches for shapes look for speeds and travel."""
+        return max(self.stretches, key=lambda stretch: len(stretch.t)).nodes
+
+    def thinned(self, rows: int) -> LawEquations:
+        """About so many rows, for a scan."""
+        return replace(self, every=max(1, len(self.y) // rows))
 
     @cached_property
     def groups(self) -> tuple[int, ...]:
@@ -230,7 +266,7 @@ def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     return max((abs(x - y) for x, y in zip(a, b, strict=True)), default=0.0)
 
 
-def fit_law(equations: LawEquations, law: Law, starts: Sequence[Array] | None = None, sharpness: float | None = None) -> LawFit:
+def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = None, sharpness: float | None = None) -> LawFit:
     """Fit `law` from the best of `starts`, which are otherwise the grids of its effects.
 
     A law that depends on the load sees that of the fit before, round by round.
@@ -239,8 +275,7 @@ def fit_law(equations: LawEquations, law: Law, starts: Sequence[Array] | None = 
     if law.sees_load:
         arms = equations.arms(fit_law(equations, law_named("coulomb+viscous") or law, None, sharpness).found.beta)
     if starts is None:
-        longest = max(equations.stretches, key=lambda stretch: len(stretch.t))
-        starts = list(law.starts(longest.nodes, arms[0], sharpness))
+        starts = list(law.starts(equations.nodes, arms[0], sharpness))
     begin = list(starts) if len(starts) == 1 else _best_of(equations, law, arms, starts)
     for _ in range(_CARRIED if law.sees_load else 1):
         found = fit_separable(equations.problem(law, arms), begin)
@@ -250,10 +285,9 @@ def fit_law(equations: LawEquations, law: Law, starts: Sequence[Array] | None = 
     return LawFit(law, arms[0], equations.postures, found, equations.width)
 
 
-def _best_of(equations: LawEquations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array]) -> list[Array]:
+def _best_of(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array]) -> list[Array]:
     """The best few of many starts by some of the rows, then the best end of a search among those."""
-    few = replace(equations, every=max(1, len(equations.y) // _SCANNED))
-    problem = few.problem(law, arms)
+    problem = equations.thinned(_SCANNED).problem(law, arms)
     grid = [np.clip(theta, problem.lower, problem.upper) for theta in starts]
     if len(grid) > _STARTS:
         grid = sorted(grid, key=lambda theta: linear_part(problem.columns(theta), problem.y).rss)[:_STARTS]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.fit.varpro import linear_part
-from pipelines.model.friction.fit_law import LawEquations, LawFit, fit_law
+from pipelines.model.friction.fit_law import Equations, LawFit, fit_law
 from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.rigid.body import Array
 
@@ -67,8 +67,8 @@ class Ladder:
 class Judge:
     """What laws are fitted to and judged by: other logs, or blocks of the same ones held out in turn."""
 
-    identify: LawEquations
-    validate: LawEquations | None
+    identify: Equations
+    validate: Equations | None
 
     def residual(self, fit: LawFit) -> Array:
         """What the law leaves (rows,) of rows that it was not fitted to [N m]."""
@@ -112,9 +112,8 @@ def _beside(judge: Judge, best: Tried, cause: str) -> tuple[Law, list[Array]]:
     law = with_further(best.law, cause)
     known = {place.name if place.name == "sharpness" else (place.effects, place.name): value
              for place, value in zip(best.law.places, best.fit.theta, strict=True)}
-    longest = max(judge.identify.stretches, key=lambda stretch: len(stretch.t))
     starts: dict[bytes, Array] = {}
-    for theta in law.starts(longest.nodes, judge.identify.joint, 1.0):
+    for theta in law.starts(judge.identify.nodes, judge.identify.arms()[0], 1.0):
         begin = np.array([known.get(place.name if place.name == "sharpness" else (place.effects, place.name), value)
                           for place, value in zip(law.places, theta, strict=True)])
         starts[begin.tobytes()] = begin
@@ -175,5 +174,5 @@ def _fault(fit: LawFit) -> str:
 
     Numbers that the rows hardly show are no fault: a law that has too many of them judges no better than a simpler one.
     """
-    below = [number.name for number in fit.numbers if number.value < number.low - _SURE * number.std]
+    below = [number.name for number in fit.numbers if number.low >= 0.0 and number.value < number.low - _SURE * number.std]
     return f"{', '.join(below)} would be negative" if below else ""
