@@ -134,3 +134,15 @@ def test_the_command(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out/provenance.json").read_text())["seed"] == 7
     missing = rrrid("simulate", "rrr", cwd=tmp_path)
     assert (missing.returncode, "--like" in missing.stderr) == (2, True)
+
+
+def test_an_open_loop_log_is_said_to_have_no_feedback(tmp_path: Path) -> None:
+    """The moving joint follows the logged torque; the report says what that means."""
+    log = controlled_log(SAMPLES)
+    assert log.controller is not None
+    friction = replace(log, experiment="friction", joint=3, controller=replace(log.controller, law="open-loop"))
+    outcome = simulated(friction, tmp_path, Settings("rrr"))
+    [found] = outcome.result.logs
+    assert (found.simulation, found.law) == ("closed-loop", "open-loop")
+    assert found.torque_rms[2] == 0.0
+    assert "without feedback" in outcome.report.verdict

@@ -55,7 +55,7 @@ def _stays(one: Imitation) -> str:
 def _way(one: Imitation) -> str:
     if one.window is not None:
         return f"in windows of {format_number(one.window * 1e3, 3)} ms that each start where the arm was"
-    return "in closed loop"
+    return "under the logged torque, without feedback" if one.law == "open-loop" else "in closed loop"
 
 
 def _key_figures(logs: Sequence[Imitation]) -> Table:
@@ -79,6 +79,10 @@ def _words(one: Imitation) -> list[str]:
         text.append(f"Simulated in windows of {format_number((one.window or 0.0) * 1e3, 3)} ms ({one.reason}): each starts at the "
                     "reconstructed position and speed and follows the logged torque without feedback. Its error grows with time; "
                     "it is no tracking error.")
+    elif one.law == "open-loop":
+        text.append("Driven open loop: the moving joint follows the logged torque, the others are held as the log says. Nothing "
+                    "corrects the moving joint, so that noise and the smallest error of the model grow with time; a torque that "
+                    "was fed back from the position (a compensation of gravity) is replayed as it was.")
     else:
         text.append("Simulated in closed loop: the controller, the references and the encoders are those of the log.")
     if one.replicas > 1 and one.noise_rms is not None:

@@ -74,6 +74,7 @@ class Imitation:
     files: tuple[str, ...]  # the simulated logs, relative to the output folder; none of windows
     simulation: str  # "closed-loop" | "windowed"
     reason: str  # why only windowed; empty otherwise
+    law: str  # of the log's controller
     samples: int
     replicas: int
     units: tuple[str, ...]  # of position
@@ -181,7 +182,8 @@ def _imitation(about: _About, differences: tuple[Array, Array, Array | None] | N
     q, dq, tau = differences if differences is not None else (None, None, None)
     rms = [None if x is None else _rms(x.reshape(-1, log.n_joints)) for x in (q, dq, tau)]
     return Imitation(
-        log.name, log.source, about.files, about.simulation, about.reason, log.n_samples, about.replicas,
+        log.name, log.source, about.files, about.simulation, about.reason,
+        "unknown" if log.controller is None else log.controller.law, log.n_samples, about.replicas,
         tuple(schema.joint_unit("q", joint.revolute) for joint in joints),
         tuple(schema.joint_unit("tau", joint.revolute) for joint in joints),
         rms[0], None if q is None else np.nanmax(np.abs(q), axis=(0, 1)), rms[1], rms[2], between, about.steps,

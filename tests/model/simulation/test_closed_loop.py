@@ -1,4 +1,4 @@
-"""Closed loops, judged by controllers written anew around Pinocchio, and by the virtual test bench."""
+"""Closed loops, judged by controllers written anew around Pinocchio."""
 
 from __future__ import annotations
 
@@ -8,16 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.bench import controllers
-from pipelines.bench.machine import paper_machine
-from pipelines.bench.plant import Recording
-from pipelines.bench.plant import run as record
-from pipelines.bench.reference import Reference
 from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Noise, Plant, run, simulate
-from tests.bench_support import controller_model
+from pipelines.model.simulation import Noise, Plant, run
 from tests.model.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop, TransferObserver
 
@@ -175,26 +169,3 @@ def test_noise_is_each_replicas_own() -> None:
     calm = run(plant, asked, 2)
     spread = [np.sqrt(np.mean((x.true_q - calm.true_q) ** 2)) for x in (many, loud)]
     assert spread[1] / spread[0] == pytest.approx(2.0, rel=0.05)
-
-
-def recorded(law: controllers.Law, samples: int, seed: int) -> tuple[Recording, Reference]:
-    """The bench's own machine, nuisances off, as MuJoCo moves it."""
-    reference = Reference(TS * np.arange(samples), *waving(samples))
-    return record(paper_machine(), law, reference, seed=seed), reference
-
-
-@pytest.mark.parametrize("law", ["pd", "pd+feedforward"])
-def test_the_bench_sees_no_difference_but_noise(law: str) -> None:
-    """Encoders, command steps, noise, observer in the loop: simulated and recorded position are as far apart as two
-    recordings with different noise, within a factor of two, over 10 s."""
-    samples, arm = 10_000, rrr().arm
-    laws = {"pd": controllers.Decentralised(), "pd+feedforward": controllers.FeedForward(controller_model(arm))}
-    (one, reference), (other, _) = (recorded(laws[law], samples, seed) for seed in (1, 2))
-    like = Experiment(TS, 0.0, one.controller, reference.q, reference.dq, reference.ddq, reference.q[0], np.zeros(3), np.zeros(3),
-                      np.full(3, 1e-5), feedforward_arm=arm)
-    found = simulate(arm, like, NOISE, (9,))
-    noise = np.sqrt(np.mean((one.q - other.q) ** 2, axis=0))
-    ours = np.sqrt(np.mean((found.q[0] - one.q) ** 2, axis=0))
-    assert (ours <= 2.0 * noise).all()
-    torque = np.std(one.tau - other.tau, axis=0)
-    assert (np.std(found.tau[0] - one.tau, axis=0) <= 2.0 * torque).all()
