@@ -7,6 +7,7 @@ delay of one joint alone makes scatter, not an offset: a clock is common to all.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,13 +38,18 @@ class Offset:
     joints: int  # how many joints' torques are understood well enough to say
 
 
-def clock_offset(rows: tuple[Row, ...], motion: Sampled) -> Offset | None:
-    """The offset between the clocks of torque and position, or None where no torque is understood well enough."""
+def clock_offset(rows: tuple[Row, ...], motion: Sampled, joints: Sequence[int] | None = None) -> Offset | None:
+    """The offset between the clocks of torque and position, or None where no torque is understood well enough.
+
+    Args:
+        joints: those to ask (from 0); all of them by default.
+    """
+    joints = range(len(rows)) if joints is None else joints
     time = motion.t - motion.t.mean()
     span = float(np.ptp(motion.t))
-    offset, drift = _coarse(rows, motion), 0.0
+    offset, drift = _coarse(rows, motion, joints), 0.0
     tau = motion.shifted(offset)
-    timed = [j for j, row in enumerate(rows) if _left(row, tau[:, j]) < _EXPLAINED]
+    timed = [j for j in joints if _left(rows[j], tau[:, j]) < _EXPLAINED]
     if not timed or span <= 0:
         return None
     middle = np.array([float(block.mean()) for block in np.array_split(time, _BLOCKS)]) / span
@@ -60,11 +66,13 @@ def _left(row: Row, tau: Array) -> float:
     return float(np.linalg.norm(row.residual(tau)) / max(float(np.linalg.norm(tau - tau.mean())), 1e-300))
 
 
-def _coarse(rows: tuple[Row, ...], motion: Sampled) -> float:
+def _coarse(rows: tuple[Row, ...], motion: Sampled, joints: Sequence[int]) -> float:
     """The best of a few offsets, so that the linear steps start near."""
     offsets = np.linspace(-0.8, 0.8, 17) * motion.reach
-    left = [sum(_left(row, tau) ** 2 for row, tau in zip(rows, motion.shifted(float(offset)).T, strict=True))
-            for offset in offsets]
+    left = []
+    for offset in offsets:
+        tau = motion.shifted(float(offset))
+        left.append(sum(_left(rows[j], tau[:, j]) ** 2 for j in joints))
     return float(offsets[int(np.argmin(left))])
 
 

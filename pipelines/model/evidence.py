@@ -6,12 +6,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.log.doctor.checks_subject import Subject
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.row_fit import Row, Sampled, relative_residual, row_fits
 
 __all__ = ["Evidence"]
+
+_HELD = 0.05  # of the travel of the joint that moves most, a metre taken for a radian
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,16 @@ class Evidence:
     @property
     def residual(self) -> Array:
         return np.diag(self.table)
+
+    @cached_property
+    def telling(self) -> npt.NDArray[np.int_]:
+        """The joints (from 0) whose row can tell anything: those that move.
+
+        A joint that is held sways within its dry friction, of which no row knows, while the moving joints' motion stands in
+        every row: another joint's row may explain its torque better than its own.
+        """
+        travel = self.subject.travel
+        return np.flatnonzero(travel >= _HELD * travel.max())
 
     @property
     def n_joints(self) -> int:

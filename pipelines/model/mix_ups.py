@@ -21,10 +21,9 @@ _SCALES = {"0.5": 0.5, "2": 2.0, "0.1": 0.1, "10": 10.0, "pi/180 (degrees)": np.
 
 def torque_columns(e: Evidence) -> list[Check]:
     """S13: would the torques fit better in another order?"""
-    n, square = e.n_joints, e.table**2
-    orders = permutations(range(n)) if n <= 6 else _pairs(n)
-    best = min(orders, key=lambda order: sum(square[j, k] for j, k in enumerate(order)))
-    moved = [j for j in range(n) if best[j] != j]
+    square = e.table**2
+    best = min(_orders(e, 6), key=lambda order: sum(square[j, k] for j, k in enumerate(order)))
+    moved = [j for j in range(e.n_joints) if best[j] != j]
     if not moved:
         return []
     before, after = e.residual[moved], e.table[moved, [best[j] for j in moved]]
@@ -42,12 +41,24 @@ def _swapped(e: Evidence, signal: str, moved: list[int], order: list[int], befor
                          remedy="correct the column map of the import, or the wiring of the drives")
 
 
-def _pairs(n: int) -> list[tuple[int, ...]]:
-    orders = [tuple(range(n))]
-    for a, b in combinations(range(n), 2):
-        order = list(range(n))
-        order[a], order[b] = b, a
-        orders.append(tuple(order))
+def _orders(e: Evidence, every: int) -> list[tuple[int, ...]]:
+    """Every order of the joints that move, of more than `every` of them every swap; first of all the log's own."""
+    told = e.telling.tolist()
+    orders = []
+    for order in permutations(told) if len(told) <= every else _swaps(told):
+        whole = list(range(e.n_joints))
+        for place, joint in zip(told, order, strict=True):
+            whole[place] = joint
+        orders.append(tuple(whole))
+    return orders
+
+
+def _swaps(joints: list[int]) -> list[list[int]]:
+    orders = [joints]
+    for a, b in combinations(range(len(joints)), 2):
+        order = joints.copy()
+        order[a], order[b] = joints[b], joints[a]
+        orders.append(order)
     return orders
 
 
@@ -61,42 +72,45 @@ def _better(before: Array, after: Array) -> bool:
 
 def position_columns(e: Evidence) -> list[Check]:
     """S13: would the positions fit better in another order, alone or with the torques?"""
-    if _rms(e.residual) < _BAD or e.n_joints < 2:
+    told = e.telling
+    if _rms(e.residual[told]) < _BAD or len(told) < 2:
         return []
     few = e.thinned()
     motion, n = few.motion, e.n_joints
     best: tuple[float, Array, tuple[int, ...], str] | None = None
-    for order in list(permutations(range(n)))[1:] if n <= 3 else _pairs(n)[1:]:
+    for order in _orders(e, 3)[1:]:
         pick = list(order)
         turned = Sampled(motion.t, motion.q[:, pick], motion.dq[:, pick], motion.ddq[:, pick], motion.coulomb[:, pick],
                          motion.torque, motion.at, motion.reach, motion.sample_time)
         table = quick_residual(e.body, turned)
         for signal, residual in (("q", np.diag(table)), ("q and tau", table[np.arange(n), pick])):
-            if best is None or _rms(residual) < best[0]:
-                best = (_rms(residual), residual, order, signal)
-    if best is None or not _better(few.residual, best[1]):
+            if best is None or _rms(residual[told]) < best[0]:
+                best = (_rms(residual[told]), residual[told], order, signal)
+    if best is None or not _better(few.residual[told], best[1]):
         return []
     moved = [j for j in range(n) if best[2][j] != j]
-    return [_swapped(e, best[3], moved, [best[2][j] for j in moved], few.residual, best[1])]
+    return [_swapped(e, best[3], moved, [best[2][j] for j in moved], few.residual[told], best[1])]
 
 
 def encoder_scale(e: Evidence) -> list[Check]:
     """S15: would one joint's angle fit better in another scale? Only a joint whose angle bends the arm can tell."""
-    if _rms(e.residual) < _SCALE_BAD:
+    told = e.telling
+    if _rms(e.residual[told]) < _SCALE_BAD:
         return []
     few = e.thinned()
-    best: tuple[float, Array, int, str] | None = None
-    for joint in range(e.n_joints):
+    best: tuple[float, int, str] | None = None
+    for joint in told.tolist():
         for name, factor in _SCALES.items():
             scale = np.where(np.arange(e.n_joints) == joint, factor, 1.0)
             residual = np.diag(quick_residual(e.body, few.motion, q=few.motion.q * scale, dq=few.motion.dq * scale,
-                                              ddq=few.motion.ddq * scale))
+                                              ddq=few.motion.ddq * scale))[told]
             if best is None or _rms(residual) < best[0]:
-                best = (_rms(residual), residual, joint, name)
-    if best is None or best[0] > _GOOD or best[0] > _SCALE_BETTER * _rms(few.residual):
+                best = (_rms(residual), joint, name)
+    before = _rms(few.residual[told])
+    if best is None or best[0] > _GOOD or best[0] > _SCALE_BETTER * before:
         return []
     return [e.subject.say("S15", "warn",
-                          f"q of joint {best[2] + 1} fits if multiplied by {best[3]}, residual {_rms(few.residual):.2f} -> "
+                          f"q of joint {best[1] + 1} fits if multiplied by {best[2]}, residual {before:.2f} -> "
                           f"{best[0]:.2f}",
-                          signal="q", joint=best[2], gate=True,
+                          signal="q", joint=best[1], gate=True,
                           remedy="correct the gear ratio, the direction or the counts per turn of this encoder")]

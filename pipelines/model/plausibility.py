@@ -92,12 +92,14 @@ def _open(subject: Subject, reason: str) -> tuple[NotTested, ...]:
 
 def _explained(e: Evidence) -> list[Check]:
     """S13: a joint whose torque nothing explains, beside others whose torque is, has another channel's torque or none."""
-    words = ", ".join(f"{v:.2g}" for v in e.residual)
-    lost = np.flatnonzero(e.residual > _UNEXPLAINED)
-    rest = np.delete(e.residual, lost)
+    told = e.telling
+    words = ", ".join(f"{v:.2g}" for v in e.residual[told])
+    lost = told[e.residual[told] > _UNEXPLAINED]
+    rest = np.delete(e.residual[told], np.searchsorted(told, lost))
     clear = lost.size and rest.size and rest.max() < _EXPLAINED and e.residual[lost].min() > _APART * rest.max()
     if not clear:
-        return e.subject.ok("S13", f"each joint's torque fits its own motion best, relative residual {words}")
+        held = "" if len(told) == e.n_joints else "; joints that are only held cannot tell"
+        return e.subject.ok("S13", f"each joint's torque fits its own motion best, relative residual {words}{held}")
     others = ", ".join(f"{v:.2g}" for v in rest)
     return [e.subject.say("S13", "warn",
                           f"joint {j + 1}'s torque is not explained by its motion: relative residual {e.residual[j]:.2g}, "
@@ -109,7 +111,7 @@ def _explained(e: Evidence) -> list[Check]:
 
 def _signs(e: Evidence) -> list[Check]:
     """S14: inertia is positive and friction takes power; a torque with its sign flipped says the opposite of both."""
-    flipped = [j for j in range(e.n_joints) if _negative(e, j)]
+    flipped = [j for j in e.telling.tolist() if _negative(e, j)]
     if not flipped:
         return e.subject.ok("S14", "inertia of every joint is positive", signal="tau")
     where = "all joints" if len(flipped) == e.n_joints > 1 else ", ".join(f"joint {j + 1}" for j in flipped)
@@ -150,7 +152,7 @@ def _ratios(e: Evidence) -> Sequence[Check | NotTested]:
     motion = e.motion
     expected = e.body.torque(motion.q, motion.dq, motion.ddq, known)
     found, seen = [], []
-    for j in range(e.n_joints):
+    for j in e.telling.tolist():
         friction = np.stack([motion.dq[:, j], motion.coulomb[:, j], np.ones(len(motion.t))], axis=-1)
         columns = np.concatenate([expected[:, j:j + 1], friction], axis=1)
         slope = float(np.linalg.lstsq(columns, motion.tau[:, j], rcond=None)[0][0])
@@ -178,14 +180,17 @@ def _unexplained(columns: Array, tau: Array) -> float:
 
 def _clock(e: Evidence) -> Sequence[Check | NotTested]:
     """T06: position and torque were stamped by the same clock."""
-    found = clock_offset(e.rows, e.motion)
+    found = clock_offset(e.rows, e.motion, e.telling.tolist())
     if found is None:
         return e.subject.cannot_tell("T06", "no torque follows its motion closely enough to time it", signal="tau")
+    if found.joints < 2:
+        return e.subject.cannot_tell("T06", "one joint's torque alone is understood, and what its friction does at a reversal looks "
+                                     "like an offset of the clocks", signal="tau")
     ms = 1e3 * e.motion.sample_time
     words = (f"torque lies {abs(found.samples):.2f} ± {found.bound:.2f} samples ({abs(found.samples) * ms:.3g} ms) "
              f"{'behind' if found.samples > 0 else 'ahead of'} the motion")
     drift = f"{found.drift:+.2f} ± {found.drift_bound:.2f} samples over the log"
-    if found.joints > 1 and abs(found.drift) > 1.0 + found.drift_bound:
+    if abs(found.drift) > 1.0 + found.drift_bound:
         return [e.subject.say("T06", "warn",
                               f"the clocks of q and tau drift by {drift}",
                               signal="tau", gate=True,
