@@ -172,7 +172,7 @@ def band(s: Subject) -> list[Check]:
 
 
 def _undersampled(s: Subject, joint: int) -> bool:
-    q, step = s.position[:, joint], s.steps[joint] or 0.0
+    q, step = s.position[:, joint], s.steps[joint] or s.log.robot.joints[joint].encoder_resolution or 0.0
     even = (np.abs(np.diff(s.good.log.t) / s.log.sample_time - 1.0) < 0.5) & ~s.good.jumped[1:, joint]
     d = np.where(even & np.isfinite(np.diff(q)), np.diff(q), 0.0)
     power = float(d @ d)

@@ -15,7 +15,7 @@ from pipelines.log.doctor.faults import quantum, spikes, time_base
 from pipelines.log.files import Opened
 from pipelines.log.limits import sentinels
 from tests.faulty import healthy_without_reference, turning
-from tests.healthy import changed, good_log, healthy_logs, make_log, one_joint, rows, stops, with_signal
+from tests.healthy import changed, good_log, healthy_logs, make_log, one_joint, rest, rows, stops, with_signal
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
@@ -203,3 +203,11 @@ def test_a_speed_that_cannot_be_taken_is_not_within_the_limits() -> None:
     log = rows(healthy_without_reference(good_log()), np.r_[0:30, 80:110])
     (found,) = [c for c in limits(Subject(log)) if c.code == "RRID-D12"]
     assert isinstance(found, NotTested)
+
+
+def test_a_held_joint_that_trembles_by_some_encoder_steps_is_sampled_well_enough() -> None:
+    """At 250 Hz by four steps, too few of them to show the encoder's step: the description gives it."""
+    log = make_log(rest, "hold", duration=2.0)
+    trembling = log.q.copy()
+    trembling[:, 0] = log.q[0, 0] + 1e-5 * np.rint(4.0 * np.sin(0.5 * np.pi * np.arange(log.n_samples) + 0.4))
+    assert [c for c in check_log(with_signal(log, q=trembling)) if c.code == "RRID-T09" and c.level != "ok"] == []
