@@ -42,9 +42,11 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
     """The fewest Runge-Kutta steps a sample whose error is at most a tenth of the difference that noise makes.
 
     Raises:
-        InputRejected: D17, the arm runs away however small the step, or the step would be too small to be of use.
+        InputRejected: D15, the model's inertia matrix is singular or worse; D17, the arm runs away however small the step, or
+            the step would be too small to be of use.
     """
     one = plant if plant.p.ndim == 1 else replace(plant, p=plant.p[0])
+    one.refuse_unphysical(experiment.q_ref[:1])
     stretches = [experiment.part(first, samples) for first, samples in _stretches(experiment)]
     random = _noise_difference(one, stretches[:2], noise or Noise.none(experiment.n_joints))
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two counts that have nothing to do with each other

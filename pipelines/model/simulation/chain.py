@@ -46,7 +46,10 @@ class ManyChains:
         """a (joints, replicas) [rad/s^2] into `out`, for q, dq and the torque that is left for motion, all of that shape."""
         mass, bias = self.equations(q, dq)
         rest = np.moveaxis(torque - bias, 0, -1)[..., None]
-        out[:] = np.linalg.solve(np.moveaxis(mass, -1, 0), rest)[..., 0].T
+        try:
+            out[:] = np.linalg.solve(np.moveaxis(mass, -1, 0), rest)[..., 0].T
+        except np.linalg.LinAlgError:
+            out[:] = np.nan  # whoever simulates refuses it as a runaway
 
     def equations(self, q: Array, dq: Array) -> tuple[Array, Array]:
         """D (joints, joints, replicas) and c + h (joints, replicas)."""

@@ -15,6 +15,7 @@ from typing import cast
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import ArmModel, Hooks
 from pipelines.model.rigid.base import BaseArm
@@ -25,6 +26,8 @@ from pipelines.model.simulation.friction import ManyCurves, stacked
 from pipelines.model.simulation.rrr import ManyRRR
 
 __all__ = ["MovingPlant", "Plant"]
+
+_SINGULAR = 1e-10  # smallest over largest eigenvalue of an inertia matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +74,21 @@ class Plant:
     def plain(self) -> bool:
         """Whether nothing but rigid body and friction moves it: no hook has to be asked on the way."""
         return all(not any((hook.load, hook.actuator, hook.states)) for hook in self.hooks)
+
+    def refuse_unphysical(self, q: Array) -> None:
+        """Look at the inertia matrix in the postures q (postures, joints).
+
+        Raises:
+            InputRejected: D15, some torque would accelerate the arm against itself, or without bound.
+        """
+        p = np.atleast_2d(self.p)[0]
+        values = np.linalg.eigvalsh(self.body.mass_matrix(q, p) + self.added)
+        worst = int(np.argmin(values[:, 0] / values[:, -1]))
+        if values[worst, 0] <= _SINGULAR * values[worst, -1]:
+            where = ", ".join(f"{x:.3g}" for x in q[worst])
+            raise InputRejected("D15", f"at q = ({where}) the model's inertia matrix is not positive definite, its smallest "
+                                f"eigenvalue {values[worst, 0]:.2g}", remedy="such an arm cannot be simulated: fit it to richer "
+                                "motion, or add the rotors' inertia")
 
     def prepared(self, replicas: int) -> MovingPlant:
         return MovingPlant(self, replicas)

@@ -24,6 +24,7 @@ from pipelines.model.simulation.plant import MovingPlant, Plant
 __all__ = ["Noise", "Simulated", "run"]
 
 _CHUNK = 2048  # samples whose noise is drawn at once
+_POSTURES = 32  # of the reference in which the inertia matrix is looked at
 _RUNAWAY = 1e4  # [rad], [rad/s]: no arm is ever there
 
 
@@ -55,9 +56,10 @@ def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = 
     """One replica for each seed, with `steps` Runge-Kutta steps a sample.
 
     Raises:
-        InputRejected: D17, the simulated arm runs away.
+        InputRejected: D15, the model's inertia matrix is singular or worse; D17, the simulated arm runs away.
     """
     seeds = tuple(seeds)
+    plant.refuse_unphysical(experiment.q_ref[::max(1, experiment.n_samples // _POSTURES)])
     replicas, n = len(seeds), experiment.n_joints
     moving, control = plant.prepared(replicas), Controlling(experiment, replicas)
     integrator = _integrator(moving, experiment.sample_time, steps)

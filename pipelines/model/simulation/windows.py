@@ -48,7 +48,8 @@ def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: floa
         usable: (samples,) where motion and torque are known without gaps; everywhere where left out.
 
     Raises:
-        InputRejected: T08, no window fits; D17, the step would be too small to be of use.
+        InputRejected: T08, no window fits; D15, the model's inertia matrix is singular or worse; D17, the step would be too small
+            to be of use.
     """
     good: Mask = np.asarray(np.isfinite(tau).all(axis=1) & np.isfinite(motion.q).all(axis=1))
     if usable is not None:
@@ -57,6 +58,7 @@ def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: floa
     first = _starts(good, uneven, length)
     if not len(first):
         raise InputRejected("T08", f"no window of {length} samples is without a gap", remedy="ask for shorter windows")
+    plant.refuse_unphysical(motion.q[first])
     tried = first[np.linspace(0, len(first) - 1, min(len(first), 32)).astype(int)]
     steps = _steps(plant, motion, tau, sample_time, tried, length)
     q, dq = np.full(motion.q.shape, np.nan), np.full(motion.q.shape, np.nan)

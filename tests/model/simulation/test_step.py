@@ -80,3 +80,15 @@ def test_a_loop_that_is_unstable_is_refused() -> None:
     with pytest.raises(InputRejected, match="joint [123]") as refused:
         run(Plant.of(rrr().arm), experiment(replace(PD, kp=-20 * KP, kd=-KD), 3000), 2)
     assert refused.value.code == "RRID-D17"
+
+
+def test_an_arm_that_cannot_exist_is_refused() -> None:
+    """Negative inertia about the last axis: D15 with the posture, before anything moves."""
+    arm = rrr().arm
+    p = arm.p.copy()
+    p[12] = -0.05
+    impossible, asked = Plant.of(arm.with_body(arm.body, p)), experiment(PD, 100)
+    for attempt in (lambda: run(impossible, asked, 2), lambda: choose_step(impossible, asked)):
+        with pytest.raises(InputRejected, match="positive definite") as refused:
+            attempt()
+        assert refused.value.code == "RRID-D15"
