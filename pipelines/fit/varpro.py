@@ -25,6 +25,7 @@ _STEP = 1e-4  # of a finite difference in θ
 _GAIN = 1e-6  # of the sum of squares: of a thousand rows, a thousandth of what noise alone is worth
 _MOST = 40  # steps
 _DAMPING = 1e-3
+_UNSHOWN = 1e-9  # of the largest slope's square: what hardly shows is held where it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +109,13 @@ def search(problem: Separable, start: Array) -> tuple[Array, Linear]:
         slope = _slopes(problem, theta, now)
         slope = slope - now.basis @ (now.basis.T @ slope)
         normal, downhill = slope.T @ slope, slope.T @ now.residual
+        size = np.diag(normal)
+        if not size.any():  # no row shows any of θ
+            break
+        weight = np.diag(np.maximum(size, _UNSHOWN * size.max()))
         gain = 0.0
         while damping < 1e8:
-            shift = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-300), downhill)
+            shift = np.linalg.solve(normal + damping * weight, downhill)
             there = np.clip(theta + np.clip(shift, -1.0, 1.0), problem.lower, problem.upper)
             other = linear_part(problem.columns(there), problem.y)
             if other.rss <= now.rss:

@@ -57,9 +57,10 @@ class Ladder:
 
     @property
     def rivals(self) -> tuple[Tried, ...]:
-        """Laws as simple as the chosen one, or nearly, that these rows do not tell from it."""
-        return tuple(one for one in self.tried if one is not self.chosen and self.alike(one)
-                     and one.law.size <= self.chosen.law.size + 1
+        """Laws as simple as the chosen one, or nearly, that explain the fitted rows as well: nothing there speaks against them."""
+        own = self.chosen.fit.found.residual
+        return tuple(one for one in self.tried if one is not self.chosen and not one.reason
+                     and _alike(one.fit.found.residual, own) and one.law.size <= self.chosen.law.size + 1
                      and not set(self.chosen.law.members) <= set(one.law.members))
 
 

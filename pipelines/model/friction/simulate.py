@@ -22,7 +22,7 @@ __all__ = ["Simulated", "simulate_joint"]
 
 _STABLE = 1.0  # of step × slope / J: a fourth-order Runge-Kutta step stands 2.7
 _MOST_STEPS = 20  # a sample
-_TURN = 64  # positions in a table, a turn
+_TURN = 128  # positions in a table, a turn
 _FASTEST = 1e4  # [rad/s] beyond it the simulation has run away
 
 
@@ -103,16 +103,16 @@ def _steepest(fit: LawFit) -> float:
 
 def _table(fit: LawFit, stretch: Stretch) -> Callable[[float, float], float]:
     """The law by linear interpolation in asinh(v/v_0), fine about zero, and in position where it depends on that."""
-    fastest = 3.0 * float(np.abs(stretch.dq).max()) + 1.0
-    fine = 0.02 / max(_steepest(fit) / max(float(np.abs(fit.curve(np.array([0.3 * fastest])))[0]), 1e-9), 1.0)
+    fastest = 100.0 * (1.0 + float(np.abs(stretch.dq).max()))  # the axis is a logarithm: reach costs little
+    fine = 0.02 / max(_steepest(fit) / max(float(np.abs(fit.curve(np.array([0.003 * fastest])))[0]), 1e-9), 1.0)
     half = int(np.clip(math.asinh(fastest / fine) / 0.002, 500, 20000))
     axis = np.linspace(-math.asinh(fastest / fine), math.asinh(fastest / fine), 2 * half + 1)
     speed = fine * np.sinh(axis)
-    low, high = float(stretch.q.min()) - 1.0, float(stretch.q.max()) + 1.0
+    low, high = float(stretch.q.min()) - math.pi, float(stretch.q.max()) + math.pi
     places = max(2, math.ceil((high - low) / (2.0 * math.pi) * _TURN))
     positions = np.linspace(low, high, places)
-    rows = [_row(fit, position, speed) for position in positions[:2]]
-    if np.array_equal(rows[0], rows[1]):
+    rows = [_row(fit, position, speed) for position in positions[:3]]
+    if np.array_equal(rows[0], rows[1]) and np.array_equal(rows[0], rows[2]):
         row = rows[0].tolist()
         return _by_speed(row, fine, half / math.asinh(fastest / fine), half)
     table = [_row(fit, position, speed).tolist() for position in positions]
