@@ -3,7 +3,7 @@
     k1 = f(x), k2 = f(x + h/2 k1), k3 = f(x + h/2 k2), k4 = f(x + h k3),   x += h/6 (k1 + 2 k2 + 2 k3 + k4)
 
 Kutta 1901. The torque is constant within a sample, so nothing in f jumps but what friction does at rest. A linearly implicit
-method (Rang & Angermann 2005, ROS34PW2, friction's slope implicit) was tried: it stays stable at any step, but is 2 to 5 times less
+method (Rang & Angermann 2005, ROS34PW2, friction's slope implicit) was tried: it costs more and is mostly 1.5 to 4 times less
 exact at the same step, for what costs accuracy is the passage through zero speed and not the slope at rest.
 """
 
