@@ -1,9 +1,9 @@
-"""Search a landscape with many valleys: islands of starts, the best refined, disturbed and refined again.
+"""Search a landscape with many valleys: many cheap starts, the best lifted, and a small pool refined over and over.
 
-An island begins with several starts on a coarse copy of the problem, a fifth of the harmonics on a fifth of the samples, where
-an evaluation costs next to nothing. Its best are lifted to the fine problem and refined there while the smooth surrogate is
-sharpened and the barrier lowered; then they are disturbed, little and much in turn, as long as that gains. After that the
-next island begins. The best point of all counts.
+Starts are made on a coarse copy of the problem, a fifth of the harmonics on a fifth of the samples, where an evaluation costs
+next to nothing; what they reach there says well what they will reach in the end. The best of them are lifted to the fine
+problem and refined while the smooth surrogate is sharpened and the barrier lowered. They join a pool, whose best members
+are disturbed a little and refined again. Then come the next starts. The best point of all counts.
 
 No step looks at a clock: the evaluations alone decide what is done next.
 """
@@ -64,40 +64,34 @@ _LIFTED = (Round(32, 4e-3, 40), Round(128, 1e-3, 80), Round(400, 3e-4, 120))
 _AGAIN = (Round(32, 2e-3, 40), Round(128, 5e-4, 100), Round(600, 1e-4, 150))
 _STARTS = 8
 _LIFTED_STARTS = 2
-_SIZES = (0.05, 0.15, 0.4)  # of a disturbance, relative to the point
-_POOL = 4
-_PATIENCE = 2 * len(_SIZES)  # disturbances without a gain worth having before the next island
-_GAIN = 1e-3
+_POOL = 5
+_TURNS = (0, 1, 0, 2)  # which member of the pool is refined, the best being 0
+_SIZES = (0.03, 0.03, 0.08, 0.05)  # of the disturbance of each, relative to the point
 
 
 def search(coarse: Landscape, fine: Landscape, lift: Callable[[Array], Array], budget: Budget, rng: np.random.Generator,
            best: Best) -> None:
     """Search until the budget is spent; `best` holds the best point of `fine` at any moment: an interruption loses nothing."""
-    climb = _Climber(fine, budget, best)
+    climb, below = _Climber(fine, budget, best), _Climber(coarse, budget, Best())
+    pool: list[tuple[float, Array]] = []
     try:
         while True:
             starts = []
             for _ in range(_STARTS):
-                local = Best()
-                _Climber(coarse, budget, local).descend(coarse.start(rng), _COARSE, 1e-4)
-                starts.append(local)
-            starts.sort(key=lambda start: start.score)
-            _island(climb, [lift(start.x) for start in starts[:_LIFTED_STARTS] if start.x is not None], rng)
+                score, x = below.descend(coarse.start(rng), _COARSE, 1e-4)
+                lifted = climb.inside(lift(x))
+                climb.look(lifted)  # so that there is something to keep, however early the search is stopped
+                starts.append((score, lifted))
+            starts.sort(key=lambda start: start[0])
+            pool += [climb.descend(x, _LIFTED, 1e-5) for _, x in starts[:_LIFTED_STARTS]]
+            for place, size in zip(_TURNS, _SIZES, strict=True):
+                pool = sorted(pool, key=lambda member: member[0])[:_POOL]
+                place = min(place, len(pool) - 1)
+                found = climb.descend(fine.disturbed(pool[place][1], size, rng), _AGAIN, 1e-5)
+                if found[0] < pool[place][0]:
+                    pool[place] = found
     except SpentError:
         return
-
-
-def _island(climb: _Climber, starts: Sequence[Array], rng: np.random.Generator) -> None:
-    pool = sorted((climb.descend(climb.inside(x), _LIFTED, 1e-5) for x in starts), key=lambda member: member[0])
-    idle, turn = 0, 0
-    while pool and idle < _PATIENCE:
-        size = _SIZES[turn % len(_SIZES)]
-        # the little disturbance is for the best alone; the larger ones give every member of the pool its turn
-        base = pool[0 if turn % len(_SIZES) == 0 else turn % len(pool)]
-        found = climb.descend(climb.land.disturbed(base[1], size, rng), _AGAIN, 1e-5)
-        idle = 0 if found[0] < pool[0][0] - _GAIN else idle + 1
-        pool = sorted([*pool, found], key=lambda member: member[0])[:_POOL]
-        turn += 1
 
 
 def polish(fine: Landscape, x: Array, rounds: Sequence[Round], budget: Budget, best: Best) -> None:
@@ -125,6 +119,10 @@ class _Climber:
 
             x = minimise(function, x, one.iterations, tolerance).x
         return self._own.score, x if self._own.x is None else self._own.x
+
+    def look(self, x: Array) -> None:
+        """Evaluate one point, for it may be the best."""
+        self._value(x, Round(4, 1e-3, 1))
 
     def inside(self, x: Array) -> Array:
         """x, drawn back from the limits until it keeps them."""

@@ -1,0 +1,238 @@
+"""`rrrid design-excitation` against its bars. CPU seconds on one core; medians of several seeds.
+
+    python -m benchmarks.excitation [paper-10 paper-60 paper-300 default bench limits gradient six-axes] [--seeds 5]
+
+paper-…     the paper's problem (N = 100, 13 parameters, limits of speed and acceleration): condition number after so many
+            seconds of the whole command, start-up included. The paper: 3.1; the bound: √(3/2) = 1.22474
+default     30 s: condition number, and predicted relative standard deviation beside the condition-optimal design's
+bench       the same confirmed: parameter error of a least-squares fit on logs of the virtual test bench, 20 noise seeds
+limits      every default design on a grid of 0.1 ms, series summed and torque recursed anew: largest share of a limit
+gradient    against the complex step, and beside forward differences
+six-axes    a Stäubli TX40 by its URDF, rigid and friction columns, 60 s: condition number beside 50 random motions'
+"""
+
+from __future__ import annotations
+
+from benchmarks.side_by_side import race  # isort: skip  # before numpy
+
+import argparse
+import json
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.bench.controllers import Decentralised
+from pipelines.bench.experiments import Experiment
+from pipelines.bench.machine import Machine, paper_machine
+from pipelines.bench.reference import Reference
+from pipelines.bench.session import record
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import open_log
+from pipelines.log.robot import format_robot
+from pipelines.log.robot_files import load_robot
+from pipelines.log.urdf import import_urdf
+from pipelines.model.arm import Arm
+from pipelines.model.estimation.logs import Recipe, fit_logs
+from pipelines.model.estimation.nominal import nominal_columns
+from pipelines.model.excitation.design import landscape
+from pipelines.model.excitation.problem import DesignProblem, grams_of
+from pipelines.model.excitation.task import Wishes, plan_task
+from pipelines.model.motion import Reconstruction, reconstruct
+from pipelines.model.rigid.base import BaseArm
+from pipelines.signal.fourier import FourierSeries
+from tests.model.excitation.test_gradient import SHARP, TASKS, WEIGHT, _complex_value, _problem
+
+TX40 = Path(__file__).resolve().parents[2] / "shared" / "real" / "tx40" / "tx40.urdf"
+PAPER = ("--criterion", "condition", "--symmetric", "--no-rest")
+NOISE_SEEDS = 20
+
+
+def command(*words: str) -> tuple[dict[str, object], Path, float]:
+    """result.json of one command in a fresh process, its folder, and the CPU seconds it took."""
+    folder = Path(tempfile.mkdtemp()) / "out"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    line = [sys.executable, "-m", "rrrid_cli.main", "design-excitation", *words, "--json", "-q", "--out", str(folder)]
+    done = subprocess.run(line, capture_output=True, text=True, check=True, env=os.environ)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return json.loads(done.stdout), folder, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+@cache
+def bare_robot() -> str:
+    """The paper's arm with the paper's limits alone: no links, no torques."""
+    robot = load_robot("rrr")
+    path = Path(tempfile.mkdtemp()) / "paper.toml"
+    path.write_text(format_robot(replace(robot, joints=tuple(replace(j, link=None, torque=np.inf) for j in robot.joints))))
+    return str(path)
+
+
+def paper(seconds: float, bar: float, seeds: int) -> None:
+    found, cpu = [], []
+    for seed in range(1, seeds + 1):
+        # start-up, finishing and files take their share of the time
+        result, _, used = command(bare_robot(), *PAPER, "--no-report", "--seconds", str(seconds - 2.0), "--seed", str(seed))
+        found.append(float(result["condition_number"]))  # type: ignore[arg-type]
+        cpu.append(used)
+    row(f"the paper's problem, {seconds:.0f} s", statistics.median(found), bar, f"{np.round(found, 4)}, CPU {np.round(cpu, 1)} s")
+
+
+@cache
+def designed(criterion: str, seed: int) -> tuple[dict[str, object], Path]:
+    result, folder, _ = command("rrr", "--criterion", criterion, "--seconds", "28", "--seed", str(seed))
+    return result, folder
+
+
+def default(seeds: int) -> None:
+    every = range(1, seeds + 1)
+    mine, other = ([designed(c, seed)[0] for seed in every] for c in ("default", "condition"))
+    row("the default design: condition number", statistics.median(float(r["condition_number"]) for r in mine), 3.0,  # type: ignore[arg-type]
+        str(np.round([float(r["condition_number"]) for r in mine], 3)))  # type: ignore[arg-type]
+    ratio = [float(a["predicted_relative_std"]) / float(b["predicted_relative_std"]) for a, b in zip(mine, other, strict=True)]  # type: ignore[arg-type]
+    row("predicted relative std / the condition-optimal one's", statistics.median(ratio), 0.5, str(np.round(ratio, 3)))
+
+
+def limits(seeds: int) -> None:
+    largest = []
+    for seed in range(1, seeds + 1):
+        _, folder = designed("default", seed)
+        c = json.loads((folder / "coefficients.json").read_text())
+        a, b = np.zeros((3, 100)), np.zeros((3, 100))
+        for j, joint in enumerate(c["joints"]):
+            a[j, np.array(joint["harmonics"]) - 1], b[j, np.array(joint["harmonics"]) - 1] = joint["a"], joint["b"]
+        series = FourierSeries(c["period"], np.array([j["q0"] for j in c["joints"]]), a, b)
+        q, dq, ddq = series.at(np.arange(0.0, c["period"], 1e-4))
+        arm = BaseArm(load_robot("rrr"))
+        p = arm.known_parameters()
+        assert p is not None
+        tau = arm.torque(q.T, dq.T, ddq.T, p).T
+        joints = arm.robot.joints
+        largest.append(max(max(np.abs(dq[j]).max() / joint.velocity, np.abs(ddq[j]).max() / joint.acceleration,
+                               np.abs(tau[j]).max() / (0.9 * joint.torque)) for j, joint in enumerate(joints)))
+    row("limits on a grid of 0.1 ms, largest share used", max(largest), 1.0, str(np.round(largest, 6)))
+
+
+def gradient() -> None:
+    worst = 0.0
+    for make in TASKS.values():
+        task = make()
+        problem, rng = _problem(task), np.random.default_rng(1)
+        x = problem.start(rng)
+        _, g, _ = problem.value(x, SHARP, WEIGHT)
+        d = problem.space.project(rng.normal(size=x.shape)) - problem.space.project(np.zeros_like(x))
+        exact = _complex_value(task, problem, x + 1e-30j * d).imag / 1e-30
+        worst = max(worst, abs(float(g @ d) - exact) / float(np.linalg.norm(g) * np.linalg.norm(d)))
+    row("gradient against the complex step, six problems", worst, 1e-8, "")
+    robot = load_robot("rrr")
+    fine = landscape(plan_task(robot, None, Wishes("condition", symmetric=True, rest=False)))
+    x = fine.start(np.random.default_rng(1))
+    timed = race(lambda: [fine.value(x, 8.0, 0.01) for _ in range(100)], lambda: forward_differences(fine, x), 5)
+    row("… times as fast as forward differences, 603 coefficients", 100 * timed.ratio, 30.0,
+        f"{100 * timed.low:.0f}-{100 * timed.high:.0f}", least=True)
+
+
+def forward_differences(problem: DesignProblem, x: np.ndarray) -> np.ndarray:
+    """With the value alone, as cheap as it can be had: no adjoint is computed for it."""
+    goal, columns = problem.arm.goal, problem.arm.columns
+
+    def value(at: np.ndarray) -> float:
+        rows = columns.rows(problem.space.motion(at, problem.samples))
+        return goal.value(grams_of(columns.columns, rows, len(columns.names)), 8.0)[0]
+
+    base, out = value(x), np.empty(len(x))
+    for k in range(len(x)):
+        moved = x.copy()
+        moved[k] += 1e-7
+        out[k] = (value(moved) - base) / 1e-7
+    return out
+
+
+def six_axes(seeds: int) -> None:
+    found, ratio = [], []
+    median = _random_six_axes()
+    for seed in range(1, seeds + 1):
+        result, _, _ = command(str(TX40), "--criterion", "condition", "--harmonics", "20", "--seconds", "55", "--no-report",
+                               "--set", "design-excitation.rehearse=false", "--seed", str(seed))
+        found.append(float(result["condition_number"]))  # type: ignore[arg-type]
+        ratio.append(found[-1] / median)
+    row("TX40: condition number / median of 50 random motions", statistics.median(ratio), 0.2,
+        f"{np.round(found, 1)}, random {median:.0f}")
+
+
+def _random_six_axes() -> float:
+    robot = import_urdf(TX40)
+    problem = landscape(plan_task(robot, Arm.from_links(robot), Wishes("condition", harmonics=(20,))))
+    rng, goal, columns = np.random.default_rng(0), problem.arm.goal, problem.arm.columns
+    found = []
+    for _ in range(50):
+        rows = columns.rows(problem.space.motion(problem.start(rng, 0.999), problem.samples))
+        found.append(goal.figures(grams_of(columns.columns, rows, len(columns.names))).condition_number)
+    return statistics.median(found)
+
+
+def bench(seeds: int) -> None:
+    """Errors of the fitted base parameters, relative to their sizes (root mean square), and of all together."""
+    machine = paper_machine()
+    kinds: dict[str, list[Reference]] = {"default": [], "condition": [], "random": []}
+    for seed in range(1, seeds + 1):
+        kinds["default"].append(_reference(designed("default", seed)[1]))
+        kinds["condition"].append(_reference(designed("condition", seed)[1]))
+    problem = landscape(plan_task(load_robot("rrr"), Arm.from_links(load_robot("rrr")), Wishes()))
+    for seed in range(seeds):
+        series = problem.space.series(problem.start(np.random.default_rng(seed), 0.999))
+        t = np.arange(10001) * 1e-3
+        kinds["random"].append(Reference(t, *(np.ascontiguousarray(x.T) for x in series.at(t))))
+    error = {kind: [_error(machine, reference, seed) for seed in range(NOISE_SEEDS) for reference in [them[seed % len(them)]]]
+             for kind, them in kinds.items()}
+    for other in ("condition", "random"):
+        for k, words in enumerate(("relative error of each", "error of all together")):
+            mine, theirs = (statistics.median(e[k] for e in error[kind]) for kind in ("default", other))
+            row(f"bench: {words} / that of {other}", mine / theirs, 0.7, f"{100 * mine:.3g} % against {100 * theirs:.3g} %")
+
+
+def _reference(folder: Path) -> Reference:
+    return Reference.of_log(open_log(folder / "trajectory.h5").log)
+
+
+def _error(machine: Machine, reference: Reference, seed: int) -> tuple[float, float]:
+    log = record(machine, (), [Experiment("excitation", "excitation", reference, Decentralised())], seed)[0]
+    p, known = _fitted(log), Arm.from_links(load_robot("rrr")).p
+    sizes = np.maximum(np.abs(known), 0.005 * np.where(np.isin(np.arange(15), [2, 3, 13, 14]), 1.66, 0.818))
+    return float(np.sqrt(np.mean(((p - known) / sizes) ** 2))), float(np.linalg.norm(p - known) / np.linalg.norm(known))
+
+
+def _fitted(log: ExperimentLog) -> np.ndarray:
+    how = Reconstruction()
+    fitted = fit_logs(((log, reconstruct(log, how)),), nominal_columns(log.robot), Recipe(how))
+    return np.asarray(fitted.estimate.beta[:15])
+
+
+def row(name: str, value: float, bar: float, more: str, least: bool = False) -> None:
+    good = value >= bar if least else value <= bar
+    print(f"{name:58s}{value:12.4g}{bar:9.4g}  {'reached' if good else 'MISSED '}  {more}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    bars: dict[str, Callable[[int], None]] = {
+        "paper-10": lambda n: paper(10.0, 1.30, n), "paper-60": lambda n: paper(60.0, 1.26, n),
+        "paper-300": lambda n: paper(300.0, 1.25, n), "default": default, "bench": bench, "limits": limits,
+        "gradient": lambda n: gradient(), "six-axes": six_axes}
+    parser.add_argument("bars", nargs="*", default=[], help=", ".join(bars))
+    parser.add_argument("--seeds", type=int, default=5)
+    given = parser.parse_args()
+    print(f"{'':58s}{'measured':>12s}{'bar':>9s}")
+    for name in given.bars or bars:
+        bars[name](given.seeds)
+
+
+if __name__ == "__main__":
+    main()
