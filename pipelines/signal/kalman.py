@@ -93,8 +93,19 @@ class ExtendedTextbook:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             from filterpy.kalman import ExtendedKalmanFilter
-        n = len(mean)
-        kalman = ExtendedKalmanFilter(dim_x=n, dim_z=1)
+        n, advance = len(mean), self.advance
+
+        class Moving(ExtendedKalmanFilter):  # type: ignore[misc]
+            """filterpy's filter with this model in the place of its linear one."""
+
+            x: Array
+
+            def predict_x(self, u: Any = 0) -> None:
+                ahead, moving = advance(self.x[:, 0], float(u))
+                self.F[:len(moving)] = moving
+                self.x = ahead[:, None]
+
+        kalman = Moving(dim_x=n, dim_z=1)
         kalman.x, kalman.P = np.array(mean, dtype=np.float64)[:, None], np.array(covariance, dtype=np.float64)
         kalman.Q, kalman.R = self.process, np.array([[self.noise_variance]])
         kalman.F = np.eye(n)
@@ -104,8 +115,5 @@ class ExtendedTextbook:
             if np.isfinite(y[k]):
                 kalman.update(np.array([[y[k]]]), lambda x: seen, lambda x: x[:1])
             states[k], covariances[k] = kalman.x[:, 0], kalman.P
-            ahead, moving = self.advance(kalman.x[:, 0], float(u[k]))
-            kalman.F[:len(moving)] = moving
-            kalman.P = kalman.F @ kalman.P @ kalman.F.T + kalman.Q  # filterpy's own predict_x is linear
-            kalman.x = ahead[:, None]
+            kalman.predict(u[k])
         return Reference(states, covariances)

@@ -28,6 +28,7 @@ __all__ = ["Stretch", "Windows", "stretches_of", "swaying"]
 
 _PARTS = 8  # of an interval in which speed passes zero
 _NEAR = 2.0  # changes of speed within a sample: nearer to zero, the sign of friction may turn over inside
+_LITTLE = 1e-4  # of the fastest speed: what creeps more slowly does not need its every sample
 _STEADY = 20.0  # a speed that changes by less than a twentieth: one node for several samples
 _MOST = 5  # of them
 _COARSEST = 5e-3  # [s]
@@ -130,7 +131,8 @@ class Stretch:
         """Times between the nodes [s] (nodes + 1,): fine where friction may change its sign, coarse where speed hardly changes."""
         v, t = self.dq, self.t
         nearest = np.where(v[1:] * v[:-1] <= 0.0, 0.0, np.minimum(np.abs(v[1:]), np.abs(v[:-1])))
-        fine = nearest < _NEAR * np.abs(np.diff(v))
+        little = _LITTLE * float(np.abs(v).max())
+        fine = (nearest < _NEAR * np.abs(np.diff(v))) & (np.abs(np.diff(v)) > little)
         parts = np.where(fine, _PARTS, 1)
         size = self._group
         if size > 1:
@@ -138,7 +140,8 @@ class Stretch:
             group = np.abs(np.stack([v[k:whole + k:size] for k in range(size + 1)]))
             slowest = group.min(axis=0)
             alone = nearest[:whole].reshape(-1, size).min(axis=1) > 0.0
-            steady = np.repeat(alone & (slowest > _STEADY * (group.max(axis=0) - slowest)), size)
+            still = group.max(axis=0) < little
+            steady = np.repeat(still | (alone & (slowest > _STEADY * (group.max(axis=0) - slowest))), size)
             inside = np.arange(whole) % size > 0
             parts[:whole][steady & inside] = 0  # the node before reaches over it
         at = np.repeat(np.arange(len(parts)), parts)
