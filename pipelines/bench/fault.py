@@ -87,6 +87,11 @@ class Case:
         return max(self.machine.torque_limit) / 60.0
 
     @property
+    def tip_size(self) -> float:
+        """What its tip can bear beside the RRR arm's, by the weakest joint."""
+        return min(self.machine.torque_limit) / 15.0
+
+    @property
     def coulomb(self) -> float:
         """The joint's dry friction [N m]."""
         return self.machine.friction[self.index].coulomb

@@ -31,7 +31,7 @@ class Contact(Fault):
         x, y, z = case.rng.normal(size=3).tolist()
         length = (x * x + y * y + z * z) ** 0.5
         begin, lasting = case.rng.uniform(0.2, 0.6) * case.duration, case.rng.uniform(0.1, 0.3)
-        return cls(None, float(begin), float(lasting), 25.0 * case.size, (x / length, y / length, z / length))
+        return cls(None, float(begin), float(lasting), 25.0 * case.tip_size, (x / length, y / length, z / length))
 
     def scaled(self, factor: float) -> Self:
         return replace(self, force=factor * self.force)

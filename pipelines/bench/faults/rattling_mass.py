@@ -35,7 +35,7 @@ class RattlingMass(Fault):
     @classmethod
     def full(cls, case: Case) -> Self:
         turn = case.phase()
-        return cls(None, 0.4 * case.size, 0.02, (float(np.cos(turn)), float(np.sin(turn)), 0.0))
+        return cls(None, 0.4 * case.tip_size, 0.02, (float(np.cos(turn)), float(np.sin(turn)), 0.0))
 
     def scaled(self, factor: float) -> Self:
         return replace(self, mass=factor * self.mass)

@@ -37,7 +37,7 @@ class SloshingLoad(Fault):
     @classmethod
     def full(cls, case: Case) -> Self:
         axis, across = np.linalg.qr(case.rng.normal(size=(3, 2)))[0].T.tolist()
-        return cls(None, 0.5 * case.size, 0.08, tuple(axis), tuple(across))
+        return cls(None, 0.5 * case.tip_size, 0.08, tuple(axis), tuple(across))
 
     def scaled(self, factor: float) -> Self:
         return replace(self, mass=factor * self.mass)
