@@ -30,8 +30,9 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from pipelines.signal.chain import held_input, transition
+from pipelines.signal.long_logs import smooth_in_parts
 from pipelines.signal.observer import Observer, Start, design, observe
-from pipelines.signal.smoother import Smoother, smooth, smooth_in_parts
+from pipelines.signal.smoother import Smoother, smooth
 
 T, STEP = 1e-3, 1e-5
 SIGMA, R = np.array([200.0, 500.0, 3770.0]), STEP**2 / 12

@@ -26,7 +26,8 @@ from pipelines.log.doctor.faults import Mask, quantum
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.limits import shorter_than_period
-from pipelines.model.motion import Mean, Measured, Reconstructed, Reconstruction, encoder_resolution, measured, reconstruct
+from pipelines.model.measured import Measured, measured
+from pipelines.model.motion import Mean, Reconstructed, Reconstruction, encoder_resolution, reconstruct
 from pipelines.model.rigid.body import Motion
 from pipelines.signal.filters import passed_both_ways
 from pipelines.signal.grid import Grid, grids, lay_on

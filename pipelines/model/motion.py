@@ -19,46 +19,24 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import InputRejected, UsageError
 from pipelines.log.derive import derived_by
 from pipelines.log.doctor.faults import Mask
-from pipelines.log.doctor.segments import Usable, long_blocks, usable
+from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.order_statistics import distinct, median
+from pipelines.log.order_statistics import median
+from pipelines.model.measured import Measured, measured
 from pipelines.model.rigid.body import Motion
+from pipelines.model.trackers import difference_tracker, filter_tracker
 from pipelines.model.tuned import METHODS, Observers, Reconstruction, encoder_resolution, tuned_observers
-from pipelines.signal.grid import Grid, Tracker, grids, on_grid
-from pipelines.signal.observer import Observer, Track, observe
-from pipelines.signal.smoother import Smoother, smooth, twicing_growth
+from pipelines.signal.grid import Tracker, on_grid
 
-__all__ = ["METHODS", "Mean", "Measured", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "measured",
-           "noise_response", "reconstruct"]
+__all__ = ["METHODS", "Mean", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "noise_response", "reconstruct"]
 
 Indices = npt.NDArray[np.intp]
-Run = Callable[[Array], tuple[Array, Array]]
 
 _SIGNALS = ("q_hat", "dq_hat", "ddq_hat")
-_LONG = 4096  # missing samples: of more, only the first are predicted
-_END = 1024
-_LEAD = 2  # missing samples at the very start that are predicted from what comes after
 _VAGUE = 2.0  # times the usual standard deviation of the acceleration
 _BEYOND = 5.0  # usual deviations: no cap below it, however still a joint stands
-_CUTOFF_HZ = 100.0  # of the zero-phase filter where no bandwidth is asked for
-_FASTEST = 0.4  # of the rate, its cut-off
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """The positions of a log as the filters see them."""
-
-    good: Usable
-    y: Array  # (kept samples, joints) [rad], unwrapped, NaN where missing or a glitch
-    step: float  # [s] nominal
-    grids: tuple[Grid, ...]  # stretches of an unbroken clock
-
-    @property
-    def longest(self) -> Grid:
-        return max(self.grids, key=lambda grid: grid.last - grid.first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,28 +76,6 @@ class Mean:
     fold: Callable[[Array], Array]  # from any signal of the source, (kept samples, channels), to its mean and the copies
 
 
-def measured(log: ExperimentLog, good: Usable | None = None) -> Measured:
-    """The positions of `log` on even grids.
-
-    Raises:
-        InputRejected: T04, no stretch of it is long enough; T05, its clock is too uneven.
-    """
-    good = usable(log) if good is None else good
-    if not good.runs:
-        raise InputRejected("T04", "no stretch without a gap is long enough to reconstruct motion from",
-                            where=log.source or log.name, remedy="'rrrid inspect' shows what is missing; record again")
-    y = np.where(good.position_spikes, np.nan, good.log.q)
-    lost = np.isnan(y)
-    if lost.all(axis=0).any():
-        raise InputRejected("D02", f"joint {int(np.argmax(lost.all(axis=0))) + 1} has no measurement at all",
-                            where=log.source or log.name, remedy="leave the joint out, or record it again")
-    edges = np.flatnonzero(np.diff(lost.any(axis=1).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    ends = [place for a, b in edges.tolist() if b - a > _LONG for place in (a + _END, b)]
-    cuts = np.concatenate([np.flatnonzero(good.jumped.any(axis=1)), [good.end], ends]).astype(np.intp)
-    step = log.sample_time if good.time.known else good.time.median
-    return Measured(good, y, step, tuple(grids(good.log.t, step, cuts)))
-
-
 def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = None) -> Reconstructed:
     """The motion of `log`; `good` is `usable(log)`, for whoever has it already.
 
@@ -134,7 +90,7 @@ def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = N
     states, std = np.full((3, *seen.y.shape), np.nan), np.full((3, *seen.y.shape), np.nan)
     filtering = how.method in ("smoother", "observer")
     tuned = tuned_observers(seen.good, seen.y, seen.longest, seen.step, how) if filtering else None
-    track = _differences(seen, how) if tuned is None else _filter(tuned, how)
+    track = difference_tracker(seen, how) if tuned is None else filter_tracker(tuned, how)
     for grid in seen.grids:
         rows = slice(grid.first, grid.last)
         if grid.size > 1 and np.isfinite(seen.y[rows]).any():
@@ -157,10 +113,10 @@ def noise_response(log: ExperimentLog, found: Reconstructed, how: Reconstruction
     seen, joints = measured(log, found.good), log.n_joints
     track: Tracker
     if found.std is None:
-        track, variance = _differences(seen, how), encoder_resolution(found.good) ** 2 / 12.0
+        track, variance = difference_tracker(seen, how), encoder_resolution(found.good) ** 2 / 12.0
     else:
         tuned = found.observers or tuned_observers(seen.good, seen.y, seen.longest, seen.step, how)
-        track, variance = _filter(tuned, how), tuned.smoothing.noise_variance
+        track, variance = filter_tracker(tuned, how), tuned.smoothing.noise_variance
     response = track(np.sqrt(variance) * rng.standard_normal((samples, joints)))[0][:3]
     return np.nan_to_num(response), variance
 
@@ -169,117 +125,6 @@ def _taken(log: ExperimentLog, good: Usable) -> Reconstructed:
     motion = Motion(log.t, log["q_hat"], log["dq_hat"], log["ddq_hat"])
     known = "q_hat_std" in log
     return Reconstructed(motion, (log["q_hat_std"], log["dq_hat_std"], log["ddq_hat_std"]) if known else None, None, good, True)
-
-
-def _filter(tuned: Observers, how: Reconstruction) -> Tracker:
-    """The filter of one grid: (samples, joints) with NaN where missing -> (3 or more, samples, joints) and deviations."""
-    if how.method == "observer":
-        return _padded(tuned.causal, lambda y, joints: observe(y, tuned.causal if joints is None else tuned.causal.pick(joints)))
-    inner, outer = _smoother(tuned.smoothing), _smoother(tuned.causal)
-    if not tuned.twice:
-        return inner
-    inner = _twice(inner, tuned.smoothing.order)
-
-    def run(y: Array) -> tuple[Array, Array]:
-        (states, std), (ends, ends_std) = inner(y), outer(y)
-        for j, reach in enumerate(_reach(tuned.smoothing).tolist()):
-            near = _near_ends(np.isnan(y[:, j]), reach)
-            states[:, near, j], std[:, near, j] = ends[:, near, j], ends_std[:, near, j]
-        return states, std
-
-    return run
-
-
-def _twice(run: Run, order: int) -> Run:
-    """What `run` leaves of the samples goes through it once more, and is added. See `Observers`."""
-
-    def again(y: Array) -> tuple[Array, Array]:
-        states, std = run(y)
-        more, _ = run(y - states[0])
-        growth = np.ones(len(states))
-        growth[:order] = twicing_growth(order)
-        return states + more, std * growth[:, None, None]
-
-    return again
-
-
-def _smoother(observer: Observer) -> Run:
-    own = Smoother(observer)
-    return _padded(observer, lambda y, joints: smooth(y, own if joints is None else own.pick(joints)))
-
-
-def _padded(observer: Observer, filter_: Callable[[Array, Indices | None], Track]) -> Run:
-    """`filter_` over the joints and samples that it can know; NaN elsewhere; and an acceleration whatever the order."""
-    order = observer.order
-
-    def run(y: Array) -> tuple[Array, Array]:
-        states, std = (np.full((max(3, order), *y.shape), np.nan) for _ in range(2))
-        present = np.isfinite(y)
-        lead = present.argmax(axis=0)
-        lead[lead <= _LEAD] = 0
-        lead[present.sum(axis=0) <= order] = len(y)  # fewer samples than states: the joint is not known here
-        for first in distinct(lead[lead < len(y)]).tolist():
-            joints = np.flatnonzero(lead == first)
-            whole = len(joints) == y.shape[1]
-            track = filter_(y[first:], None) if whole else filter_(y[first:, joints], joints)
-            where = slice(None) if whole else joints
-            states[:order, first:, where] = track.states
-            std[:order, first:, where] = track.full_std()
-        if order == 2:  # the held acceleration itself, known as well as it is bounded
-            states[2] = np.gradient(states[1], observer.sample_time, axis=0)
-            std[2] = np.where(np.isfinite(std[1]), observer.jerk_std, np.nan)
-        return states, std
-
-    return run
-
-
-def _reach(observer: Observer) -> Indices:
-    """(joints,) samples after which an end is forgotten to about 1/1000."""
-    samples = 7.0 / -np.log(np.abs(observer.filter.poles).max(axis=1))
-    return np.asarray(np.ceil(samples), dtype=np.intp)
-
-
-def _near_ends(lost: Mask, reach: int) -> Mask:
-    """Samples within `reach` of an end or of a long block that is missing."""
-    near = np.zeros(len(lost), dtype=bool)
-    for a, b in [(0, 0), (len(lost), len(lost)), *long_blocks(lost)]:
-        near[max(0, a - reach):b + reach] = True
-    return near
-
-
-def _differences(seen: Measured, how: Reconstruction) -> Tracker:
-    """Central differences, of the samples or of what a zero-phase low-pass leaves of them: textbook rivals without deviations."""
-    lowest, highest = 1.0 / (seen.longest.size * seen.step), _FASTEST / seen.step
-    if how.method == "zero-phase" and not all(lowest <= hz <= highest for hz in how.bandwidth or ()):
-        raise UsageError("C02", "a cut-off whose period is longer than the log, or near half the rate", where="--bandwidth",
-                         remedy=f"choose between {lowest:.2g} and {highest:.3g} Hz")
-
-    def central(y: Array) -> tuple[Array, Array | None]:
-        dq, ddq = np.full_like(y, np.nan), np.full_like(y, np.nan)
-        dq[1:-1] = (y[2:] - y[:-2]) / (2.0 * seen.step)
-        ddq[1:-1] = (y[2:] - 2.0 * y[1:-1] + y[:-2]) / seen.step**2
-        return np.stack([y, dq, ddq]), None
-
-    def zero_phase_central(y: Array) -> tuple[Array, Array | None]:
-        from pipelines.signal.filters import design_low_pass, zero_phase
-
-        whole = y if np.isfinite(y).all() else _completed(seen, y)
-        cutoff = _CUTOFF_HZ if how.bandwidth is None else max(how.bandwidth)
-        low_pass = design_low_pass(min(cutoff, highest), 1.0 / seen.step)
-        return central(zero_phase(whole, low_pass) if len(y) > low_pass.padding else whole)
-
-    return zero_phase_central if how.method == "zero-phase" else central
-
-
-def _completed(seen: Measured, y: Array) -> Array:
-    """Missing samples as the smoother predicts them."""
-    how = Reconstruction()
-    states, _ = _filter(tuned_observers(seen.good, seen.y, seen.longest, seen.step, how), how)(y)
-    whole, at = np.where(np.isfinite(y), y, states[0]), np.arange(len(y))
-    for column in whole.T:  # before the first sample, or a joint without any
-        known = np.isfinite(column)
-        column[~known] = np.interp(at[~known], at[known], column[known]) if known.any() else 0.0
-    return whole
 
 
 def _known_at_all(seen: Measured, states: Array, std: Array, tuned: Observers | None) -> Array:

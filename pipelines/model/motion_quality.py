@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.motion import Measured, Reconstructed
+from pipelines.model.measured import Measured
+from pipelines.model.motion import Reconstructed
 from pipelines.model.tuned import encoder_resolution
 from pipelines.signal.grid import lay_on
 from pipelines.signal.observer import Observer

@@ -11,9 +11,10 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import NOT_STORED
 from pipelines.log.schema import joint_unit
 from pipelines.model import motion_quality as quality
-from pipelines.model.estimation.regression import condition
+from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff
 from pipelines.model.mean_period import NoiseFloor, mean_period, noise_floor
-from pipelines.model.motion import Measured, Reconstructed, Reconstruction, measured
+from pipelines.model.measured import Measured, measured
+from pipelines.model.motion import Reconstructed, Reconstruction
 from pipelines.model.tuned import Observers, encoder_resolution, tuned_observers
 from pipelines.signal.observer import Observer
 from pipelines.signal.tuning import smoother_bandwidth
@@ -133,7 +134,7 @@ def assess(log: ExperimentLog, found: Reconstructed, how: Reconstruction, place:
 def _periods(log: ExperimentLog, seen: Measured, found: Reconstructed,
              how: Reconstruction) -> tuple[NoiseFloor | None, MeanResult | None]:
     """What differs between periods, before and after the low-pass that an estimate would choose, and their mean."""
-    cutoff = condition(found.motion, 1.0 / seen.step, None, None, np.zeros(log.n_joints)).cutoff_hz
+    cutoff = cutoff_at(wanted_cutoff(found.motion, 1.0 / seen.step), 1.0 / seen.step)
     if not how.average:
         return noise_floor(log, found, cutoff), None
     floor, mean = mean_period(log, found, cutoff)

@@ -12,7 +12,6 @@ predicted state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,7 +23,7 @@ from pipelines.signal import segments as seg
 from pipelines.signal.observer import BLOCK, STARTS, Observer, Start, Track, advance, block_starts, checked, chunks, filter_run
 from pipelines.signal.segments import Part, Piece, Prior, Run
 
-__all__ = ["Smoother", "smooth", "smooth_in_parts", "twicing_growth"]
+__all__ = ["Smoother", "smooth", "twicing_growth"]
 
 Array = npt.NDArray[np.float64]
 
@@ -116,29 +115,6 @@ def smooth(y: Array, observer: Observer | Smoother, start: Start | None = None, 
         if not whole:
             states[part.joints] = room
     return Track(states.transpose(1, 2, 0), own.std, tuple(pieces))
-
-
-def smooth_in_parts(read: Callable[[int, int], Array], samples: int, observer: Observer,
-                    size: int = 65536) -> Iterator[tuple[int, Array]]:
-    """The same for a log of any length in constant memory: (first sample, states (order, size, joints)) part by part.
-
-    `read(first, last)` gives measured samples. Each part is smoothed with as many samples on either side as the filter
-    needs to forget them, so the parts join to about 1e-15 of the signal.
-    """
-    own, reach = Smoother(observer), observer.settled
-    for first in range(0, samples, size):
-        last = min(samples, first + size)
-        before, behind = max(0, first - reach), min(samples, last + reach)
-        while True:
-            y = read(before, behind)
-            known = np.isfinite(y)
-            short = known[:first - before].sum(axis=0).min() < reach and before > 0
-            brief = known[last - before:].sum(axis=0).min() < reach and behind < samples
-            if not (short or brief):
-                break
-            before = max(0, first - 2 * (first - before)) if short else before
-            behind = min(samples, last + 2 * (behind - last)) if brief else behind
-        yield first, smooth(y, own).states[:, first - before:last - before]
 
 
 def twicing_growth(order: int) -> Array:

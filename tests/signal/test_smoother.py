@@ -8,8 +8,9 @@ from scipy.integrate import quad
 
 from pipelines.errors import InputRejected
 from pipelines.signal.kalman import Textbook
+from pipelines.signal.long_logs import smooth_in_parts
 from pipelines.signal.observer import Start, design, observe
-from pipelines.signal.smoother import Smoother, smooth, smooth_in_parts, twicing_growth
+from pipelines.signal.smoother import Smoother, smooth, twicing_growth
 from tests.signal.chains import assert_near, exact_smoother, swing, walk, with_gaps
 
 T, STEP = 1e-3, 1e-5

@@ -124,8 +124,7 @@ def _deviate(chi_square: float, freedom: int, rest: int) -> float:
 
 def _groups(logs: Sequence[LogEquations], least: int) -> list[Gram]:
     """The statistics of consecutive stretches: `least` of them or up to twice as many, where there are as many windows."""
-    samples = sum(run.stop - run.start for one in logs for run in one.counted)
-    windows = samples / max(2.0, _WINDOW / logs[0].found.good.log.sample_time)
+    windows = sum((run.stop - run.start) / _size(one) for one in logs for run in one.counted)
     balances = chain.from_iterable(_balances(one) for one in logs)
     parts = gather_growing(split(balances, max(1, int(windows / least))), least)
     return [part for part in parts if part.counts.any()]
@@ -163,10 +162,15 @@ class _Part:
         return energy(body, self.motion.q[self.ends], self.motion.dq[self.ends])
 
 
+def _size(one: LogEquations) -> int:
+    """Samples of a window."""
+    return max(2, round(_WINDOW / one.found.good.log.sample_time))
+
+
 def _parts(one: LogEquations) -> Iterator[_Part]:
     good, motion = one.found.good, one.found.motion
     bad = one.rows.out | one.rows.slow.any(axis=1)
-    size = max(2, round(_WINDOW / good.log.sample_time))
+    size = _size(one)
     length = max(1, _PIECE // size) * size
     for run in one.counted:
         for first in range(run.start, run.stop - size, length):

@@ -14,6 +14,7 @@ import numpy as np
 from pipelines.fit.least_squares import errors
 from pipelines.fit.statistics import gather
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Judged, Motions
 from pipelines.model.estimation.regression import LogEquations
 from pipelines.model.mean_period import NoiseFloor, mean_period, noise_floor
@@ -59,6 +60,7 @@ def _of(log: ExperimentLog, found: Reconstructed, how: Reconstruction,
         cutoff_hz: float | None) -> tuple[NoiseFloor | None, tuple[ExperimentLog, Reconstructed] | None]:
     if log.period is None:
         return None, None
+    cutoff_hz = cutoff_at(cutoff_hz, 1.0 / log.sample_time)
     if how.average:
         return mean_period(log, found, cutoff_hz)
     return noise_floor(log, found, cutoff_hz), None

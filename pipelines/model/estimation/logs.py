@@ -12,8 +12,9 @@ from pipelines.fit.least_squares import Errors
 from pipelines.fit.statistics import Triangles, gather
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.estimation.blocks import Stretches, by_blocks, by_stretches
+from pipelines.model.estimation.conditioning import HIGHEST, condition, cutoff_at, wanted_cutoff
 from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
-from pipelines.model.estimation.regression import Columns, Conditioning, LogEquations, Rows, condition
+from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
 
@@ -37,6 +38,7 @@ class Recipe:
     decimation: int | None = None
     min_speed: tuple[float, ...] = (0.0,)
     known: Callable[[Motion], Array] | None = None  # torque (samples, joints) [N m] that is subtracted: of a given friction
+    found: bool = False  # the cut-off, or that there is none, came of the fitted logs; one of a lower rate does without
 
     def check(self, log: ExperimentLog) -> None:
         """C02: what no log of this rate and so many joints can be done with."""
@@ -47,9 +49,10 @@ class Recipe:
             raise UsageError("C02", "a speed that is no number from zero up", where="--min-speed", remedy="give 0 or more [rad/s]")
         if self.decimation is not None and self.decimation < 1:
             raise UsageError("C02", f"every {self.decimation}th sample", where="--decimate", remedy="give 1 or more")
-        if self.cutoff_hz is not None and not 0.0 < self.cutoff_hz < 0.5 / log.sample_time:
+        highest = HIGHEST / log.sample_time
+        if self.cutoff_hz is not None and not self.found and not 0.0 < self.cutoff_hz < highest:
             raise UsageError("C02", f"a low-pass at {self.cutoff_hz:g} Hz for {log.name}, sampled at {1.0 / log.sample_time:g} Hz",
-                             where="--filter", remedy="give a frequency above 0 and below half the rate")
+                             where="--filter", remedy=f"give a frequency above 0 and below {HIGHEST:g} of the rate, {highest:g} Hz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +105,12 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
 
 def with_cutoff(recipe: Recipe, motions: Motions, columns: Columns) -> Recipe:
     """`recipe` with the cut-off for these logs, where none is given: the highest that any of them asks for."""
-    if recipe.cutoff_hz is not None:
+    if recipe.found or recipe.cutoff_hz is not None:
         return recipe
-    asked = [_condition(log, found, recipe, columns).cutoff_hz for log, found in motions]
-    known = [cutoff for cutoff in asked if cutoff is not None]
-    return replace(recipe, cutoff_hz=max(known) if known else None)
+    asked = [(wanted_cutoff(found.motion, 1.0 / log.sample_time), 1.0 / log.sample_time) for log, found in motions]
+    highest = max(wanted for wanted, _ in asked)
+    felt = any(cutoff_at(highest, rate) is not None for _, rate in asked)
+    return replace(recipe, cutoff_hz=highest if felt else None, found=True)
 
 
 def _fast_enough(equations: Sequence[LogEquations], motions: Motions) -> None:
@@ -168,11 +172,6 @@ def _of_mean_periods(found: Errors, equations: Sequence[LogEquations]) -> Errors
     return replace(found, rms=found.rms * shrink, signal_rms=found.signal_rms * shrink)
 
 
-def _condition(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns) -> Conditioning:
-    slow: Array = np.broadcast_to(np.array(recipe.min_speed, dtype=np.float64), columns.body.robot.n_joints)
-    return condition(found.motion, 1.0 / log.sample_time, recipe.cutoff_hz, recipe.decimation, slow)
-
-
 def equations_of(motions: Motions, recipe: Recipe, columns: Columns, rows: Sequence[Rows] | None = None) -> list[LogEquations]:
     """The equations of every log; of the samples in `rows` where those are given.
 
@@ -183,7 +182,9 @@ def equations_of(motions: Motions, recipe: Recipe, columns: Columns, rows: Seque
 
 
 def _of_log(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns, rows: Rows | None) -> LogEquations:
-    how = _condition(log, found, recipe, columns)
+    slow: Array = np.broadcast_to(np.array(recipe.min_speed, dtype=np.float64), columns.body.robot.n_joints)
+    cutoff = np.inf if recipe.found and recipe.cutoff_hz is None else recipe.cutoff_hz
+    how = condition(found.motion, 1.0 / log.sample_time, cutoff, recipe.decimation, slow)
     equations = LogEquations(columns, found, how, held=log.torque != "measured", known=recipe.known, chosen=rows)
     if not equations.runs:
         raise InputRejected("T04", f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz",

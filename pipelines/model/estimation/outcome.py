@@ -10,6 +10,7 @@ import numpy.typing as npt
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import Validity
 from pipelines.model.arm import Arm, ArmTorque
+from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Motions
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed
@@ -90,6 +91,7 @@ def torques(arm: Arm, log: ExperimentLog, motion: Reconstructed) -> ArmTorque:
 def course(log: ExperimentLog, found: Reconstructed, parts: ArmTorque, cutoff_hz: float | None) -> Course:
     """The torques of `log` along its time, as the fit saw them."""
     good, rate = found.good, 1.0 / log.sample_time
+    cutoff_hz = cutoff_at(cutoff_hz, rate)
     low_pass = None if cutoff_hz is None else design_low_pass(cutoff_hz, rate)
     every = 1 if cutoff_hz is None else max(1, choose_decimation(cutoff_hz, rate) // 2)
     pieces = []

@@ -19,12 +19,13 @@ import numpy.typing as npt
 
 from pipelines.fit.equations import Block
 from pipelines.model.effects.base import ArmModel, Effect
+from pipelines.model.estimation.conditioning import Conditioning
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.rrr import ACTING, RRR
-from pipelines.signal.filters import LowPass, centre_hold, centre_samples, choose_decimation, design_low_pass, zero_phase
+from pipelines.signal.filters import centre_hold, centre_samples, zero_phase
 
-__all__ = ["Column", "Columns", "Conditioning", "LogEquations", "Rows", "condition"]
+__all__ = ["Column", "Columns", "LogEquations", "Rows"]
 
 # time, and of each joint: columns, torque, and which of its equations count (None: all)
 _Piece = tuple[Array, tuple[Array, ...], tuple[Array, ...], tuple[npt.NDArray[np.bool_], ...] | None]
@@ -102,40 +103,6 @@ class Columns:
         keep = [place[index] >= 0 for index in acting]
         return ([row[k] for row, k in zip(rows, keep, strict=True)],
                 [place[index[k]] for index, k in zip(acting, keep, strict=True)])
-
-
-@dataclass(frozen=True)
-class Conditioning:
-    """What is done alike to torque and columns. See `condition` for the defaults."""
-
-    low_pass: LowPass | None
-    cutoff_hz: float | None
-    decimation: int
-    min_speed: tuple[float, ...]  # [rad/s] slower samples of a joint are left out of its own equations
-
-
-def condition(motion: Motion, rate: float, cutoff_hz: float | None, decimation: int | None, min_speed: Array) -> Conditioning:
-    """The filter for a log, its cut-off from the motion where none is given.
-
-    The motion excites what lies below f, where 99.9 % of the power of its speed is; torque has harmonics of it, and
-    friction that changes sign has many. Five times f keeps them and leaves out what only noise and structure fill.
-    """
-    if cutoff_hz is None:
-        cutoff_hz = 5.0 * _highest_frequency(motion, rate)
-    if cutoff_hz >= 0.4 * rate:
-        return Conditioning(None, None, decimation or 1, tuple(map(float, min_speed)))
-    return Conditioning(design_low_pass(cutoff_hz, rate), cutoff_hz, decimation or choose_decimation(cutoff_hz, rate),
-                        tuple(map(float, min_speed)))
-
-
-def _highest_frequency(motion: Motion, rate: float) -> float:
-    """Below it lies 99.9 % of the power of the speed, joints scaled alike [Hz]."""
-    known = motion.dq[np.isfinite(motion.dq).all(axis=1)]
-    scale = known.std(axis=0)
-    x = (known - known.mean(axis=0))[:, scale > 0.0] / scale[scale > 0.0]
-    power = np.sum(np.abs(np.fft.rfft(x * np.hanning(len(x))[:, None], axis=0)) ** 2, axis=1)
-    total = np.cumsum(power)
-    return float(np.searchsorted(total, 0.999 * total[-1]) + 1) * rate / len(x) if total[-1] > 0.0 else rate
 
 
 @dataclass(frozen=True, eq=False)
