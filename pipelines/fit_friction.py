@@ -1,6 +1,7 @@
 """Fit the friction law of each joint, and choose it.
 
-Reads    "friction" logs of role "identify", each of one joint driven alone; those of role "validate" judge; "hold" logs
+Reads    "friction" logs of role "identify", each of one joint driven alone; those of role "validate" judge; "hold" logs;
+         where there are none, "excitation" and "free" logs: friction then is fitted with the base parameters
 Writes   result.json, result.h5, model.json with the friction, logs/ with its torque, report.html
 Source   Kostić et al. 2004, Section IV.B, eq. (10)-(11), Table III, Figs. 5 and 6
 """
@@ -26,6 +27,8 @@ from pipelines.log.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.estimation.nominal import fitted_arm
 from pipelines.model.estimation.outcome import validity
 from pipelines.model.friction.findings import findings
 from pipelines.model.friction.fit_law import LawFit
@@ -33,10 +36,11 @@ from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
 from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.methods import METHODS, by_method
 from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.result import JointResult, Result, joint_result
+from pipelines.model.friction.result import JointResult, Result, joint_result, several_results
+from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
 from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.body import Motion
+from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
 from pipelines.report.friction_report import friction_report
@@ -68,13 +72,15 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     measured = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
     logs = [log for log in measured if log.experiment in ("friction", "hold")]
     identify = [log for log in logs if log.role == "identify" and log.experiment == "friction"]
+    together = [log for log in measured if log.role == "identify" and log.experiment in ("excitation", "free")]
+    if not identify and together:
+        return _together(together, [log for log in measured if log.role == "validate" and log.experiment in ("excitation", "free")],
+                         settings, law)
     if not identify:
         kinds = ", ".join(sorted({f"{o.log.experiment} ({o.log.role})" for o in inputs.logs})) or "none"
         raise NothingMatched("C06", f"no friction log of role identify; there are: {kinds}", where=inputs.label,
                              remedy="drive each joint alone, the others held, and record it as experiment 'friction'")
-    if len({log.robot_text for log in logs}) > 1:
-        raise UsageError("C02", "logs of several robots", where=inputs.label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+    _of_one_robot(logs, inputs.label)
     used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
     seen, said = _examined(used, Reconstruction(order=settings.order))
     joints = [by_method(fit_joint(part, settings.window, law), settings.method) for part in _by_joint(seen)]
@@ -88,6 +94,32 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     return Result(identify[0].robot_name, results, "one joint at a time", (*said, *found), model=model,
                   derived=tuple(_derived(pair, joint, arm, settings) for joint in joints
                                 for pair in (*joint.logs.identify, *joint.logs.validate)))
+
+
+def _of_one_robot(logs: Sequence[ExperimentLog], label: str) -> None:
+    if len({log.robot_text for log in logs}) > 1:
+        raise UsageError("C02", "logs of several robots", where=label,
+                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+
+
+def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], settings: Settings, law: Law | None) -> Result:
+    """No joint was driven alone: friction with the base parameters, from logs in which all move."""
+    _of_one_robot((*identify, *validate), identify[0].name)
+    how = Reconstruction(order=settings.order)
+    if settings.method != "varpro":
+        raise UsageError("C02", f"'{settings.method}' needs joints that were driven alone", where="--method", remedy="take varpro")
+    if law is not None and (law.sees_load or not law.pointwise):
+        raise UsageError("C02", f"{law.name} cannot be fitted while all joints move", where="--law",
+                         remedy="drive each joint alone, or choose a law of speed and position")
+    (seen, said), (others, said_too) = _examined(identify, how), _examined(validate, how)
+    found = fit_several(tuple(seen), tuple(others), Recipe(how), law)
+    arm = fitted_arm(found.fitted.estimate, identify[0].robot_name)
+    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in seen)
+    model = arm.to_model(validity=validity(tuple(seen)), sources=sources,
+                         notes=("friction and base parameters fitted together by rrrid fit-friction",))
+    derived = tuple(_with_friction(pair, arm.friction_torque(pair[1].motion), settings) for pair in (*seen, *others))
+    return Result(identify[0].robot_name, several_results(found, arm, tuple(others)), "all joints at once", (*said, *said_too),
+                  model=model, derived=derived)
 
 
 def _law(settings: Settings) -> Law | None:
@@ -167,13 +199,17 @@ def _notes(arm: Arm, joints: Sequence[JointResult]) -> tuple[str, ...]:
 
 
 def _derived(pair: Seen, joint: JointFit, arm: Arm, settings: Settings) -> tuple[str, ExperimentLog]:
-    log, motion = pair
-    how = Reconstruction(order=settings.order)
-    friction = arm.friction_torque(motion.motion)
+    friction = arm.friction_torque(pair[1].motion)
     only = np.zeros_like(friction)  # of the joint that was driven: at rest eq. (10) has none
     only[:, joint.logs.joint - 1] = friction[:, joint.logs.joint - 1]
+    return _with_friction(pair, only, settings)
+
+
+def _with_friction(pair: Seen, friction: Array, settings: Settings) -> tuple[str, ExperimentLog]:
+    log, motion = pair
+    how = Reconstruction(order=settings.order)
     with_motion = derive(log, "reconstruct", how.as_settings(), motion.signals())
-    return slug(log.name), derive(with_motion, "fit-friction", encode(settings)[0], {"tau_friction_model": only})
+    return slug(log.name), derive(with_motion, "fit-friction", encode(settings)[0], {"tau_friction_model": friction})
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
@@ -195,7 +231,8 @@ def report(result: Result) -> Report:
 def _onward(result: Result, inputs: Inputs) -> Inputs:
     """Later stages take the friction as known where every joint has its law."""
     arm = Arm.from_model(result.model)
-    return replace(inputs, material=arm) if len(result.joints) == arm.n_joints else inputs
+    whole = result.source == "one joint at a time" and len(result.joints) == arm.n_joints
+    return replace(inputs, material=arm) if whole else inputs
 
 
 STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report, read_logs, write,

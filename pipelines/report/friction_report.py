@@ -36,6 +36,8 @@ def _gravity(joint: JointResult) -> list[tuple[str, Value]]:
 
 
 def _well(joint: JointResult) -> bool:
+    if not joint.validation.by:
+        return True  # nothing was simulated
     ratio = _ratio(joint)
     return ratio is not None and ratio <= _GOOD
 
@@ -100,8 +102,8 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
                             "simulation (Fig. 5).", joint.series, revolute)
     simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion (Fig. 6). Gravity is "
                                   "compensated at the measured position.", joint.series, revolute)
-    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)),
-            Section(f"{joint.name}: simulation", _simulation_words(joint), (), (simulated, parts)),
+    alone = (Section(f"{joint.name}: simulation", _simulation_words(joint), (), (simulated, parts)),) if joint.validation.by else ()
+    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *alone,
             Section(f"{joint.name}: choice of the law", _ladder_words(joint), (_ladder(joint),)))
 
 

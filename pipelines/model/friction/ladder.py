@@ -8,7 +8,7 @@ laws that these rows cannot tell apart are named.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ _WORTH = 0.01  # of the mean square: a smaller difference is none, however sure
 _BLOCKS = 20  # of the rows that judge
 _FOLDS = 10
 _FURTHER = 2  # causes beside the first
+_MORE = 0.1  # of what is left (mean square), the least that each of them must explain
 _HOPEFUL = 3  # of them are fitted at a time, those that explain most to first order
 
 
@@ -98,7 +99,7 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
         beside = [_beside(judge, best, cause) for cause in causes if cause not in best.law.members]
         gains = [_gain(judge, best, law, starts) for law, starts in beside]
         hopeful = [k for k in sorted(range(len(gains)), key=lambda k: -gains[k])[:_HOPEFUL] if gains[k] > 0.5 * _WORTH]
-        more = [judge.try_law(*beside[k]) for k in hopeful]
+        more = [_worth(judge.try_law(*beside[k]), best) for k in hopeful]
         tried += more
         if not more or _alike(best.residual, _best(tried).residual):
             break
@@ -119,6 +120,13 @@ def _beside(judge: Judge, best: Tried, cause: str) -> tuple[Law, list[Array]]:
                           for place, value in zip(law.places, theta, strict=True)])
         starts[begin.tobytes()] = begin
     return law, list(starts.values())
+
+
+def _worth(one: Tried, best: Tried) -> Tried:
+    """A cause more has to explain a good part of what one cause leaves, or it is the model's own roughness that it explains."""
+    if one.reason or one.validate_rms**2 < (1.0 - _MORE) * best.validate_rms**2:
+        return one
+    return replace(one, reason=f"explains too little beside {best.law.name}")
 
 
 def _gain(judge: Judge, best: Tried, law: Law, starts: Sequence[Array]) -> float:

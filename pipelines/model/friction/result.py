@@ -10,10 +10,14 @@ from pipelines.errors import Check
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
+from pipelines.model.arm import Arm
+from pipelines.model.effects import find_effect
+from pipelines.model.estimation.logs import Motions
 from pipelines.model.friction.joint import JointFit, fractions
 from pipelines.model.friction.one_joint import gravity_names
+from pipelines.model.friction.several import SeveralFit
 
-__all__ = ["Event", "JointResult", "Posture", "Result", "Rung", "Series", "Validation", "Value", "joint_result"]
+__all__ = ["Event", "JointResult", "Posture", "Result", "Rung", "Series", "Validation", "Value", "joint_result", "several_results"]
 
 _POINTS = 1500  # of a figure
 _CURVE = 401
@@ -134,6 +138,51 @@ class Result:
     checks: tuple[Check, ...]  # of the logs, and what the fit says of them
     model: ModelFile = field(metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)
+
+
+def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[JointResult, ...]:
+    """One result a joint of a fit of all at once. Nothing was simulated: the joints did not move alone."""
+    motions = found.fitted.motions
+    q = np.concatenate([motion.motion.q[motion.good.kept[motion.good.fit]] for _, motion in motions])
+    dq = np.concatenate([motion.motion.dq[motion.good.kept[motion.good.fit]] for _, motion in motions])
+    middle = np.median(q, axis=0)
+    names = tuple(log.name for log, _ in (*motions, *validate))
+    return tuple(_several(found, arm, j, middle, np.abs(dq[:, j]), names) for j in range(arm.n_joints))
+
+
+def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, names: tuple[str, ...]) -> JointResult:
+    ladder = found.ladders[j]
+    law, first = ladder.chosen.law, f":{j + 1}:"
+    known = {key.replace(first, "."): value for key, value in arm.parameters.items() if first in key}
+    members = set(law.members)
+    numbers = {key if len(members) > 1 else key.partition(".")[2]: Value(p.value, p.std, p.unit)
+               for key, p in known.items() if key.partition(".")[0] in members}
+    rungs = tuple(Rung(one.law.name, one.law.size, one.identify_rms, one.validate_rms, ladder.alike(one), one is ladder.chosen,
+                       one.reason) for one in ladder.tried)
+    fastest, slowest = float(speed.max()), float(np.quantile(speed, 0.02))
+    side = np.concatenate([[0.0], np.geomspace(1e-3 * fastest, fastest, _CURVE // 2)])
+    axis = np.concatenate([-side[:0:-1], side])
+    nothing = np.zeros(0)
+    series = Series(axis, ladder.chosen.fit.curve(axis), ladder.chosen.fit.curve_std(axis), *(nothing,) * 15)
+    inertia = _inertia(found, arm, j, middle)
+    open_ = tuple(Missing(f"{law.name} cannot be told from {one.law.name}", find_effect(one.law.members[-1]).experiment)
+                  for one in ladder.rivals)
+    return JointResult(j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
+                       (Posture(tuple(map(float, middle)), inertia, {}),), Validation(None, None, "", False), rungs, ladder.by,
+                       open_, (), None, (slowest, fastest), names, series)
+
+
+def _inertia(found: SeveralFit, arm: Arm, j: int, q: Array) -> Value:
+    """D_jj at the middle posture."""
+    push = np.zeros((1, arm.n_joints))
+    push[0, j] = 1.0
+    still = 0.0 * push
+    row = (arm.body.regressor(q[None], still, push) - arm.body.regressor(q[None], still, still))[0, j]
+    estimate = found.fitted.estimate
+    kept = list(estimate.columns.kept)
+    spread = estimate.robust.covariance[:len(kept), :len(kept)]
+    std = float(np.sqrt(row[kept] @ spread @ row[kept])) if np.isfinite(spread).all() else None
+    return Value(float(row @ arm.p), std, "kg m^2" if arm.robot.joints[j].revolute else "kg")
 
 
 def joint_result(joint: JointFit, name: str, method: str) -> JointResult:

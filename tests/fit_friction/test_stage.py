@@ -1,0 +1,245 @@
+"""`rrrid fit-friction`: the law of each joint from its logs, judged, written, drawn; bad input named."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines import fit_friction
+from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.fit_friction import Settings
+from pipelines.log.experiment import Controller, ExperimentLog, Signal
+from pipelines.log.files import Opened, open_log, write_log
+from pipelines.log.model_file import read_model
+from pipelines.model.arm import Arm
+from pipelines.model.friction.result import JointResult, Result
+from pipelines.stage import Inputs, Outcome, Request, run_stage
+from tests.cli.commands import rrrid
+from tests.model.friction.one_joint import COSINE, INERTIA, JOINT, SINE, STEP, TRUTHS, as_log, driven, recorded, relative
+
+QUICK = Settings(law="coulomb+viscous")
+
+
+def stage(folder: Path, *logs: ExperimentLog, settings: Settings = QUICK, check: bool = False) -> Outcome[Result]:
+    for log in logs:
+        write_log(folder / f"logs/{log.name}.h5", log)
+    return run_stage(fit_friction.STAGE, Request((folder / "logs",), out=folder / "out", check=check), settings)
+
+
+def computed(*logs: ExperimentLog, settings: Settings = QUICK) -> Result:
+    return fit_friction.compute(Inputs(tuple(Opened(Path(f"{log.name}.h5"), "", log, ()) for log in logs), label="logs"), settings)
+
+
+def changed(log: ExperimentLog, **signals: np.ndarray) -> ExperimentLog:
+    more = {name: Signal(values, log.signals[name].units, name) if name in log.signals else Signal(values, "A", name)
+            for name, values in signals.items()}
+    return replace(log, signals={**log.signals, **more})
+
+
+def gates(result: Result) -> dict[str, Check]:
+    return {check.code.removeprefix("RRID-"): check for check in result.checks if check.gate}
+
+
+@pytest.fixture(scope="module")
+def good() -> ExperimentLog:
+    return recorded("coulomb+viscous", 4)
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome[Result]:
+    return stage(tmp_path_factory.mktemp("friction"), recorded("three_sigmoid", 4), recorded("three_sigmoid", 54, "validate"),
+                 settings=Settings())
+
+
+def test_the_fields_of_the_contract(outcome: Outcome[Result]) -> None:
+    """joints: joint, law, parameters with value, std, unit; inertia, gravity; validation; ladder. cli-contract.md."""
+    (joint,) = json.loads((outcome.folder / "result.json").read_text())["joints"]
+    assert (joint["joint"], joint["law"]) == (JOINT, "three_sigmoid")
+    assert set(joint["parameters"]) == {"f1", "f2", "f3", "w1", "w2", "w3", "b"}
+    for number in (*joint["parameters"].values(), joint["inertia"], *joint["gravity"].values()):
+        assert set(number) == {"value", "std", "unit"}
+    assert set(joint["gravity"]) == {"sine", "cosine"}
+    assert set(joint["ladder"][0]) >= {"law", "identify_rms", "validate_rms", "chosen"}
+    assert [rung["law"] for rung in joint["ladder"] if rung["chosen"]] == ["three_sigmoid"]
+    assert joint["judged_by"] == "logs"
+    assert joint["parameters"]["w1"]["value"] > joint["parameters"]["w2"]["value"] > joint["parameters"]["w3"]["value"]
+
+
+def test_numbers_of_the_joint(outcome: Outcome[Result]) -> None:
+    """Inertia and both sides of gravity within 1 % and three standard deviations; Fig. 6 below 0.05."""
+    (joint,) = outcome.result.joints
+    for found, truth in ((joint.inertia, INERTIA), (joint.gravity["sine"], SINE), (joint.gravity["cosine"], COSINE)):
+        assert found.std is not None
+        assert abs(found.value - truth) <= min(3.0 * found.std, 0.01 * max(truth, 1.0))
+    assert joint.validation.held_out
+    assert joint.validation.velocity_error_with is not None
+    assert joint.validation.velocity_error_without is not None
+    assert joint.validation.velocity_error_with <= 0.05 * joint.validation.velocity_error_without
+
+
+def test_the_map_knows_no_law_and_agrees(outcome: Outcome[Result]) -> None:
+    """Pairs of ± v lie on the true curve within four standard deviations, their even part is gravity's mean."""
+    series = outcome.result.joints[0].series
+    assert len(series.map_speed) >= 5
+    apart = series.map_odd - TRUTHS["three_sigmoid"].curve(series.map_speed)
+    assert np.sqrt(np.mean(np.square(apart))) < 0.05 * np.abs(series.map_odd).max()
+
+
+def test_the_model_carries_the_friction(outcome: Outcome[Result]) -> None:
+    """model.json gives the curve again; base parameters nobody fitted are said to be unknown."""
+    arm = Arm.from_model(read_model(outcome.folder / "model.json"))
+    (law,) = arm.friction
+    assert (law.effect.name, law.effect.joint) == ("three_sigmoid", JOINT)
+    speed = np.linspace(-5.0, 5.0, 101)
+    assert relative(law.effect.curve(speed, arm, law.values), TRUTHS["three_sigmoid"].curve(speed)) < 0.004
+    known = arm.body.known_parameters() is not None
+    assert all(parameter.origin == ("known" if known else "assumed") for parameter in arm.base)
+
+
+def test_the_report_has_its_figures(outcome: Outcome[Result]) -> None:
+    names = {path.stem for path in (outcome.folder / "figures").glob("*.svg")}
+    assert {f"curve-{JOINT}", f"fractions-{JOINT}", f"simulation-{JOINT}"} <= names
+    page = (outcome.folder / "report.html").read_text()
+    assert "Table III" in page
+    assert "three sigmoid" in page
+
+
+def test_the_derived_log_holds_the_friction(outcome: Outcome[Result]) -> None:
+    log = open_log(outcome.folder / "logs/three_sigmoid-4.h5").log
+    friction = log["tau_friction_model"]
+    assert not friction[:, [0, 1]].any()
+    assert relative(friction[:, 2], TRUTHS["three_sigmoid"].curve(log["dq_hat"][:, 2])) < 0.01
+
+
+@pytest.mark.parametrize("method", ["varpro", "output-error", "ekf"])
+def test_three_methods(method: str) -> None:
+    """Each gives inertia to 1 % and the curve to 1.2 % on a log of its own."""
+    law = None if method != "ekf" else "three_sigmoid"
+    (joint,) = computed(recorded("three_sigmoid", 5), settings=Settings(law=law or "three_sigmoid", method=method)).joints
+    assert joint.method == method
+    assert joint.inertia.value == pytest.approx(INERTIA, rel=0.01)
+    assert relative(joint.series.curve, TRUTHS["three_sigmoid"].curve(joint.series.speed)) < 0.012
+
+
+def ramps(seed: int = 6) -> ExperimentLog:
+    """Slow ramps of torque from rest to beyond what friction holds, both ways, gravity nearly none."""
+    t = np.arange(16000) * STEP
+    tau = 2.2 * np.interp(t, [0, 3.5, 4, 7.5, 8, 11.5, 12, 15.5, 16], [0, 1, 0, -1, 0, 1, 0, -1, 0])
+    noise = 0.005 * np.random.default_rng(seed).standard_normal(len(t))
+    states = driven(tau + noise, TRUTHS["coulomb+viscous"].torque, gravity=(0.0, 0.0))
+    return as_log(np.round(states[:, 0] / 1e-5) * 1e-5, tau, "ramps")
+
+
+def test_break_away() -> None:
+    """The torque that sets the joint in motion is the top of the friction curve at creeping speed, either way."""
+    (joint,) = computed(ramps()).joints
+    assert {event.direction for event in joint.break_away} == {1, -1}
+    for event in joint.break_away:
+        assert event.torque.value == pytest.approx(1.2, rel=0.05)
+        assert event.torque.std is not None
+        assert event.events >= 1
+
+
+def one_way(good: ExperimentLog) -> ExperimentLog:
+    tau = 1.9 + 0.5 * np.sin(2 * np.pi * 0.5 * np.arange(8000) * STEP)
+    states = driven(tau, TRUTHS["coulomb+viscous"].torque, gravity=(0.0, 0.0), start=(0.0, 4.0))
+    return as_log(np.round(states[:, 0] / 1e-5) * 1e-5, tau, "one-way")
+
+
+BAD = {
+    "D10": one_way,
+    "S14": lambda log: changed(log, tau=-log.tau),
+    "D05": lambda log: changed(log, tau=np.clip(log.tau, -1.6, 1.6)),
+    "D16": lambda log: changed(log, q=log.q + np.array([0.3, 0.0, 0.0]) * np.sin(2 * np.pi * 0.3 * log.t)[:, None]),
+    "S10": lambda log: changed(log, current=log.tau),
+}
+
+
+@pytest.mark.parametrize("code", BAD)
+def test_bad_input_is_a_clear_finding(code: str, good: ExperimentLog, tmp_path: Path) -> None:
+    """No reversal, a wrong sign, saturated torque, a locked joint that moves, amperes: named, with what to do, and exit 1."""
+    try:
+        found = stage(tmp_path, BAD[code](good), check=True)
+    except InputRejected as problem:
+        assert problem.code == f"RRID-{code}"
+        return
+    assert code in gates(found.result), [check.message for check in found.result.checks]
+    assert gates(found.result)[code].remedy
+    assert found.exit_code == 1
+
+
+def test_a_compensation_that_the_torque_lacks(good: ExperimentLog) -> None:
+    """D18: the log says that gravity was compensated, its torque holds none of it. A total torque is no finding."""
+    says = Controller("open-loop", feedforward=("gravity",))
+    total = replace(good, controller=says)
+    weight = SINE * np.sin(good.q[:, 2]) + COSINE * np.cos(good.q[:, 2])
+    lacking = changed(total, tau=good.tau - np.stack([0 * weight, 0 * weight, weight], axis=1))
+    assert "D18" in gates(computed(lacking))
+    assert "D18" not in gates(computed(total))
+    assert "D18" not in gates(computed(replace(lacking, controller=None)))
+
+
+def test_two_postures_have_two_inertias(good: ExperimentLog) -> None:
+    """Logs with the other joints elsewhere: friction is shared, inertia and gravity are not."""
+    truth = TRUTHS["coulomb+viscous"]
+    heavy = driven(good.tau[:, 2], truth.torque, inertia=0.13, gravity=(1.2, 0.0))
+    other = as_log(np.round(heavy[:, 0] / 1e-5) * 1e-5, good.tau[:, 2], "elsewhere")
+    other = changed(other, q=other.q + np.array([0.0, 0.5, 0.0]))
+    (joint,) = computed(good, other).joints
+    found = sorted(posture.inertia.value for posture in joint.postures)
+    assert found == pytest.approx([INERTIA, 0.13], rel=0.01)
+    assert relative(joint.series.curve, truth.curve(joint.series.speed)) < 0.01
+
+
+def test_no_log_to_fit(good: ExperimentLog) -> None:
+    with pytest.raises(NothingMatched) as refused:
+        computed(replace(good, role="validate"))
+    assert refused.value.exit_code == 5
+
+
+@pytest.mark.parametrize("settings", [{"law": "stribek"}, {"method": "guess"}, {"window": 0.0}, {"window": 10.0},
+                                      {"law": "presliding", "method": "output-error"}])
+def test_settings_have_bounds(settings: dict[str, object], good: ExperimentLog) -> None:
+    with pytest.raises(UsageError) as refused:
+        computed(good, settings=replace(QUICK, **settings))  # type: ignore[arg-type]
+    assert (refused.value.code, refused.value.exit_code) == ("RRID-C02", 2)
+
+
+def test_joints_that_never_moved_alone(samples: Path) -> None:
+    """Excitation of all joints: friction with the base parameters, and inertia of the arm in the middle of its motion."""
+    logs = [open_log(samples / f"rrr-closed-form/excitation-{number}.h5").log for number in (1, 2)]
+    result = computed(*logs, settings=Settings(law="three_sigmoid"))
+    assert result.source == "all joints at once"
+    truth = Arm.from_model(read_model("rrr"))
+    for joint, law in zip(result.joints, truth.friction, strict=True):
+        speed = joint.series.speed
+        assert relative(joint.series.curve, law.effect.curve(speed, truth, law.values)) < 0.012
+    arm = Arm.from_model(result.model)
+    for ours, known in zip(arm.base, truth.base, strict=True):
+        assert ours.value == pytest.approx(known.value, abs=0.01)
+
+
+def test_the_command(good: ExperimentLog, tmp_path: Path) -> None:
+    write_log(tmp_path / "logs/a.h5", good)
+    made = rrrid("fit-friction", "logs", "--out", "o", "--law", "coulomb+viscous", "--no-report", "--json", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert json.loads(made.stdout)["joints"][0]["law"] == "coulomb+viscous"
+    wrong = rrrid("fit-friction", "logs", "--out", "o", "--law", "coulom", cwd=tmp_path)
+    assert wrong.returncode == 2
+    assert "did you mean 'coulomb'" in wrong.stderr
+
+
+def test_friction_is_handed_on(samples: Path) -> None:
+    """`run` fits friction first: where every joint was driven alone, the estimate takes it as known."""
+    names = [f"friction-{number}" for number in (1, 2, 3)]
+    opened = tuple(open_log(samples / f"rrr-closed-form/{name}.h5") for name in names)
+    inputs = Inputs(opened, label="logs")
+    result = fit_friction.compute(inputs, QUICK)
+    assert isinstance(fit_friction.STAGE.onward(result, inputs).material, Arm)
+    part = Inputs(opened[:2], label="logs")
+    assert fit_friction.STAGE.onward(fit_friction.compute(part, QUICK), part).material is None
+    assert all(isinstance(joint, JointResult) for joint in result.joints)
