@@ -64,21 +64,22 @@ def _friction(task: Task, j: int, home: Array) -> Plan:
     low, high = task.robot.joints[j].position
     room = _USED_RANGE * (high - low) if np.isfinite(high - low) else _FREE
     centre = 0.5 * (low + high) if np.isfinite(high - low) else home[j]
-    rate, parts, held = _acceleration(task, j, home), [], []
-    place = float(home[j])
-    for speed in np.geomspace(0.01, 1.0, _LEVELS) * _SHARE * task.speed[j]:
+    rate, top, place = _acceleration(task, j, home), _SHARE * float(task.speed[j]), float(home[j])
+    parts: list[tuple[Array, float]] = []
+    held: list[float] = []
+    for speed in np.geomspace(0.01, 1.0, _LEVELS) * top:
         ramp = max(_PEAK * speed / rate, 0.05)
         hold = min(room / speed - ramp, _HELD[1])
         if hold < _HELD[0]:
             continue
         start = float(centre - 0.5 * speed * (hold + ramp))
-        parts += [_move(place, start, rate), *_stroke(start, float(speed), ramp, float(hold))]
+        parts += [_move(place, start, rate, top), *_stroke(start, float(speed), ramp, float(hold))]
         place = start
         held.append(float(speed))
     if not held:
         raise UsageError("C08", f"joint {j + 1} has too small a range to hold any speed", where="position limits",
                          remedy="widen them, or record friction by hand")
-    parts.append(_move(place, float(home[j]), rate))
+    parts.append(_move(place, float(home[j]), rate, top))
     motion = _joined(task, parts)
     whole = np.zeros((3, task.robot.n_joints, motion.shape[1]))
     whole[0] = home[:, None]
@@ -98,9 +99,10 @@ def _acceleration(task: Task, j: int, home: Array) -> float:
     return _ACCELERATION * min(bounds)
 
 
-def _move(start: float, end: float, rate: float) -> tuple[Array, float]:
-    """From rest to rest: (polynomial (6,), duration [s]), no faster than `rate` allows."""
-    duration = max(float(np.sqrt(5.774 * abs(end - start) / rate)), 0.2)  # a quintic's largest acceleration
+def _move(start: float, end: float, rate: float, speed: float) -> tuple[Array, float]:
+    """From rest to rest: (polynomial (6,), duration [s]), no faster than `speed` and acceleration `rate` allow."""
+    far = abs(end - start)
+    duration = max(float(np.sqrt(5.774 * far / rate)), 1.875 * far / speed, 0.2)  # a quintic's peaks
     return quintic(np.array([[start], [0.0], [0.0]]), np.array([[end], [0.0], [0.0]]), duration)[:, 0], duration
 
 
@@ -120,10 +122,10 @@ def _stroke(start: float, speed: float, ramp: float, hold: float) -> list[tuple[
 def _joined(task: Task, parts: list[tuple[Array, float]]) -> Array:
     """Position, speed, acceleration (3, samples) of polynomials one after another."""
     ends = np.cumsum([duration for _, duration in parts])
-    t = np.arange(int(ends[-1] / task.sample_time) + 1) * task.sample_time
+    t = np.arange(int(np.ceil(ends[-1] / task.sample_time - 1e-9)) + 1) * task.sample_time
     which = np.minimum(np.searchsorted(ends, t, side="right"), len(parts) - 1)
     length = np.array([duration for _, duration in parts])[which]
-    s = (t - (ends - np.array([duration for _, duration in parts]))[which]) / length
+    s = np.minimum((t - (ends - np.array([duration for _, duration in parts]))[which]) / length, 1.0)  # at rest, then, to the last
     c = np.stack([polynomial for polynomial, _ in parts])[which].T
     k = np.arange(6)[:, None]
     powers = s[None] ** k

@@ -161,20 +161,22 @@ def test_a_ceiling_out_of_reach_names_the_limit_in_the_way() -> None:
 
 
 def test_earlier_information_is_added() -> None:
-    """A direction that earlier logs know well needs nothing more: designed after them, the whole is known better."""
-    task = _task(replace(Wishes(), criterion="A", harmonics=(10,)))
-    columns, goal = task.problem.columns, task.problem.goal
+    """Predicted deviations are those of one least-squares fit to both experiments, noise by joint: (Σ AᵀA/σ²)⁻¹ by NumPy."""
     rng = np.random.default_rng(0)
-    motion = np.stack([rng.uniform(-3, 3, (3, 4000)), rng.normal(size=(3, 4000)) * 0.01, rng.normal(size=(3, 4000)) * 0.01])
-    known = grams_of(columns.columns, columns.rows(motion), 15) * 4000.0  # hardly moving: gravity alone
-    after = plan_task(task.robot, task.arm, replace(Wishes(), criterion="A", harmonics=(10,)), known)
-    found = design(after, Effort(evaluations=900), 1)
-    alone = design(task, Effort(evaluations=900), 1)
-    std = {}
-    for name, one in (("after", found), ("alone", alone)):
-        whole = one.trajectory.series.samples(10000)
-        std[name] = after.problem.goal.std(grams_of(columns.columns, columns.rows(whole), 15)) / goal.sizes
-    assert np.sqrt(np.mean(std["after"] ** 2)) < np.sqrt(np.mean(std["alone"] ** 2))
+    wishes = replace(Wishes(), criterion="A", harmonics=(8,))
+    columns = _task(wishes).problem.columns
+    old, new = (rng.normal(size=(3, 3, 500)) * np.array([2.0, 3.0, 20.0])[:, None, None] for _ in range(2))
+    known = 500.0 * grams_of(columns.columns, columns.rows(old), 15)
+    goal = plan_task(rrr(), described(rrr()), wishes, known).problem.goal
+    mine = goal.std(grams_of(columns.columns, columns.rows(new), 15))
+    normal = np.zeros((15, 15))
+    for motion, weight in ((old, 1.0), (new, 10000 / 500)):  # an experiment of 10 s at 1 kHz
+        whole = np.zeros((500, 3, 15))
+        for j, (own, row) in enumerate(zip(columns.columns, columns.rows(motion), strict=True)):
+            whole[:, j, own] = row.T
+        for j, sigma in enumerate((0.6, 0.3, 0.15)):
+            normal += weight * whole[:, j].T @ whole[:, j] / sigma**2
+    np.testing.assert_allclose(mine, np.sqrt(np.diag(np.linalg.inv(normal))), rtol=1e-8)
 
 
 def test_the_certificate_holds_for_random_motions() -> None:
