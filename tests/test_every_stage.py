@@ -52,6 +52,8 @@ def _run(module: str, tmp_path: Path, samples: Path) -> tuple[Any, Any]:
     if module == "simulate":
         write_log(tmp_path / "waving.h5", controlled_log(400))
         settings, paths = dataclasses.replace(settings, model="rrr"), (tmp_path / "waving.h5",)
+    if module == "design_excitation":
+        settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out"), settings)
 
 
