@@ -21,6 +21,7 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, model_text, read_model
 from pipelines.log.results import encode
+from pipelines.log.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.balance import power_balance
 from pipelines.model.estimation.checks import consistency
@@ -150,7 +151,8 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
     growth, checked = found.convergence(), consistency(found, arm.body)
     names = [column.name for column in found.columns.names]
     return Result(
-        robot=arm.name, joints=tuple(joint.name for joint in arm.robot.joints), parameters=parameters(fitted, arm),
+        robot=arm.name, joints=tuple(joint.name for joint in arm.robot.joints),
+        torque_units=tuple(joint_unit("tau", joint.revolute) for joint in arm.robot.joints), parameters=parameters(fitted, arm),
         condition_number=found.condition_number, condition_number_fit=found.solution.condition, rank=found.solution.rank,
         relative_error={key: e.relative_error for key, e in both.items()},
         torque_rms={key: tuple(map(float, e.rms)) for key, e in both.items()},

@@ -24,8 +24,8 @@ _SHOWN = 8  # curves in one axes
 
 
 def torque_figure(name: str, caption: str, t: Array, measured: Array, model: Array, friction: Array, left: Array,
-                  joints: Sequence[str]) -> Figure:
-    """Measured and modelled torque, the friction in it, and what is left, one row a joint. All (points, joints) [N m]."""
+                  joints: Sequence[str], unit: str = "N m") -> Figure:
+    """Measured and modelled torque, the friction in it, and what is left, one row a joint. All (points, joints) [`unit`]."""
 
     def draw(drawing: Drawing) -> None:
         axes = figures.joint_axes(drawing, measured.shape[1])
@@ -34,7 +34,7 @@ def torque_figure(name: str, caption: str, t: Array, measured: Array, model: Arr
             axis.set_title(printable(joints[j], 60), pad=3.0)
         axes[-1].set_xlabel("time [s]")
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderpad=0.0)
-        drawing.supylabel("torque [N m]", fontsize="medium")
+        drawing.supylabel(f"torque [{unit}]", fontsize="medium")
 
     return Figure(name, caption, draw, size=figures.joint_size(measured.shape[1]))
 

@@ -89,8 +89,10 @@ def _noise_section(result: Result) -> Section:
                     f"{log.log}: its periods are not averaged, {log.why_not}.")
         rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.floor[j],
                   log.residual[j], log.ratio[j]) for j, name in enumerate(result.joints)]
-    columns = ("log", "joint", "position, one sample [rad]", "torque, one sample [N m]", "after the low-pass [N m]",
-               "by noise of the motion [N m]", "noise floor [N m]", "residual [N m]", "residual / floor")
+    unit, position = _torque_unit(result), " or ".join(dict.fromkeys("m" if own == "N" else "rad" for own in result.torque_units))
+    columns = ("log", "joint", f"position, one sample [{position}]", f"torque, one sample [{unit}]",
+               f"after the low-pass [{unit}]", f"by noise of the motion [{unit}]", f"noise floor [{unit}]", f"residual [{unit}]",
+               "residual / floor")
     values = tuple(tuple(x if isinstance(x, str) or math.isfinite(x) else None for x in row) for row in rows)
     text.append("What differs from one period to the next is noise, which no model explains. A residual well above it is what "
                 "this model lacks; where it is no larger, more experiments help, not more model.")
@@ -132,13 +134,19 @@ def _course_section(result: Result) -> Section:
     left, whole = result.torque_rms, result.torque_signal_rms["validate"]
     rows = tuple((name, left["identify"][j], left["validate"][j], whole[j],
                   100 * left["validate"][j] / whole[j] if whole[j] else None) for j, name in enumerate(result.joints))
-    table = Table(("joint", "residual, fitted [N m]", "residual, held out [N m]", "torque, held out [N m]", "relative [%]"), rows,
-                  "Root mean squares, after the low-pass.")
+    unit = _torque_unit(result)
+    table = Table(("joint", f"residual, fitted [{unit}]", f"residual, held out [{unit}]", f"torque, held out [{unit}]",
+                   "relative [%]"), rows, "Root mean squares, after the low-pass.")
     passed = "" if result.filter_hz is None else f", all after the low-pass of {result.filter_hz:.3g} Hz"
     figures = [torque_figure(f"torque-{c.name}", f"{c.name} ({c.role}): measured torque, the model's, its friction, "
                                                  f"and what is left{passed}.",
-                             c.t, c.measured, c.model, c.friction, c.left, result.joints) for c in result.courses]
+                             c.t, c.measured, c.model, c.friction, c.left, result.joints, unit) for c in result.courses]
     return Section("Torque along the experiment", (), (table,), tuple(figures))
+
+
+def _torque_unit(result: Result) -> str:
+    """"N m", "N", or "N m or N" where each joint has its own."""
+    return " or ".join(dict.fromkeys(result.torque_units))
 
 
 def _trust_section(result: Result) -> Section:

@@ -84,11 +84,30 @@ def _listed(joints: Sequence[int]) -> str:
 
 
 def _key_figures(logs: Sequence[LogResult]) -> Table:
-    rows = tuple((log.name, log.samples, log.predicted, float(log.reconstruction_error_max.max()), float(log.peak_speed.max()),
-                  _largest(log.speed_std), float(log.peak_acceleration.max()), _largest(log.acceleration_std)) for log in logs)
-    return Table(("log", "samples", "predicted", "error, largest [rad]", "speed, largest [rad/s]", "its std [rad/s]",
-                  "acceleration, largest [rad/s^2]", "its std [rad/s^2]"), rows,
+    several = len(units := tuple(dict.fromkeys(unit for log in logs for unit in log.units))) > 1
+    unit = "unit" if several else units[0]
+    rows = tuple((f"{log.name} [{own}]" if several else log.name, log.samples, log.predicted, *figures)
+                 for log in logs for own, figures in _by_unit(log).items())
+    return Table(("log [unit]" if several else "log", "samples", "predicted", f"error, largest [{unit}]",
+                  f"speed, largest [{unit}/s]", f"its std [{unit}/s]", f"acceleration, largest [{unit}/s^2]",
+                  f"its std [{unit}/s^2]"), rows,
                  "The worst joint of each log. Predicted: samples in which a position was not measured.")
+
+
+def _by_unit(log: LogResult) -> dict[str, tuple[float | None, ...]]:
+    """The key figures of the worst of the joints that share a unit: a slide's metres are no radians."""
+    found = {}
+    for unit in dict.fromkeys(log.units):
+        own = np.array([other == unit for other in log.units])
+        found[unit] = tuple(_largest(values[own]) for values in (
+            log.reconstruction_error_max, log.peak_speed, log.speed_std, log.peak_acceleration, log.acceleration_std))
+    return found
+
+
+def _unit(log: LogResult) -> str:
+    """Of position: "rad", "m", or "(rad or m)" where each joint has its own."""
+    units = tuple(dict.fromkeys(log.units))
+    return units[0] if len(units) == 1 else f"({' or '.join(units)})"
 
 
 def _largest(values: Array) -> float | None:
@@ -99,7 +118,8 @@ def _explanation(logs: Sequence[LogResult]) -> Section:
     doubtful = sum(bool(coloured(log)) for log in logs)
     text = ["The observer takes each joint for a chain of integrators that random jerk drives. The encoder's resolution and its "
             "samples say how noisy it is; the jerk is the one that predicts the next sample best, unless it was asked for. The "
-            "paper's rule, the largest jerk of the reference, is a first guess and filters hardly at all."]
+            "paper's rule, the largest jerk of the reference, is a first guess and filters hardly at all. Positions alone are "
+            "asked: whether the torque belongs to them is for inspect and estimate-bps to say."]
     if logs[0].smoother is not None:
         text.append("The smoother sees both sides of a sample and needs far less jerk. Near the ends of a log and over long gaps "
                     "it takes the observer's, because there it has to look ahead as well.")
@@ -128,34 +148,35 @@ def _log_section(log: LogResult, series: Series, number: int) -> Section:
 
 
 def _tables(log: LogResult) -> tuple[Table, ...]:
-    o = log.observer
+    o, unit = log.observer, _unit(log)
     columns: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
     columns |= {f"k{i + 1} [{('1', '1/s', '1/s^2', '1/s^3')[i]}]": o.gains[:, i].tolist() for i in range(o.order)}
-    columns |= {"bandwidth [Hz]": o.bandwidth_hz.tolist(), "encoder noise [rad]": o.measurement_std.tolist(),
-                f"jerk σ [rad/s^{o.order}]": o.jerk_std.tolist(), f"paper's rule [rad/s^{o.order}]": o.jerk_std_paper.tolist(),
-                "whiteness": log.innovation_whiteness.tolist()}
+    columns |= {"bandwidth [Hz]": o.bandwidth_hz.tolist(), f"encoder noise [{unit}]": o.measurement_std.tolist(),
+                f"jerk σ [{unit}/s^{o.order}]": o.jerk_std.tolist(),
+                f"paper's rule [{unit}/s^{o.order}]": o.jerk_std_paper.tolist(), "whiteness": log.innovation_whiteness.tolist()}
     known: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
     if log.smoother is not None:
-        known |= {f"smoother's σ [rad/s^{o.order}]": log.smoother.jerk_std.tolist(),
+        known |= {f"smoother's σ [{unit}/s^{o.order}]": log.smoother.jerk_std.tolist(),
                   "its bandwidth [Hz]": log.smoother.bandwidth_hz.tolist()}
-    known |= {"error, largest [rad]": log.reconstruction_error_max.tolist(), "rms [rad]": log.reconstruction_error_rms.tolist(),
-              "std q [rad]": log.position_std.tolist(), "std dq [rad/s]": log.speed_std.tolist(),
-              "std ddq [rad/s^2]": log.acceleration_std.tolist()}
+    known |= {f"error, largest [{unit}]": log.reconstruction_error_max.tolist(),
+              f"rms [{unit}]": log.reconstruction_error_rms.tolist(), f"std q [{unit}]": log.position_std.tolist(),
+              f"std dq [{unit}/s]": log.speed_std.tolist(), f"std ddq [{unit}/s^2]": log.acceleration_std.tolist()}
     tables = (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white."),
               _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
     return tables if log.noise_floor is None else (*tables, _floor_table(log, log.noise_floor))
 
 
 def _floor_table(log: LogResult, noise: NoiseFloor) -> Table:
+    unit, torque = _unit(log), " or ".join(dict.fromkeys("N m" if own == "rad" else "N" for own in log.units))
     floor: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
-    floor |= {"position [rad]": noise.position.tolist(), "torque [N m]": noise.torque.tolist()}
+    floor |= {f"position [{unit}]": noise.position.tolist(), f"torque [{torque}]": noise.torque.tolist()}
     passed = "" if noise.cutoff_hz is None else f" below {format_number(noise.cutoff_hz, 3)} Hz"
     if noise.cutoff_hz is not None:
-        floor |= {f"position{passed} [rad]": noise.position_low_pass.tolist(),
-                  f"torque{passed} [N m]": noise.torque_low_pass.tolist()}
+        floor |= {f"position{passed} [{unit}]": noise.position_low_pass.tolist(),
+                  f"torque{passed} [{torque}]": noise.torque_low_pass.tolist()}
     if log.mean is not None:
-        floor |= {"std dq of the mean [rad/s]": log.mean.speed_std.tolist(),
-                  "std ddq of the mean [rad/s^2]": log.mean.acceleration_std.tolist()}
+        floor |= {f"std dq of the mean [{unit}/s]": log.mean.speed_std.tolist(),
+                  f"std ddq of the mean [{unit}/s^2]": log.mean.acceleration_std.tolist()}
     return _table(floor, "Noise floor: standard deviation of one sample of one period, by what differs between periods.")
 
 
@@ -164,10 +185,10 @@ def _table(columns: dict[str, Sequence[float]], caption: str) -> Table:
 
 
 def _figures(log: LogResult, s: Series, first: bool) -> list[Figure]:
-    joints, unit = len(log.units), log.units[0]
+    joints, unit = len(log.units), _unit(log)
     band = " The band is two standard deviations, where it is wide enough to see." if not np.isnan(log.speed_std).all() else ""
-    largest = format_number(float(log.reconstruction_error_max.max()), 2)
-    error = (f"Measured minus reconstructed position: {largest} {unit} at most. "
+    largest = " and ".join(f"{format_number(figures[0] or 0.0, 2)} {own}" for own, figures in _by_unit(log).items())
+    error = (f"Measured minus reconstructed position: {largest} at most. "
              "It should look like the steps of the encoder, without a trace of the motion.")
     spectrum = ("Spectrum of that difference: flat above the bandwidth, where it is the encoder's noise. A peak would be an error "
                 "of the encoder, or a vibration that the reconstruction does not follow.")

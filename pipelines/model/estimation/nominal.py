@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipelines.errors import UsageError
 from pipelines.log.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
@@ -35,8 +36,13 @@ def nominal_columns(robot: RobotDescription, *, friction: bool = True, offset: b
     """Base parameters, and at every joint Coulomb and viscous friction, an offset, and a geared rotor's inertia.
 
     Rotor inertia that the rigid body shows already (the first joints' of most arms) has no column of its own.
+
+    Raises:
+        UsageError: C02, symmetric links of an arm whose parameters are not those of the paper.
     """
     body = rigid_body(robot)
+    if symmetric and not {p.name for p in body.parameters}.issuperset(_SYMMETRIC):
+        raise UsageError("C02", "only the RRR arm has p4 and p15", where="--symmetric", remedy="leave it out")
     names = [name for name, wanted in (("coulomb", friction), ("viscous", friction), ("torque_offset", offset)) if wanted]
     laws = [effect for name in names for effect in find_effect(name).everywhere(robot.n_joints)]
     kept = tuple(i for i, p in enumerate(body.parameters) if not (symmetric and p.name in _SYMMETRIC))

@@ -23,13 +23,14 @@ class Result:
 
     robot: str
     joints: tuple[str, ...]
+    torque_units: tuple[str, ...]  # per joint: "N m", or "N" of a prismatic one
     parameters: tuple[Estimated, ...]
     condition_number: float  # of Φ in (13): rigid columns, unweighted, SI
     condition_number_fit: float  # of the weighted columns at unit length
     rank: int
     relative_error: dict[str, float]  # identify, validate
-    torque_rms: dict[str, tuple[float, ...]]  # [N m] of the residual, per joint
-    torque_signal_rms: dict[str, tuple[float, ...]]  # [N m]
+    torque_rms: dict[str, tuple[float, ...]]  # [torque_units] of the residual, per joint
+    torque_signal_rms: dict[str, tuple[float, ...]]  # [torque_units]
     held_out: str  # "logs" | "blocks"
     filter_hz: float | None  # low-pass over torque and columns
     equations: tuple[int, ...]  # of each joint, too slow samples left out
