@@ -7,6 +7,9 @@ Source   Kostić et al. 2004, Section IV.C.2 and IV.C.4, eq. (16)-(21), Figs. 7 
 The observer is eq. (20), its jerk the one its innovations ask for; the default goes on to smooth, with later samples as well.
 A derived log holds the motion of every sample. Periods of a periodic log are compared, and how well their mean is known is
 reported; equations are taken from the mean by who makes them, `estimate-bps`, out of those same samples.
+
+Positions alone are asked. Whether torque belongs to the motion, joint by joint, in sign, in scale and in time (S13 to S15,
+T06), changes nothing here: `inspect` tells, and `estimate-bps` refuses such a log.
 """
 
 from __future__ import annotations

@@ -201,8 +201,8 @@ def test_far_from_the_encoder_is_an_alarm(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("average", [True, False])
-def test_periods_are_compared_and_their_mean_is_better_known(average: bool, tmp_path: Path) -> None:
-    """Three periods: deviations of the mean are those of a sample over √3; the derived log holds every sample either way."""
+def test_periods_are_compared(average: bool, tmp_path: Path) -> None:
+    """Three periods are compared, averaged or not; the derived log holds every sample either way."""
     log = make_log(good_path(), duration=15.0, period=5.0)
     outcome = stage(tmp_path, log, settings=Settings(average=average))
     text = " ".join(text for section in outcome.report.sections for text in section.text)
@@ -211,7 +211,6 @@ def test_periods_are_compared_and_their_mean_is_better_known(average: bool, tmp_
     assert ("not averaged, as asked for" in text) == (found.mean is None) == (not average)
     if found.mean is not None:
         assert found.mean.periods == 3
-        np.testing.assert_allclose(found.mean.speed_std, found.speed_std / np.sqrt(3.0), rtol=1e-6)
     assert motion_of(open_log(outcome.folder / "logs/log-0.h5").log, Settings(average=not average)).derived
 
 
