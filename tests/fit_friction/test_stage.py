@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from pipelines import fit_friction
-from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.fit_friction import Settings
 from pipelines.log.experiment import Controller, ExperimentLog, Signal
 from pipelines.log.files import Opened, open_log, write_log
 from pipelines.log.model_file import read_model
+from pipelines.log.robot import format_robot
 from pipelines.model.arm import Arm
 from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs, Outcome, Request, run_stage
@@ -150,11 +151,19 @@ def one_way(good: ExperimentLog) -> ExperimentLog:
     return as_log(np.round(states[:, 0] / 1e-5) * 1e-5, tau, "one-way")
 
 
+def limited(log: ExperimentLog, limit: float) -> ExperimentLog:
+    """A drive that gives no more than it is described to."""
+    joints = tuple(replace(joint, torque=limit) for joint in log.robot.joints)
+    text = format_robot(replace(log.robot, joints=joints))
+    return replace(changed(log, tau=np.clip(log.tau, -limit, limit)), robot_text=text)
+
+
 BAD = {
     "D10": one_way,
     "S14": lambda log: changed(log, tau=-log.tau),
-    "D05": lambda log: changed(log, tau=np.clip(log.tau, -1.6, 1.6)),
-    "D16": lambda log: changed(log, q=log.q + np.array([0.3, 0.0, 0.0]) * np.sin(2 * np.pi * 0.3 * log.t)[:, None]),
+    "D05": lambda log: limited(log, 1.6),
+    "D16": lambda log: changed(log, q=log.q + 1.5 * np.outer(np.sin(2 * np.pi * 0.3 * log.t), [1.0, 0.0, 0.0]),
+                               tau=log.tau + np.outer(np.sin(2 * np.pi * 0.31 * log.t), [1.0, 0.0, 0.0])),
     "S10": lambda log: changed(log, current=log.tau),
 }
 
@@ -162,11 +171,7 @@ BAD = {
 @pytest.mark.parametrize("code", BAD)
 def test_bad_input_is_a_clear_finding(code: str, good: ExperimentLog, tmp_path: Path) -> None:
     """No reversal, a wrong sign, saturated torque, a locked joint that moves, amperes: named, with what to do, and exit 1."""
-    try:
-        found = stage(tmp_path, BAD[code](good), check=True)
-    except InputRejected as problem:
-        assert problem.code == f"RRID-{code}"
-        return
+    found = stage(tmp_path, BAD[code](good), check=True)
     assert code in gates(found.result), [check.message for check in found.result.checks]
     assert gates(found.result)[code].remedy
     assert found.exit_code == 1
@@ -216,8 +221,9 @@ def test_joints_that_never_moved_alone(samples: Path) -> None:
     assert result.source == "all joints at once"
     truth = Arm.from_model(read_model("rrr"))
     for joint, law in zip(result.joints, truth.friction, strict=True):
-        speed = joint.series.speed
-        assert relative(joint.series.curve, law.effect.curve(speed, truth, law.values)) < 0.012
+        driven_ = np.abs(joint.series.speed) >= joint.driven[0]
+        speed = joint.series.speed[driven_]
+        assert relative(joint.series.curve[driven_], law.effect.curve(speed, truth, law.values)) < 0.004
     arm = Arm.from_model(result.model)
     for ours, known in zip(arm.base, truth.base, strict=True):
         assert ours.value == pytest.approx(known.value, abs=0.01)

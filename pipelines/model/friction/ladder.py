@@ -105,7 +105,7 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
             break
     best = _best(tried)
     able = [one for one in tried if not one.reason and _alike(one.residual, best.residual)]
-    chosen = min(able, key=lambda one: (one.law.size, one.validate_rms))
+    chosen = min(able or [best], key=lambda one: (one.law.size, one.validate_rms))
     return Ladder(tuple(tried), chosen, best, "logs" if judge.validate is not None else "blocks")
 
 
