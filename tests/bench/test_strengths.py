@@ -36,9 +36,9 @@ INVISIBLE: dict[tuple[str, int | None], str] = {
     ("joint_elasticity", 3): "grows with the fourth power of frequency, and this motion is slow: an FRF (1.5)",
     ("quadratic_drag", 2): "a slow shoulder: viscous friction absorbs it (0.2)",
     ("quadratic_drag", 3): "0.02 N m s²/rad² at 2.4 rad/s, and viscous friction absorbs most (2.3)",
-    ("viscous_drift", 1): "half of the warm-up happens within 10 s, and the mean is absorbed: longer logs (2.6)",
-    ("viscous_drift", 2): "half of the warm-up happens within 10 s, and the mean is absorbed: longer logs (0.7)",
-    ("viscous_drift", 3): "half of the warm-up happens within 10 s, and the mean is absorbed: longer logs (0.7)",
+    ("viscous_drift", 1): "half of the warm-up happens within 10 s, and the mean is absorbed: 40 s of log are enough (2.6)",
+    ("viscous_drift", 2): "as at the waist, and less viscous friction: 40 s of log are not enough (0.7)",
+    ("viscous_drift", 3): "as at the waist, and less viscous friction: 40 s of log are not enough (0.7)",
 }
 
 
