@@ -146,3 +146,15 @@ def test_an_open_loop_log_is_said_to_have_no_feedback(tmp_path: Path) -> None:
     assert (found.simulation, found.law) == ("closed-loop", "open-loop")
     assert found.torque_rms[2] == 0.0
     assert "without feedback" in outcome.report.verdict
+
+
+def test_the_verdict_is_that_of_the_logs_with_feedback(tmp_path: Path) -> None:
+    """An open-loop log beside one in closed loop drifts further whatever the model, and is not what the verdict tells."""
+    log = controlled_log(SAMPLES)
+    assert log.controller is not None
+    friction = replace(log, name="alone", experiment="friction", joint=3, controller=replace(log.controller, law="open-loop"))
+    for name, one in (("waving", log), ("alone", friction)):
+        write_log(tmp_path / f"{name}.h5", one)
+    outcome = run_stage(STAGE, Request((tmp_path / "waving.h5", tmp_path / "alone.h5"), out=tmp_path / "out"), Settings("rrr"))
+    assert f"({log.name}, the only log in closed loop)" in outcome.report.verdict
+    assert [row[-1] for row in outcome.report.key_figures.rows[::3]] == ["closed loop", "open loop"]

@@ -30,13 +30,31 @@ def simulation_report(model: str, faults: Sequence[str], logs: Sequence[Imitatio
     if not compared:
         said = f"The model {model}{ailing} was simulated in {_many(logs, 'planned experiment')}; nothing was measured to compare"
     else:
-        worst = max(compared, key=lambda one: float(np.max(one.position_rms if one.position_rms is not None else 0.0)))
+        worst = _worst(compared)
         said = (f"The simulation of {model}{ailing} {_stays(worst)} the measured position"
-                f"{'' if len(logs) == 1 else f' ({worst.name}, the worst of {len(logs)} logs)'}, {_way(worst)}")
+                f"{'' if len(logs) == 1 else f' ({worst.name}, {_rank(worst, compared)})'}, {_way(worst)}")
     sections = [_section(one, one.course) for one in logs if one.course is not None]
     if more := [one.name for one in logs if one.course is None]:
         sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
     return Report("Simulation", f"{said}.", "neutral", _key_figures(logs), tuple(sections))
+
+
+def _worst(compared: Sequence[Imitation]) -> Imitation:
+    """The log that is imitated worst. What nothing corrects drifts away whatever the model: it counts where all do so."""
+    kept = [one for one in compared if _how(one) == "closed loop"] or compared
+    return max(kept, key=lambda one: float(np.max(one.position_rms if one.position_rms is not None else 0.0)))
+
+
+def _rank(worst: Imitation, compared: Sequence[Imitation]) -> str:
+    alike = sum(_how(one) == _how(worst) for one in compared)
+    kind = "" if alike == len(compared) else f" in {_how(worst)}"
+    return f"the only log{kind}" if alike == 1 else f"the worst of {alike} logs{kind}"
+
+
+def _how(one: Imitation) -> str:
+    if one.simulation == "windowed":
+        return "windows"
+    return "open loop" if one.law == "open-loop" else "closed loop"
 
 
 def _many(logs: Sequence[Imitation], what: str) -> str:
@@ -64,9 +82,9 @@ def _key_figures(logs: Sequence[Imitation]) -> Table:
         for j, unit in enumerate(one.units):
             figures = (one.position_rms, one.position_max, one.speed_rms, one.torque_rms)
             values = [None if x is None else float(x[j]) for x in figures]
-            rows.append((one.name, j + 1, unit, *values, one.simulation, one.steps))
+            rows.append((one.name, j + 1, unit, *values, _how(one)))
     return Table(("log", "joint", "unit of position", "position, rms", "position, largest", "speed, rms [unit/s]",
-                  "torque, rms [N m]", "simulated", "steps a sample"), tuple(rows), "Simulated minus measured, joint by joint.")
+                  "torque, rms [N m]", "simulated in"), tuple(rows), "Simulated minus measured, joint by joint.")
 
 
 def _section(one: Imitation, s: Course) -> Section:
@@ -91,8 +109,8 @@ def _words(one: Imitation) -> list[str]:
                     f"{levels} {one.units[0]} rms apart, joint by joint.")
     if one.step_error is not None:
         largest = format_number(float(np.max(one.step_error)), 2)
-        text.append(f"The integrator took {one.steps} steps a sample; twice as many change no joint's position by more than "
-                    f"{largest} {one.units[0]} rms.")
+        text.append(f"The integrator took {one.steps} step{'s' * (one.steps > 1)} a sample; twice as many change no joint's "
+                    f"position by more than {largest} {one.units[0]} rms.")
     return text
 
 
