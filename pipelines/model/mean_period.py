@@ -219,7 +219,9 @@ def _between_copies(log: ExperimentLog, found: Reconstructed, folded: _Folded) -
     signals = {name: Signal(values[name], log.signals[name].units, log.signals[name].long_name) for name in values}
     mean = replace(log, signals=signals, sample_time=folded.step, derived=None)
     good = replace(usable(mean), saturated=fold(found.good.saturated.astype(np.float64)) > 0.0)
-    how = Mean(copies * phases, (copies + 1) * phases, folded.periods.count, recording(log), found, fold)
+    varies, counting = folded.periods.noise_variance[:joints], encoder_resolution(found.good) ** 2 / 12.0
+    differing = np.asarray(varies / np.maximum(varies, counting))
+    how = Mean(copies * phases, (copies + 1) * phases, folded.periods.count, differing, recording(log), found, fold)
     return mean, _averaged(how, good, t)
 
 
@@ -229,5 +231,6 @@ def _averaged(how: Mean, good: Usable, t: Array) -> Reconstructed:
     motion = Motion(t, *(how.fold(x[kept]) for x in (whole.motion.q, whole.motion.dq, whole.motion.ddq)))
     if whole.std is None:
         return Reconstructed(motion, None, None, good, False, how)
-    q, dq, ddq = (np.median(std, axis=0) / np.sqrt(how.periods) + np.zeros_like(motion.q) for std in whole.std)
+    shrink = np.sqrt(1.0 - how.differing * (1.0 - 1.0 / how.periods))
+    q, dq, ddq = (np.median(std, axis=0) * shrink + np.zeros_like(motion.q) for std in whole.std)
     return Reconstructed(motion, (q, dq, ddq), whole.observers, good, False, how)
