@@ -71,10 +71,17 @@ def controllers_model(machine: Machine) -> ControllerModel:
     return controller_model(arm_of(with_links(machine.described, links), friction, "rrr-earlier"))
 
 
-def recorded(machine: Machine, experiments: Iterable[Experiment], faults: Sequence[Fault] = (),
-             seed: int = 0) -> Iterator[tuple[str, ExperimentLog]]:
-    """The log of each experiment, after the name of its file. What it says of its reference is so to the last bit."""
+def recorded(machine: Machine, experiments: Iterable[Experiment], faults: Sequence[Fault] = (), seed: int = 0,
+             only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
+    """The log of each experiment, after the name of its file. What it says of its reference is so to the last bit.
+
+    Args:
+        seed: of the session's noise.
+        only: the name of an experiment, where no other has to be recorded.
+    """
     for place, one in enumerate(experiments):
+        if only not in (None, one.name):
+            continue
         plan = replace(one, reference=rounded(one.reference))
         (log,) = record(machine, faults, [plan], seed=1000 * seed + place)
         yield f"{log.name}.h5", _compact(log)

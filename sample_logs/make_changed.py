@@ -36,11 +36,11 @@ def plans_after(machine: Machine) -> Iterator[Experiment]:
     yield cases[experiments.WRITING_CASES.index(FEEDFORWARD)]
 
 
-def changed_logs() -> Iterator[tuple[str, ExperimentLog]]:
-    """Every log of `rrr-changed/`, after the name of its file."""
+def changed_logs(only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
+    """Every log of `rrr-changed/`, after the name of its file; or the one of this name."""
     at_hand = machine()
-    yield from recorded(at_hand, plans_before(at_hand), seed=2)
-    yield from recorded(at_hand, plans_after(at_hand), _what_happened(), seed=3)
+    yield from recorded(at_hand, plans_before(at_hand), seed=2, only=only)
+    yield from recorded(at_hand, plans_after(at_hand), _what_happened(), seed=3, only=only)
 
 
 def _what_happened() -> tuple[Fault, ...]:

@@ -42,7 +42,7 @@ def plans(machine: Machine) -> Iterator[Experiment]:
         yield from (experiments.frf(machine, joint, posture, model, seed, FRF_SECONDS) for joint in joints)
 
 
-def healthy_logs() -> Iterator[tuple[str, ExperimentLog]]:
-    """Every log of `rrr-healthy/`, after the name of its file."""
+def healthy_logs(only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
+    """Every log of `rrr-healthy/`, after the name of its file; or the one of this name."""
     at_hand = machine()
-    return recorded(at_hand, plans(at_hand), seed=1)
+    return recorded(at_hand, plans(at_hand), seed=1, only=only)

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pipelines.bench.experiments import WRITING_CASES
 from pipelines.log.canonical import digest_of
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_changed import changed_logs
 from sample_logs.make_closed_form import NOISE, SAMPLE_TIME, Fourier, averaged_torque, closed_form_logs, torque_step
+from sample_logs.make_healthy import healthy_logs
 from sample_logs.make_model import synthetic_arm
+from sample_logs.make_samples import FOLDERS
 
 FILES = ["excitation-1.h5", "excitation-2.h5", "free-1.h5", "friction-1.h5", "friction-2.h5", "friction-3.h5",
          "hold-1.h5"]
@@ -45,6 +51,54 @@ def test_committed_logs_are_what_the_script_makes(rebuilt: dict[str, ExperimentL
         assert not opened.checks
 
 
+@pytest.mark.parametrize(("name", "made"), [("rrr-healthy/hold-1", healthy_logs), ("rrr-changed/friction-2-3", changed_logs)])
+def test_a_bench_log_is_what_the_script_makes(name: str, made: Callable[[str], Iterator[tuple[str, ExperimentLog]]],
+                                              samples: Path) -> None:
+    """The same digest from the committed file and from the machine recorded anew."""
+    file, log = next(made(name.split("/")[1]))
+    assert name.endswith(file.removesuffix(".h5"))
+    assert digest_of(open_log(samples / f"{name}.h5").log) == digest_of(log)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FOLDERS)
+def test_every_log_is_what_the_script_makes(name: str, samples: Path) -> None:
+    """All three folders: the same files, digest by digest."""
+    logs = dict(FOLDERS[name]())
+    assert sorted(logs) == sorted(path.name for path in (samples / name).iterdir())
+    for file, log in logs.items():
+        assert digest_of(open_log(samples / name / file).log) == digest_of(log), file
+
+
+def test_nothing_in_the_changed_logs_tells_what_changed(samples: Path) -> None:
+    """Logs from before and after of one experiment differ in name, role and samples, and in nothing else."""
+    before, after = (open_log(samples / f"rrr-changed/{name}.h5").log for name in ("excitation-3-commissioning", "excitation-3"))
+    assert (before.role, after.role) == ("reference", "identify")
+    assert replace(after, name=before.name, role=before.role, signals=before.signals, source=before.source) == before
+    assert set(after.signals) == set(before.signals)
+    assert "link" not in after.robot_text
+
+
+def test_every_kind_of_experiment_is_there(samples: Path) -> None:
+    """Of the healthy machine, with every case of feed-forward and every joint's frequency response in two postures."""
+    logs = [open_log(path).log for path in sorted((samples / "rrr-healthy").iterdir())]
+    assert {log.experiment for log in logs} == {"friction", "hold", "excitation", "free", "writing", "frf"}
+    assert {log.role for log in logs if log.experiment == "excitation"} == {"identify", "validate"}
+    writing = [log.controller.feedforward or () for log in logs if log.experiment == "writing" and log.controller]
+    assert sorted(writing, key=WRITING_CASES.index) == list(WRITING_CASES)
+    assert [log.joint for log in logs if log.experiment == "frf"] == [1, 1, 2, 2, 3, 3]
+
+
+def test_writing_by_feedback_alone_errs_by_millimetres(samples: Path, arm: Arm) -> None:
+    """By 1.1, 1.7 and 4.6 mm in x, y and z, Kostić et al. 2004, Table IV, within a factor of two; with feed-forward far less."""
+    spread = []
+    for case in (1, 6):
+        log = open_log(samples / f"rrr-healthy/writing-{case}.h5").log
+        spread.append(1e3 * np.std(arm.body.tip(log.q) - arm.body.tip(log["q_ref"]), axis=0))
+    assert (np.abs(np.log2(spread[0] / [1.1, 1.7, 4.6])) < 1.0).all()
+    assert (spread[0] / spread[1] > [3.2, 6.9, 4.3]).all()
+
+
 def test_logs_pass_the_strict_checker(shared: Path, samples: Path) -> None:
     """check_log.py finds no fault."""
     done = subprocess.run([sys.executable, str(shared / "tools" / "check_log.py"), str(samples)], check=False,
@@ -52,9 +106,10 @@ def test_logs_pass_the_strict_checker(shared: Path, samples: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_logs_are_small(folder: Path) -> None:
-    """Together under 2.5 MB."""
+def test_logs_are_small(folder: Path, samples: Path) -> None:
+    """Those in closed form under 2.5 MB, all together under 30."""
     assert sum(path.stat().st_size for path in folder.iterdir()) < 2.5e6
+    assert sum(path.stat().st_size for path in samples.rglob("*.h5")) < 30e6
 
 
 @pytest.mark.parametrize("name", FILES)
