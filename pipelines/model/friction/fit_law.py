@@ -18,12 +18,13 @@ from pipelines.model.friction.one_joint import OneJoint, gravity_names
 from pipelines.model.friction.weak_form import Stretch, Windows
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Equations", "LawEquations", "LawFit", "Number", "Predicted", "alike", "fit_law", "posture_groups"]
+__all__ = ["Equations", "LawEquations", "LawFit", "Number", "Predicted", "alike", "fit_law", "posture_groups", "takes_power"]
 
 _SEEN = 0.9  # share of a number that must lie in directions which the rows show
 _ALIKE = 0.02  # [rad] by which locked joints may stand apart and the inertia still be the same
 _SCANNED = 120  # rows that a scan for starts looks at
 _STARTS = 2
+_OTHERS = 8
 _CARRIED = 3  # rounds in which a law that depends on the load sees the load of the fit before
 
 
@@ -279,10 +280,37 @@ def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = Non
     begin = list(starts) if len(starts) == 1 else _best_of(equations, law, arms, starts)
     for _ in range(_CARRIED if law.sees_load else 1):
         found = fit_separable(equations.problem(law, arms), begin)
+        if not takes_power(equations, law, arms[0], found):
+            found = _other(equations, law, arms, starts, found)
         if not np.array_equal(named := law.canonical(found.theta), found.theta):
             found = fit_separable(equations.problem(law, arms), [named])
         begin, arms = [found.theta], equations.arms(found.beta)
     return LawFit(law, arms[0], equations.postures, found, equations.width)
+
+
+def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableFit) -> bool:
+    """Whether friction is against the motion at every speed up to the fastest; of a curve that is not odd nothing is asked.
+
+    Two sigmoids nearly alike, one up and one down, fit the speeds there are and may do anything between them and zero.
+    """
+    speed = float(np.abs(equations.nodes.dq).max()) * np.geomspace(1e-6, 1.0, 200)
+    forth, back = (law.curve(side * speed, arm, found.theta, found.beta[-law.amplitudes:]) for side in (1.0, -1.0))
+    odd = bool(np.allclose(forth, -back, rtol=1e-9, atol=1e-12))
+    return not odd or bool(np.all(forth >= -1e-9 * np.abs(forth).max()))
+
+
+def _other(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array], found: SeparableFit) -> SeparableFit:
+    """The best of other local optima whose curve takes power; `found` where there is none."""
+    problem, scan = equations.problem(law, arms), equations.thinned(_SCANNED).problem(law, arms)
+    grid = [np.clip(theta, problem.lower, problem.upper) for theta in (
+        starts if len(starts) > 1 else law.starts(equations.nodes, arms[0]))]
+    ranked = sorted(grid, key=lambda theta: linear_part(scan.columns(theta), scan.y).rss)[:_OTHERS]
+    ends = sorted((search(problem, theta) for theta in ranked), key=lambda end: end[1].rss)
+    for theta, _ in ends:
+        one = fit_separable(problem, [theta])
+        if takes_power(equations, law, arms[0], one):
+            return one
+    return found
 
 
 def _best_of(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array]) -> list[Array]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.fit.varpro import linear_part
-from pipelines.model.friction.fit_law import Equations, LawFit, fit_law
+from pipelines.model.friction.fit_law import Equations, LawFit, fit_law, takes_power
 from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.rigid.body import Array
 
@@ -79,7 +79,8 @@ class Judge:
     def try_law(self, law: Law, start: Sequence[Array] | None = None, sharpness: float | None = None) -> Tried:
         fit = fit_law(self.identify, law, start, sharpness)
         residual = self.residual(fit)
-        return Tried(fit, fit.found.rms, float(np.sqrt(np.mean(np.square(residual)))), residual, _fault(fit))
+        return Tried(fit, fit.found.rms, float(np.sqrt(np.mean(np.square(residual)))), residual,
+                     _fault(fit, takes_power(self.identify, law, fit.joint, fit.found)))
 
 
 def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
@@ -178,10 +179,12 @@ def _held_out(fit: LawFit) -> Array:
     return residual
 
 
-def _fault(fit: LawFit) -> str:
-    """Why a law cannot be chosen: a number that its cause cannot have.
+def _fault(fit: LawFit, takes: bool) -> str:
+    """Why a law cannot be chosen: a number that its cause cannot have, or a curve that gives power back at some speed.
 
     Numbers that the rows hardly show are no fault: a law that has too many of them judges no better than a simpler one.
     """
     below = [number.name for number in fit.numbers if number.low >= 0.0 and number.value < number.low - _SURE * number.std]
-    return f"{', '.join(below)} would be negative" if below else ""
+    if below:
+        return f"{', '.join(below)} would be negative"
+    return "" if takes else "its curve would push at speeds that are not in these logs"
