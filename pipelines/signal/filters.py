@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.blocks import impulse_toeplitz
 
-__all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "decimate", "design_low_pass", "passed_both_ways",
+__all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "passed_both_ways",
            "zero_phase"]
 
 Array = npt.NDArray[np.float64]
@@ -108,11 +108,6 @@ def _carry(across: Complex, drive: Array) -> Array:
 def choose_decimation(cutoff_hz: float, rate: float) -> int:
     """Every how many samples are enough after a low-pass at `cutoff_hz`: at least four a period of the cut-off stay."""
     return max(1, int(rate / (_KEEP * cutoff_hz) + 1e-9))
-
-
-def decimate(x: Array, factor: int) -> Array:
-    """Every `factor`-th sample along axis 0. The signal must have passed the low-pass before."""
-    return np.ascontiguousarray(x[::factor])
 
 
 def centre_hold(command: Array) -> Array:

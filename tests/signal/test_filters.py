@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.filters import centre_hold, centre_samples, choose_decimation, decimate, design_low_pass, zero_phase
+from pipelines.signal.filters import centre_hold, centre_samples, choose_decimation, design_low_pass, zero_phase
 
 
 @pytest.mark.parametrize("order", range(1, 9))
@@ -66,7 +66,7 @@ def test_decimation_keeps_what_passed_the_low_pass() -> None:
     assert factor == 12
     t = np.arange(48_000) * 1e-3
     high = np.sin(2 * np.pi * (1000.0 / factor - 15.0) * t + rng.uniform())  # would fold to 15 Hz
-    kept = decimate(zero_phase(high, design_low_pass(20.0, 1000.0)), factor)
+    kept = zero_phase(high, design_low_pass(20.0, 1000.0))[::factor]
     assert kept.shape == (4000,)
     assert np.abs(kept[100:-100]).max() < 1e-3
     assert choose_decimation(400.0, 1000.0) == 1
