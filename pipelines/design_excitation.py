@@ -206,7 +206,7 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
     log = planned_log(f"{task.robot.name} {settings.criterion} excitation", task.robot, _joint_motion(t, motion), "excitation",
                       "identify")
     log = replace(log, period=trajectory.series.period if task.rest else None)
-    goal = task.problem.goal
+    goal, top = task.problem.goal, int(np.flatnonzero(task.harmonics.used.any(axis=0))[-1]) + 1
     return Result(
         robot=task.robot.name, joints=tuple(j.name for j in task.robot.joints), purpose="excitation",
         criterion=settings.criterion, ceiling=goal.ceiling, condition_number=judged.condition_number,
@@ -219,7 +219,8 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
         run_in=trajectory.run_in, duration=trajectory.duration, sample_time=settings.sample_time,
         home=None if task.home is None else tuple(map(float, task.home)), noise=tuple(map(float, goal.noise)),
         friction_columns=task.problem.columns.friction, torque_checked=task.arm is not None, torque_share=settings.torque_share,
-        after=after, first_mode=mode, rehearsal=rehearsal, rehearsal_failed=failed, plans=(),
+        after=after, first_mode=mode, mode_factor=settings.mode_factor, top_hz=top / trajectory.series.period,
+        rehearsal=rehearsal, rehearsal_failed=failed, plans=(),
         logs=(("trajectory", log),), table=controller_table(given.recipe, task.robot, lambda at: trajectory.at(at)[0].T,
                                                             trajectory.duration, settings.sample_time),
         coefficients=_coefficients(task, trajectory))

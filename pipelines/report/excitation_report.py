@@ -66,11 +66,12 @@ def _key_figures(result: Result) -> Table:
     rows += [("Frobenius condition number", result.frobenius), ("smallest singular value of Φ/√n", result.smallest_singular_value),
              ("log det of the information matrix", result.log_determinant),
              ("duration", f"{result.periods} × {result.period:g} s{f' and twice {result.run_in:.3g} s' if result.run_in else ''}"),
-             ("start and end", start), ("evaluations, seed", f"{result.evaluations}, {result.seed}")]
+             ("highest harmonic [Hz]", result.top_hz), ("start and end", start),
+             ("evaluations, seed", f"{result.evaluations}, {result.seed}")]
     if result.after:
         rows.append(("information added of", ", ".join(result.after[:6])))
     if result.first_mode is not None:
-        rows.append(("first mode known [Hz]", result.first_mode))
+        rows.append((f"first mode known; no harmonic above 1/{result.mode_factor:g} of it [Hz]", result.first_mode))
     return Table(("what", "figure"), tuple(rows))
 
 
@@ -128,7 +129,8 @@ def _motion(result: Result) -> Section | None:
 
 
 def _limits(result: Result) -> Section:
-    rows = tuple(("tip" if one.joint is None else result.joints[one.joint - 1], one.quantity, one.peak, one.limit, format_unit(one.unit),
+    rows = tuple(("tip" if one.joint is None else result.joints[one.joint - 1], one.quantity, one.peak, one.limit,
+                  format_unit(one.unit),
                   100 * one.share, 100 * one.cost) for one in result.limits)
     dear = [one for one in sorted(result.limits, key=lambda one: -one.cost) if one.cost > _DEAR][:3]
     named = ", ".join(f"{one.quantity} of {'the tip' if one.joint is None else result.joints[one.joint - 1]}" for one in dear)
@@ -146,7 +148,8 @@ def _limits(result: Result) -> Section:
 
 
 def _told(result: Result) -> Section:
-    rows = tuple((p.name, p.value, p.std, format_unit(p.unit), None if not p.value else 100 * p.std / abs(p.value)) for p in result.parameters)
+    rows = tuple((p.name, p.value, p.std, format_unit(p.unit),
+                  None if not p.value else 100 * p.std / abs(p.value)) for p in result.parameters)
     relative = [(p.name, 100 * p.std / abs(p.value)) for p in result.parameters if p.value]
     noise = ", ".join(format_number(value, 3) for value in result.noise)
     text = (f"Standard deviations are those of one experiment whose torque has white noise of {noise} N m (standard deviation, "

@@ -8,6 +8,7 @@ from collections.abc import Callable
 __all__ = ["Budget", "SpentError"]
 
 _TELL_EVERY = 1.0  # [s]
+_LOOK_EVERY = 8  # evaluations: asking for the time of the process may cost as much as one of them
 
 
 class SpentError(Exception):
@@ -26,7 +27,7 @@ class Budget:
         """
         self.seconds, self.limit, self.reserve = seconds, evaluations, reserve
         self.done = 0
-        self._tell, self._start, self._told = tell, time.process_time(), 0.0
+        self._tell, self._start, self._told, self._elapsed = tell, time.process_time(), 0.0, 0.0
 
     @property
     def elapsed(self) -> float:
@@ -39,7 +40,9 @@ class Budget:
         Raises:
             SpentError: nothing is left.
         """
-        elapsed = self.elapsed
+        if self.done % _LOOK_EVERY == 1:
+            self._elapsed = self.elapsed
+        elapsed = self._elapsed
         if self.limit is not None:
             spent = self.done >= self.limit
         else:

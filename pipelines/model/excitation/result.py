@@ -87,6 +87,8 @@ class Result:
     torque_share: float = 1.0
     after: tuple[str, ...] = ()
     first_mode: float | None = None  # [Hz]
+    mode_factor: float = 1.0  # times that the top harmonic lies below it, at least
+    top_hz: float = 0.0  # [Hz] of the highest harmonic
     rehearsal: Rehearsal | None = None
     rehearsal_failed: str = ""
     logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
