@@ -6,17 +6,18 @@ import math
 
 import numpy as np
 
-from pipelines.model.estimation.balance import ALONE, CLOSED
+from pipelines.model.estimation.balance import ALONE, CLOSED, TOGETHER, Balance
 from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
 from pipelines.report.bps import convergence_figure, torque_figure
 from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.style import with_std
+from pipelines.report.style import format_number, with_std
 
 __all__ = ["bps_report"]
 
 _GOOD = 0.1  # relative torque error that is worth calling good
+_POOR = 0.5  # one that explains too little to be used
 _SURE = 3.0  # standard deviations: a value that is clearly visible
 _STANDS_OUT = 2.0  # times the overall relative error: a joint worth naming
 _ALIKE = 0.02  # of the better error: less is no difference worth speaking of
@@ -34,17 +35,20 @@ def bps_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     error = result.relative_error["validate"]
-    return "bad" if result.unresolved or result.physically_consistent is False else \
-        "good" if error < _GOOD and not _worst_joint(result) else "attention"
+    return "bad" if result.unresolved or result.physically_consistent is False or error >= _POOR else \
+        "good" if error < _GOOD and not _worst_joints(result) else "attention"
 
 
-def _worst_joint(result: Result) -> str:
-    """The joint that the model explains far worse than the rest, "joint_5 61 %"; empty where there is none."""
+def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
+    """Joints that the model explains far worse than the whole arm, and their relative error; the worst first."""
     pairs = zip(result.torque_rms["validate"], result.torque_signal_rms["validate"], strict=True)
     errors = [left / whole if whole > 0.0 else 0.0 for left, whole in pairs]
-    worst = max(range(len(errors)), key=errors.__getitem__)
-    return f"{result.joints[worst]} {100 * errors[worst]:.2g} %" if (
-        errors[worst] > _STANDS_OUT * result.relative_error["validate"]) else ""
+    far = [pair for pair in zip(result.joints, errors, strict=True) if pair[1] > _STANDS_OUT * result.relative_error["validate"]]
+    return tuple(sorted(far, key=lambda pair: -pair[1]))
+
+
+def _percent(share: float) -> str:
+    return f"{format_number(100.0 * share, 2)} %"
 
 
 def _seen(p: Estimated) -> str:
@@ -55,17 +59,20 @@ def _seen(p: Estimated) -> str:
 
 
 def _verdict(result: Result) -> str:
-    judged = "held-out logs" if result.held_out == "logs" else "held-out blocks of the fitted logs, for none has role validate,"
+    judged = "held-out logs" if result.held_out == "logs" else "blocks held out of the fitted logs (for none has role validate)"
     if result.unresolved:
         return f"These logs do not determine the model: {result.unresolved}."
     seen = [_seen(p) for p in result.parameters]
-    small, worst = seen.count("known to be small"), _worst_joint(result)
-    noise = _beside_noise(result)
-    text = (f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
-            f"{f', {small} known to be small' if small else ''}; the model explains the torque of {judged} "
-            f"to {100 * result.relative_error['validate']:.2g} %"
-            f"{f', that of the worst joint less well: {worst}' if worst else ''}{f'; {noise}' if noise else ''}.")
-    return text if result.physically_consistent is not False else f"{text} No links that could exist have these parameters."
+    small, error, noise = seen.count("known to be small"), result.relative_error["validate"], _beside_noise(result)
+    worst = ", ".join(f"{name} {_percent(own)}" for name, own in _worst_joints(result))
+    sentences = (f"{'The model predicts' if error < _POOR else 'The model does not explain these logs: it predicts'} the torque of "
+                 f"{judged} with an error of {_percent(error)} (rms){f', in single joints more: {worst}' if worst else ''}"
+                 f"{f'; {noise}' if noise else ''}.",
+                 f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
+                 f"{f', {small} known to be small' if small else ''}.",
+                 *(("No links that could exist have these parameters: some would need negative mass or inertia.",)
+                   if result.physically_consistent is False else ()))
+    return " ".join(sentences)
 
 
 def _beside_noise(result: Result) -> str:
@@ -111,7 +118,7 @@ def _key_figures(result: Result) -> Table:
         ("equations, joint by joint", ", ".join(map(str, result.equations))),
         ("condition number of the rigid columns", result.condition_number),
         ("condition number of the fit, unit columns", result.condition_number_fit),
-        ("low-pass over torque and columns [Hz]", result.filter_hz),
+        ("low-pass over torque and columns [Hz]", "none" if result.filter_hz is None else result.filter_hz),
         ("friction", "fitted with the rest" if result.friction == "fitted" else "taken from the given model"),
         ("links that could exist", {True: "yes", False: "no", None: "cannot be said"}[result.physically_consistent]))
     return Table(("what", "figure"), rows)
@@ -119,15 +126,39 @@ def _key_figures(result: Result) -> Table:
 
 def _parameter_section(result: Result) -> Section:
     known = any(p.known is not None for p in result.parameters)
-    columns = ("parameter", "value ± std", "unit", "seen", "stands for", *(("described",) if known else ()))
+    columns = ("parameter", "value ± std", "unit", "seen", *(("described",) if known else ()), "stands for")
     rows = [(p.name, "not determined" if p.value is None or p.std is None else with_std(p.value, p.std), p.unit,
-             _seen(p), p.combination, *((p.known,) if known else ()))
+             _seen(p), *((p.known,) if known else ()), p.combination)
             for p in result.parameters]
     tones: tuple[Tone, ...] = tuple(
         "good" if p.visible else "bad" if p.value is None else "attention" for p in result.parameters)
-    return Section("Parameters", ("Standard deviations allow for a residual whose samples depend on one another.",),
+    legend = (f"Seen clearly: more than {_SURE:g} standard deviations from zero. Known to be small: the standard deviation is "
+              "small beside parameters of its kind, the value may be zero. Barely: the value says little. Standard deviations "
+              "allow for a residual whose samples depend on one another.")
+    return Section("Parameters", (legend, *_described_words(result), *_rotor_words(result)),
                    (Table(columns, tuple(rows), "Table V of the paper, with what each stands for"
                           f"{', and the value of the described links' if known else ''}.", tones),))
+
+
+def _described_words(result: Result) -> tuple[str, ...]:
+    """How many estimates contradict the described links, and which most."""
+    apart = {p.name: abs(p.value - p.known) / p.std for p in result.parameters
+             if p.value is not None and p.known is not None and p.std}
+    if not apart:
+        return ()
+    far = sorted((name for name in apart if apart[name] > ALONE), key=lambda name: -apart[name])
+    if not far:
+        return (f"All {len(apart)} values of the described links lie within {ALONE:g} standard deviations of the estimate.",)
+    return (f"{len(far)} of {len(apart)} values of the described links lie more than {ALONE:g} standard deviations from the "
+            f"estimate, those of {', '.join(far[:4])} farthest.",)
+
+
+def _rotor_words(result: Result) -> tuple[str, ...]:
+    """Where the inertia of a rotor has gone that has no row of its own beside others that have one."""
+    own = {int(p.name.split(":")[1]) for p in result.parameters if p.name.startswith("rotor_inertia:")}
+    rest = [str(j) for j in range(1, len(result.joints) + 1) if own and j not in own]
+    return (f"The rotor inertia of joint {', '.join(rest)} cannot be told from that of the links: it is contained in their "
+            "parameters, and not in the described values.",) if rest else ()
 
 
 def _course_section(result: Result) -> Section:
@@ -141,7 +172,10 @@ def _course_section(result: Result) -> Section:
     figures = [torque_figure(f"torque-{c.name}", f"{c.name} ({c.role}): measured torque, the model's, its friction, "
                                                  f"and what is left{passed}.",
                              c.t, c.measured, c.model, c.friction, c.left, result.joints, unit) for c in result.courses]
-    return Section("Torque along the experiment", (), (table,), tuple(figures))
+    worst = ", ".join(name for name, _ in _worst_joints(result))
+    words = (f"Much is left of {worst}. Where it follows the motion, the model lacks an effect there: drives that are coupled, "
+             "friction that depends on load or position, a column that belongs to another joint.",) if worst else ()
+    return Section("Torque along the experiment", words, (table,), tuple(figures))
 
 
 def _torque_unit(result: Result) -> str:
@@ -177,7 +211,7 @@ def _settling_words(result: Result) -> tuple[str, ...]:
     if not moved[k] > 0.0:
         return ()
     words = f"The second half of the samples moves {result.parameters[k].name} most, by {moved[k]:.1f} standard deviations"
-    return (f"{words}: noise explains that." if moved[k] < ALONE else
+    return (f"{words}; below {ALONE:g} the largest of so many may be chance." if moved[k] < ALONE else
             f"{words}: more than noise explains. The model lacks something, or it changed during the experiment.",)
 
 
@@ -186,25 +220,33 @@ def _balance_words(result: Result) -> tuple[str, ...]:
     balance = result.balance
     if balance is None:
         return ()
-    together = (f"all differences together make χ² = {balance.chi_square:.3g} of {balance.freedom}, the largest is "
-                f"{max(balance.apart):.1f} standard deviations")
+    together = (f"all differences together make χ² = {balance.chi_square:.3g} in {balance.freedom} degrees of freedom, the largest "
+                f"is {max(balance.apart):.1f} standard deviations")
     late = (f"torque lies {with_std(1e3 * abs(balance.delay), 1e3 * balance.delay_std)} ms "
             f"{'behind' if balance.delay > 0 else 'ahead of'} the position")
     if balance.agree:
         return (f"The balance of power, which needs no acceleration, gives the same parameters: {together}; {late}.",)
-    meanings = []
-    if balance.closure > CLOSED:
-        meanings.append(f"the reconstructed motion contradicts itself by {100 * balance.closure:.2g} % of the energy: its "
-                        f"acceleration is not the slope of its speed, as after an observer that lags; a smoother's is.")
+    unlike = (f"the reconstructed motion contradicts itself by {_percent(balance.closure)} of the energy: its acceleration is not "
+              "the slope of its speed, as after an observer that lags, or where the motion is faster than a smoother follows.")
+    if _nothing_else(balance):
+        return ("The balance of power, which needs no acceleration, finds the same parameters but cannot confirm them: "
+                f"{unlike}",)
+    meanings = [unlike] if balance.closure > CLOSED else []
     if abs(balance.delay) > ALONE * balance.delay_std:
         meanings.append(f"{late}: a drive or a filter delays one of them, or their clocks differ.")
     if differing := [name for name, apart in zip(balance.names, balance.apart, strict=True) if apart > ALONE]:
-        meanings.append(f"too far apart: {', '.join(differing)}. Then the reconstructed acceleration "
-                        f"is too small or too large, or the model lacks an effect.")
+        meanings.append(f"too far apart: {', '.join(differing)}. Either the reconstructed acceleration is too small or too large, "
+                        "or the model lacks an effect.")
     if not meanings:
         meanings.append("No one of them stands out, all of them together do: most likely the model lacks an effect.")
     return (f"The balance of power, which needs no acceleration, does not confirm the parameters: {together}.",
             *(f"{words[0].upper()}{words[1:]}" for words in meanings))
+
+
+def _nothing_else(balance: Balance) -> bool:
+    """Whether parameters and delay agree, and the motion's own contradiction alone stands against it."""
+    return balance.closure > CLOSED and max(balance.apart) < ALONE and balance.deviate < TOGETHER and (
+        abs(balance.delay) < ALONE * balance.delay_std)
 
 
 def _balance_table(result: Result) -> Table | None:
@@ -246,9 +288,9 @@ def _comparison_section(result: Result) -> Section:
                   "" if c.used or not c.value else f"{100 * c.apart[0]:+.2g} … {100 * c.apart[1]:+.2g}",
                   c.failed or ", ".join(filter(None, ("used here" if c.used else "", "as good as the best" if c.tied else ""))))
                  for c in result.comparison)
-    errors = Table(("motion by", "fitted [%]", "held out [%]", "less the one used, 95 % [%]", ""), rows,
-                   "Relative torque error on the same equations. The intervals come of drawing the held-out stretches of time "
-                   f"anew, the same ones for both. {_winner(result.comparison)}")
+    errors = Table(("motion by", "fitted [%]", "held out [%]", "held out, minus the one used [%]", ""), rows,
+                   "Relative torque error on the same equations. The differences are intervals of 95 %, by drawing the held-out "
+                   "stretches of time anew, the same ones for both.")
     good = [c for c in result.comparison if c.value]
     values = tuple((p.name, *(with_std(c.value[k], c.std[k]) for c in good))
                    for k, p in enumerate(result.parameters[:len(good[0].value) if good else 0]))

@@ -30,7 +30,7 @@ from pipelines.model.estimation.regression import LogEquations
 from pipelines.model.rigid.body import Motion, RigidBody
 from pipelines.model.rigid.energy import energy, work
 
-__all__ = ["ALONE", "CLOSED", "Balance", "power_balance"]
+__all__ = ["ALONE", "CLOSED", "TOGETHER", "Balance", "power_balance"]
 
 _WINDOW = 0.02  # [s] between two balances: long against the noise of a sample, short against the motion
 _GROUPS = 40  # at least, left out in turn
@@ -38,7 +38,7 @@ _PIECE = 32768  # samples worked on at once
 _PER_PARAMETER, _FEWEST = 3, 1.5  # groups a parameter: aimed at, and enough to tell chance by
 CLOSED = 2e-3  # of the energy: a smoother leaves 1e-5, central differences of a fine encoder 1e-4, a lagging observer 1e-2
 ALONE = 4.0  # standard deviations of one difference that chance does not make among twenty
-_TOGETHER = 3.0  # normal deviate of all differences together: once in 700
+TOGETHER = 3.0  # normal deviate of all differences together: once in 700
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def power_balance(found: Estimate) -> Balance | None:
     return Balance(tuple(found.columns.names[k].name for k in rigid), tuple(map(float, solution.beta[rigid])),
                    tuple(map(float, std[:-1])), tuple(map(float, apart[:-1])), float(solution.beta[-1]), float(std[-1]),
                    chi_square, rank, deviate, closure, int(gram.counts.sum()),
-                   bool(apart.max() < ALONE and deviate < _TOGETHER and closure < CLOSED))
+                   bool(apart.max() < ALONE and deviate < TOGETHER and closure < CLOSED))
 
 
 def _jackknife(groups: list[Gram], beta: Array) -> Array:
