@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["motion_report"]
 
-_METHODS = {"smoother": "the Kalman smoother, which knows later samples too",
+_CHANCE = 6.0  # standard deviations: noise is further off in one sample of 5e8
+
+_METHODS = {"smoother": "the Kalman smoother",
             "observer": "the Kalman observer, as a controller could",
             "central-differences": "central differences",
             "zero-phase": "a zero-phase low-pass and central differences"}
@@ -38,7 +40,8 @@ def motion_report(logs: Sequence[LogResult]) -> Report:
     sections = [_explanation(logs), *(_log_section(log, log.series, i) for i, log in enumerate(logs) if log.series is not None)]
     if more := [log.name for log in logs if log.series is None]:
         sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
-    return Report("Reconstructed motion", "; ".join(said) + ".", tone, _key_figures(logs), tuple(sections))
+    verdict = " ".join(f"{words[0].upper()}{words[1:]}." for words in said)
+    return Report("Reconstructed motion", verdict, tone, _key_figures(logs), tuple(sections))
 
 
 def _known(logs: Sequence[LogResult]) -> str:
@@ -48,11 +51,11 @@ def _known(logs: Sequence[LogResult]) -> str:
         pairs = [(log.speed_std[j], log.acceleration_std[j]) for log in logs for j, own in enumerate(log.units) if own == unit]
         speed, acceleration = (_largest(np.array(values)) for values in zip(*pairs, strict=True))
         if speed is not None:
-            parts.append(f"speed to {format_number(speed, 2)} {unit}/s and acceleration to {format_number(acceleration, 2)} "
-                         f"{unit}/s^2")
+            parts.append(f"{format_number(speed, 2)} {unit}/s in speed and {format_number(acceleration, 2)} {unit}/s² in "
+                         "acceleration")
     if not parts:
         return "how well speed and acceleration are known, this method cannot say"
-    return f"it knows {' and '.join(parts)} (standard deviation, worst joint)"
+    return f"its standard deviation is {', '.join(parts)} (worst joint)"
 
 
 def _whiteness(logs: Sequence[LogResult], doubtful: Sequence[LogResult]) -> tuple[str, ...]:
@@ -61,11 +64,11 @@ def _whiteness(logs: Sequence[LogResult], doubtful: Sequence[LogResult]) -> tupl
     if doubtful:
         where = f"joint {_listed(coloured(doubtful[0]))}" + ("" if len(logs) == 1 else f" of {doubtful[0].name}")
         more = f" and in {len(doubtful) - 1} more logs" if len(doubtful) > 1 else ""
-        return (f"that holds only where the innovations are white, and those of {where}{more} are coloured",)
+        return (f"these deviations hold only where the innovations are white, and those of {where}{more} are coloured",)
     words = {text.split(":")[0].split(",")[0] for log in logs for text in log.innovation_verdict}
     if words == {"none"}:
-        return ("no joint moves, so nothing tells whether that holds",)
-    return (f"the innovations are {'nearly white' if 'nearly white' in words else 'white'}, so that holds",)
+        return ("no joint moves, so nothing tells whether these deviations hold",)
+    return (f"the innovations are {'nearly white' if 'nearly white' in words else 'white'}, so these deviations hold",)
 
 
 def _alarm(logs: Sequence[LogResult], far: Sequence[LogResult]) -> tuple[str, ...]:
@@ -73,10 +76,14 @@ def _alarm(logs: Sequence[LogResult], far: Sequence[LogResult]) -> tuple[str, ..
         return ()
     worst = max(far, key=lambda log: max(log.reconstruction_error_max[j - 1] for j in straying(log)))
     joint = max(straying(worst), key=lambda j: float(worst.reconstruction_error_max[j - 1]))
-    limit = float(alarm(worst)[joint - 1])
-    return (f"joint {joint}{'' if len(logs) == 1 else f' of {worst.name}'} strays "
+    limit, noise = float(alarm(worst)[joint - 1]), float(worst.observer.measurement_std[joint - 1])
+    allowed = "the paper calls good enough" if limit == ALARM else "its steps allow for"
+    chance = float(worst.reconstruction_error_max[joint - 1]) < _CHANCE * noise
+    why = f", as an encoder with noise of {format_number(noise, 2)} rad does" if chance else ""
+    more = f"; in {len(far)} of {len(logs)} logs a joint strays" if len(far) > 1 else ""
+    return (f"the position of joint {joint}{'' if len(logs) == 1 else f' of {worst.name}'} strays "
             f"{format_number(float(worst.reconstruction_error_max[joint - 1]), 2)} rad from what its encoder measured, more than "
-            f"the {format_number(limit)} rad that {'the paper calls good enough' if limit == ALARM else 'its steps allow for'}",)
+            f"the {format_number(limit, 2)} rad that {allowed}{why}{more}",)
 
 
 def _listed(joints: Sequence[int]) -> str:
@@ -132,8 +139,7 @@ def _explanation(logs: Sequence[LogResult]) -> Section:
 
 def _log_section(log: LogResult, series: Series, number: int) -> Section:
     floor = log.noise_floor
-    text = [f"Innovations of joint {j + 1}: {words}." for j, words in enumerate(log.innovation_verdict)]
-    text = text if number == 0 or coloured(log) else []
+    text = _innovations(log) if number == 0 or coloured(log) else []
     if (doubtful := coloured(log)) and not np.isnan(log.speed_std).all():
         text.append("A stated standard deviation holds only where the innovations are white: do not rely on those of joint "
                     f"{_listed(doubtful)}.")
@@ -145,6 +151,15 @@ def _log_section(log: LogResult, series: Series, number: int) -> Section:
         compared = f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
         text.append(f"{compared if floor.periods else ''}{mean}")
     return Section(f"Log {log.name}", tuple(text), _tables(log), tuple(_figures(log, series, number == 0)))
+
+
+def _innovations(log: LogResult) -> list[str]:
+    """What the innovations of each joint say, joints that say the same together."""
+    numbers, found = [f"{value:.2f}" for value in log.innovation_correlation], dict[str, list[int]]()
+    for j, words in enumerate(log.innovation_verdict):
+        found.setdefault(words.replace(numbers[j], "{}"), []).append(j)
+    return [f"Innovations of joint {_listed([j + 1 for j in joints])}: {words.format(', '.join(numbers[j] for j in joints))}."
+            for words, joints in found.items()]
 
 
 def _tables(log: LogResult) -> tuple[Table, ...]:
@@ -195,7 +210,7 @@ def _figures(log: LogResult, s: Series, first: bool) -> list[Figure]:
     figures = [_bode(log.observer, f"bode-{log.name}")] if first else []
     return [
         *figures,
-        joint_signal_figure(f"error-{log.name}", error, s.t, s.error, unit, quantity="measured − reconstructed"),
+        joint_signal_figure(f"error-{log.name}", error, s.t, s.error, unit, quantity="difference"),
         Figure(f"spectrum-{log.name}", spectrum,
                lambda drawing: draw_density(drawing.subplots(), s.frequency, s.error_density, unit), (6.0, 2.8)),
         Figure(f"speed-{log.name}", f"Reconstructed speed.{band}",
