@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pipelines.errors import Check, RrridError, clean
 
 if TYPE_CHECKING:
+    from pipelines.report.report import Table
     from pipelines.stage import Outcome
 
 __all__ = ["Teller", "say_error", "say_outcome"]
@@ -55,16 +56,19 @@ def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: b
     stream = sys.stderr if as_json else sys.stdout
     print(clean(outcome.report.verdict, 1000), file=stream)
     if outcome.report.key_figures is not None:
-        _say_table(outcome.report.key_figures.rows, stream)
+        _say_table(outcome.report.key_figures, stream)
     _say_checks(outcome.checks, verbose, stream)
     report = outcome.folder / "report.html"
     print(f"→ {report if report.exists() else outcome.folder}", file=stream)
 
 
-def _say_table(rows: Iterable[tuple[Any, ...]], stream: Any) -> None:
+def _say_table(table: Table, stream: Any) -> None:
+    """The rows of a table; its head as well, where a row is more than a name and a figure."""
     from pipelines.report.style import format_number
 
-    cells = [[format_number(c) if isinstance(c, float) else clean("–" if c is None else c, 60) for c in row] for row in rows]
+    head = [table.columns] if len(table.columns) > 2 and table.rows else []
+    cells = [[format_number(c) if isinstance(c, float) else clean("–" if c is None else c, 60) for c in row]
+             for row in (*head, *table.rows)]
     widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))] if cells else []
     for row in cells:
         print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip(), file=stream)

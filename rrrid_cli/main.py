@@ -26,7 +26,7 @@ __all__ = ["app", "entry"]
 
 TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
 Average = Annotated[bool | None, typer.Option("--average/--no-average",
-                                              help="Mean of the periods of a periodic log, where they are alike. [average]")]
+                                              help="Of a periodic log, take the mean of periods that are alike. [average]")]
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
 STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation")
@@ -127,8 +127,8 @@ def reconstruct(
     logs: LogPaths, common: Common,
     method: Annotated[str | None, typer.Option(help="smoother, observer, zero-phase or central-differences. [smoother]")] = None,
     order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
-    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint.")] = None,
-    bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
+    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk [rad/s^order]: one, or one a joint. [as data say]")] = None,
+    bandwidth: Annotated[list[str] | None, typer.Option(help="Bandwidth [Hz], instead of jerk: one, or one a joint.")] = None,
     average: Average = None,
 ) -> None:
     """Reconstruct position, speed and acceleration from the encoders: Kalman observer and smoother."""
@@ -144,16 +144,16 @@ def estimate_bps(
     logs: LogPaths, common: Common,
     method: Annotated[str | None, typer.Option(help="Motion by smoother, observer, zero-phase or central-differences.")] = None,
     order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
-    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk of the model [rad/s^order]: one, or one a joint.")] = None,
-    bandwidth: Annotated[list[str] | None, typer.Option(help="Observer's bandwidth [Hz]: one, or one a joint. [data's]")] = None,
+    jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk [rad/s^order]: one, or one a joint. [as data say]")] = None,
+    bandwidth: Annotated[list[str] | None, typer.Option(help="Bandwidth [Hz], instead of jerk: one, or one a joint.")] = None,
     average: Average = None,
     filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
-    decimate: Annotated[int | None, typer.Option(help="Keep every so-manieth sample. [four a period of the low-pass]")] = None,
-    min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint.")] = None,
-    blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn, without validate logs. [10]")] = None,
-    symmetric: Annotated[bool | None, typer.Option("--symmetric", help="Mirror-symmetric links: p4 = p15 = 0.")] = None,
-    unweighted: Annotated[bool, typer.Option("--unweighted", help="All joints alike, as eq. (15).")] = False,
-    model: Annotated[str | None, typer.Option(help="Model whose friction is subtracted instead of fitted.")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
+    min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
+    blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
+    symmetric: Annotated[bool | None, typer.Option("--symmetric", help="RRR arm, mirror-symmetric links: p4 = p15 = 0.")] = None,
+    unweighted: Annotated[bool, typer.Option("--unweighted", help="Weigh all joints alike, as eq. (15).")] = False,
+    model: Annotated[str | None, typer.Option(help="model.json whose friction is subtracted, not fitted.")] = None,
     allow_same: AllowSame = None,
     allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Fit torque that looks misplaced.")] = None,
 ) -> None:
