@@ -207,7 +207,7 @@ def test_no_log_to_fit(good: ExperimentLog) -> None:
 
 
 @pytest.mark.parametrize("settings", [{"law": "stribek"}, {"method": "guess"}, {"window": 0.0}, {"window": 10.0},
-                                      {"law": "presliding", "method": "output-error"}])
+                                      {"law": "load_friction", "method": "output-error"}])
 def test_settings_have_bounds(settings: dict[str, object], good: ExperimentLog) -> None:
     with pytest.raises(UsageError) as refused:
         computed(good, settings=replace(QUICK, **settings))  # type: ignore[arg-type]

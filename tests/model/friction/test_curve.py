@@ -70,6 +70,7 @@ def test_the_band_is_honest(fits: dict[int, LawFit]) -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
 
 
+@pytest.mark.slow
 def test_the_curve_is_better_than_the_papers_filter(fits: dict[int, LawFit]) -> None:
     """Median error below that of the extended Kalman filter on the same logs."""
     seeds = list(SEEDS)[:3]

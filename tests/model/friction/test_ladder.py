@@ -23,14 +23,14 @@ def judged(law: str, seed: int = 1) -> JointFit:
 @pytest.mark.parametrize("law", TRUTHS)
 def test_six_machines_with_six_laws(law: str) -> None:
     """The chosen law is the true one, and its curve the true one to 1.2 %: a joint jumps over the falling side of a hump in no
-    time, so that a hump is the hardest to see. Where it is off, its band says so.
+    time, so that a hump is the hardest to see. Nowhere is it off by more than four of its standard deviations.
     """
     found = judged(law)
     assert found.fit.law.name == law, [(one.law.name, one.validate_rms) for one in found.ladder.tried]
     speed = driven_speeds(recorded(law, 1))
     apart = found.fit.curve(speed) - TRUTHS[law].curve(speed)
     assert relative(found.fit.curve(speed), TRUTHS[law].curve(speed)) <= 0.012
-    assert np.sqrt(np.mean(np.square(apart / found.fit.curve_std(speed)))) < 2.0
+    assert np.abs(apart / found.fit.curve_std(speed)).max() < 4.0
     # Fig. 6: what friction explains of the simulated speed
     errors = [found.driven.error(simulated) for simulated in (found.driven.with_friction, found.driven.without)]
     assert errors[0] <= 0.05 * errors[1]
