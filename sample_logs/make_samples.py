@@ -16,8 +16,9 @@ from sample_logs.make_closed_form import closed_form_logs
 from sample_logs.make_healthy import healthy_logs
 from sample_logs.make_model import HERE, example_text
 
-__all__ = ["FOLDERS", "main"]
+__all__ = ["FOLDERS", "MUJOCO", "main"]
 
+MUJOCO = "4.0.0"  # that made the committed logs; another rounds the last bit otherwise
 FOLDERS: dict[str, Callable[[], Iterator[tuple[str, ExperimentLog]]]] = {
     "rrr-closed-form": lambda: iter(closed_form_logs().items()), "rrr-healthy": healthy_logs, "rrr-changed": changed_logs}
 

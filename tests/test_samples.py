@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from sample_logs.make_changed import changed_logs
 from sample_logs.make_closed_form import NOISE, SAMPLE_TIME, Fourier, averaged_torque, closed_form_logs, torque_step
 from sample_logs.make_healthy import healthy_logs
 from sample_logs.make_model import synthetic_arm
-from sample_logs.make_samples import FOLDERS
+from sample_logs.make_samples import FOLDERS, MUJOCO
 
 FILES = ["excitation-1.h5", "excitation-2.h5", "free-1.h5", "friction-1.h5", "friction-2.h5", "friction-3.h5",
          "hold-1.h5"]
@@ -51,13 +52,17 @@ def test_committed_logs_are_what_the_script_makes(rebuilt: dict[str, ExperimentL
         assert not opened.checks
 
 
-@pytest.mark.parametrize(("name", "made"), [("rrr-healthy/hold-1", healthy_logs), ("rrr-changed/friction-2-3", changed_logs)])
+@pytest.mark.parametrize(("name", "made"), [("rrr-healthy/hold-1", healthy_logs), ("rrr-changed/writing-6", changed_logs)])
 def test_a_bench_log_is_what_the_script_makes(name: str, made: Callable[[str], Iterator[tuple[str, ExperimentLog]]],
                                               samples: Path) -> None:
-    """The same digest from the committed file and from the machine recorded anew."""
+    """The same digest from the committed file and from the machine recorded anew; by another MuJoCo the same motion to the
+    noise."""
     file, log = next(made(name.split("/")[1]))
     assert name.endswith(file.removesuffix(".h5"))
-    assert digest_of(open_log(samples / f"{name}.h5").log) == digest_of(log)
+    committed = open_log(samples / f"{name}.h5").log
+    if version("mujoco") == MUJOCO:
+        assert digest_of(committed) == digest_of(log)
+    assert np.abs(committed.q - log.q).max() < 2e-4
 
 
 @pytest.mark.slow
