@@ -24,9 +24,10 @@ def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Outcome[ru
 
 
 def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result]) -> None:
-    """inspect, reconstruct, estimate-bps; each with its result in result.json and its files in a folder of its name."""
+    """inspect, fit-friction, reconstruct, estimate-bps; each with its result and a folder of its name."""
     stages = json.loads((whole.folder / "result.json").read_text())["stages"]
-    assert [(stage["name"], stage["exit"]) for stage in stages] == [("inspect", 0), ("reconstruct", 0), ("estimate-bps", 0)]
+    assert [(stage["name"], stage["exit"]) for stage in stages] == [
+        ("inspect", 0), ("fit-friction", 0), ("reconstruct", 0), ("estimate-bps", 0)]
     assert {p.name for p in (whole.folder / "reconstruct/logs").iterdir()} == {p.name for p in (
         whole.folder / "estimate-bps/logs").iterdir()} | {f"{n}.h5" for n in ("friction-1", "friction-2", "friction-3", "hold-1")}
     assert (whole.folder / "estimate-bps/model.json").is_file()
@@ -34,9 +35,10 @@ def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result
 
 
 def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
-    """estimate-bps inside `run`, on derived logs, is bit for bit estimate-bps on the recordings."""
-    alone = run_stage(estimate_bps.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path / "out"), estimate_bps.Settings())
-    inside = json.loads((whole.folder / "result.json").read_text())["stages"][2]["result"]
+    """estimate-bps inside `run`, on derived logs, is estimate-bps on the recordings with the friction that fit-friction found."""
+    settings = estimate_bps.Settings(model=str(whole.folder / "fit-friction/model.json"))
+    alone = run_stage(estimate_bps.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path / "out"), settings)
+    inside = json.loads((whole.folder / "result.json").read_text())["stages"][3]["result"]
     assert inside["parameters"] == alone.json["parameters"]
     assert inside["relative_error"] == alone.json["relative_error"]
     assert (whole.folder / "estimate-bps/model.json").read_bytes() == (alone.folder / "model.json").read_bytes()
@@ -67,7 +69,7 @@ def test_a_bad_log_costs_itself_alone(samples: Path, tmp_path: Path) -> None:
     outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out"), run.Settings())
     assert outcome.exit_code == 3
     assert {c.code for c in outcome.checks if c.level == "reject"} == {"RRID-F02", "RRID-T02"}
-    assert outcome.json["stages"][2]["result"]["parameters"] == good.json["stages"][2]["result"]["parameters"]
+    assert outcome.json["stages"][3]["result"]["parameters"] == good.json["stages"][3]["result"]["parameters"]
 
 
 def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> None:
