@@ -130,7 +130,8 @@ class OpenLoop:
     """Given torque on the open joints, the others held by PD. In the log the gains of an open joint are zero.
 
     `gravity` (n, 2) adds c sin q + c' cos q on the open joints, from the position as read: Section IV.B closes that
-    loop around a joint that gravity pulls at.
+    loop around a joint that gravity pulls at. A log has no words for it, so that its law is then "unknown": replayed as
+    if nothing had fed it back, such a torque lets the arm fall.
     """
 
     torque: Array  # (samples, n) [N m]
@@ -139,7 +140,8 @@ class OpenLoop:
     velocity: str = "observer"
 
     def describe(self, machine: Machine) -> Controller:
-        return _describe(machine, "open-loop", *self._gains(machine), self.velocity)
+        law = "open-loop" if self.gravity is None or not np.any(self.gravity) else "unknown"
+        return _describe(machine, law, *self._gains(machine), self.velocity)
 
     def start(self, machine: Machine, reference: Reference, sample_time: float) -> Step:
         kp, kd = self._gains(machine)

@@ -75,6 +75,7 @@ def friction(machine: Machine, joint: int, seed: int = 0, duration: float = 20.0
     if not machine.robot.joints[joint - 1].revolute:
         torque[:, joint - 1] += gravity[joint - 1, 1]
         gravity[:] = 0.0
+    gravity[np.abs(gravity) < 1e-9] = 0.0  # about an upright axis
     law = OpenLoop(torque, tuple(j == joint - 1 for j in range(machine.n)), gravity)
     return Experiment(f"friction-{joint}-{seed}", "friction", at_rest(at, duration), law, joint=joint)
 

@@ -19,7 +19,8 @@ ways, or both:
 `full` is the fault at the ×1 strength of causes.md at one joint of one machine, phases and the like drawn; `scaled`
 makes it weaker: at a strength near zero it must do almost nothing (no jump), so whatever comes with it (a spring's
 compliance, a motor's lag) scales too. `parameters` are the numbers of the sealed answer, named as in causes.md.
-Prismatic joints: a fault takes its strength from `case.torque` and `case.angle`, which fit the machine.
+Strengths that causes.md lists for ×1, ×0.3 and ×0.1 one by one follow that list (`listed`). Prismatic joints: `case.torque`
+and `case.angle` fit a strength to the machine.
 
     @dataclass(frozen=True)
     class TorqueOffset(Fault):
@@ -56,10 +57,17 @@ import numpy as np
 
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Plan
+from pipelines.errors import UsageError
 
-__all__ = ["Case", "Fault", "Hooks", "Run"]
+__all__ = ["Case", "Fault", "Hooks", "Parameters", "Run", "listed"]
 
 Floats = list[float]
+Parameters = dict[str, float | tuple[float, ...]]
+
+
+def listed(strength: float, *values: float) -> float:
+    """What causes.md lists for the strengths 0, 0.1, 0.3 and 1, straight lines between."""
+    return float(np.interp(strength, (0.0, 0.1, 0.3, 1.0), values))
 
 
 @dataclass(frozen=True)
@@ -80,6 +88,12 @@ class Case:
     def torque(self) -> float:
         """What "s N m" of causes.md means here: the joint's factor, grown with the machine's torque; 1 at the RRR's waist."""
         return self.machine.joint_factor[self.index] * self.size
+
+    @property
+    def angle(self) -> float:
+        """What a radian of causes.md means here: 1 where the joint turns, 0.1 m where it slides, for slides move by tenths of a
+        metre where joints turn by radians."""
+        return 1.0 if self.machine.robot.joints[self.index].revolute else 0.1
 
     @property
     def size(self) -> float:
@@ -108,7 +122,13 @@ class Case:
 
     @property
     def neighbour(self) -> int:
-        """1-based: the joint before this one, or after the first, for what two joints share."""
+        """1-based: the joint before this one, or after the first, for what two joints share.
+
+        Raises:
+            UsageError: C02, there is only one joint.
+        """
+        if self.machine.n < 2:
+            raise UsageError("C02", "two joints share this fault, and the machine has one")
         return self.index if self.index else 2
 
     def phase(self) -> float:
@@ -125,7 +145,7 @@ class Run:
     machine: Machine
     model: Any  # mujoco.MjModel
     data: Any  # mujoco.MjData
-    names: dict[str, int]  # degree of freedom by name: "joint 1", "twist 1", "base", …
+    names: dict[str, int]  # degree of freedom by name: "joint 1", "twist 1", "base 1", …
     dofs: tuple[int, ...]  # of the machine's own joints
     tip_body: int
     tip: tuple[float, float, float]  # [m] in that body's frame
@@ -168,7 +188,7 @@ class Fault(ABC):
         """Itself at `factor` times the strength."""
 
     @abstractmethod
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         """The true values of what a finding reports."""
 
     def build(self, plan: Plan, machine: Machine) -> Plan:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.bench.solid import Solid, axis_rotation
+from pipelines.errors import UsageError
 from pipelines.log.experiment import Array
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.log.urdf import chain_from_urdf
@@ -92,9 +93,20 @@ class Plan:
     joints: tuple[PlannedJoint, ...]
     tip: Array  # (3,) [m] in the last body frame
     attached: tuple[Attached, ...] = ()
-    base: Base | None = None
+    bases: tuple[Base, ...] = ()  # from the ground up, each on the one before
     shafts: tuple[Shaft, ...] = ()
     inner_step: float = INNER_STEP  # [s] no longer than this
+
+    def with_twist(self, index: int, twist: Twist) -> Plan:
+        """One joint's motor apart from its link.
+
+        Raises:
+            UsageError: C02, it is apart already: a spring and a gap at one joint are one mechanism, not two faults.
+        """
+        joint = self.joints[index]
+        if joint.twist is not None:
+            raise UsageError("C02", f"joint {index + 1} gives way twice", remedy="one of joint_elasticity and backlash a joint")
+        return self.with_joint(index, replace(joint, twist=twist))
 
     def with_joint(self, index: int, joint: PlannedJoint) -> Plan:
         return replace(self, joints=(*self.joints[:index], joint, *self.joints[index + 1:]))

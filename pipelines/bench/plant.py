@@ -176,8 +176,10 @@ def _loop(machine: Machine, law: Law, reference: Reference, built: Built, data: 
         waiting.append(command(control(k, q, observer)))
         tau = waiting.pop(0)
         logged = tau.copy()
-        for write in writes:
-            write(t, logged)
+        if writes:
+            for write in writes:
+                write(t, logged)
+            logged = command(logged)  # the recorder's words have as many bits, whatever it was given
         for row, values in zip(rows, (q, logged, truth, speed, observer.e, observer.de, observer.nu), strict=True):
             row.append(values.copy())
         move([a + b for a, b in zip(tau, noise[k], strict=True)])

@@ -24,7 +24,7 @@ class Built:
     """A compiled model and where its degrees of freedom are. Every joint has one, so position and speed share an index."""
 
     model: Any  # mujoco.MjModel
-    dofs: dict[str, int]  # "joint 1", "twist 1", "base", and the names of mobilities
+    dofs: dict[str, int]  # "joint 1", "twist 1", "base 1", and the names of mobilities
     joints: tuple[int, ...]  # where torque acts and encoders read
     tip_body: int
     tip: Array  # (3,) [m] in that body's frame
@@ -55,9 +55,9 @@ def build(plan: Plan, time_step: float) -> Built:
 def _chain(spec: Any, plan: Plan) -> list[Any]:
     """The bodies of the arm, one a joint, each on the one before."""
     parent = spec.worldbody
-    if plan.base is not None:
-        parent = _body(parent, np.eye(3), np.zeros(3), Solid(1.0, np.zeros(3), plan.base.inertia * np.eye(3)))
-        _joint(parent, "base", plan.base.axis, True, plan.base.stiffness, plan.base.damping)
+    for number, base in enumerate(plan.bases, start=1):
+        parent = _body(parent, np.eye(3), np.zeros(3), Solid(1.0, np.zeros(3), base.inertia * np.eye(3)))
+        _joint(parent, f"base {number}", base.axis, True, base.stiffness, base.damping)
     bodies = []
     for number, joint in enumerate(plan.joints, start=1):
         solid, place = joint.solid, (joint.rotation, joint.position)

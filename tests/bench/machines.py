@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.bench.fault import Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Fault, Floats, Hooks, Parameters, Run
 from pipelines.bench.friction import CoulombViscous
 from pipelines.bench.machine import Machine, machine_of
 from pipelines.bench.reference import Reference, times
@@ -60,7 +60,7 @@ class Spy(Fault):
     def scaled(self, factor: float) -> Spy:
         return self
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {}
 
     def start(self, run: Run) -> Hooks:

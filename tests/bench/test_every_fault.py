@@ -59,7 +59,7 @@ def test_a_fault_is_frozen_and_says_what_it_is(name: str) -> None:
     assert is_dataclass(fault)
     assert fault.name == name
     assert fault.parameters()
-    assert all(np.isfinite(value) for value in fault.parameters().values())
+    assert all(np.isfinite(value).all() for value in fault.parameters().values())
     with pytest.raises(FrozenInstanceError):
         fault.joint = 1  # type: ignore[misc]
 

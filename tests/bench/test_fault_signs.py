@@ -229,7 +229,7 @@ def test_a_fault_of_the_library_answers_with_the_names_of_causes() -> None:
         "spring": {"stiffness", "rest_angle"}, "torque_gain": {"gain_error"}, "torque_saturation": {"limit"},
         "torque_crosstalk": {"coefficient", "from_joint"}, "drive_lag": {"time_constant"}, "torque_lag": {"time_constant"},
         "time_delay": {"delay"}, "encoder_eccentricity": {"amplitude", "phase"}, "encoder_crosstalk": {"coefficient", "from_joint"},
-        "transmission_coupling": {"with_joint", "inertia", "viscous", "coulomb"}, "payload": {"mass"},
+        "transmission_coupling": {"with_joint", "inertia", "viscous", "coulomb"}, "payload": {"mass", "first_moment"},
         "gravity_tilt": {"angle", "direction"}, "link_length": {"error", "link"}, "rotor_inertia": {"inertia"},
         "joint_elasticity": {"stiffness", "damping", "frequency", "motor_inertia"},
         "base_resonance": {"frequency", "damping_ratio", "inertia"}, "backlash": {"gap"},

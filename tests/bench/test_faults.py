@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -24,7 +23,7 @@ from pipelines.bench.faults.torque_saturation import TorqueSaturation
 from pipelines.bench.machine import Machine, paper_machine
 from pipelines.bench.plant import run
 from pipelines.bench.reference import at_rest
-from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable
+from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable, unrounded
 from tests.bench.test_rigid import standard_parameters
 from tests.model.rigid.serial_arms import Arm, by_hand
 
@@ -104,6 +103,16 @@ def test_a_soft_base_rings_at_its_own_pole() -> None:
         np.testing.assert_allclose(recording.true_q[1:, 0], kick / table * t - base, atol=2e-3 * kick / (inertia * wd))
 
 
+def test_a_base_may_stand_on_a_base() -> None:
+    """A fault's base does not take the place of one that the machine stands on: heavy and stiff, it changes nothing."""
+    table, stiff = BaseResonance(None, 28.0, 0.08, 8.0), BaseResonance(None, 400.0, 0.08, 8e4)
+    kick = np.zeros((100, 1))
+    kick[0] = 10.0
+    soft, both, rigid = (run(turntable(0.8), OpenLoop(kick, (True,)), at_rest(np.zeros(1), 0.1), faults).true_q
+                         for faults in ([table], [table, stiff], []))
+    np.testing.assert_allclose(both, soft, atol=1e-3 * np.abs(soft - rigid).max())
+
+
 def test_in_the_gap_the_motor_is_alone() -> None:
     """Torque u drives J_m alone until half the gap is crossed, from then on motor and link together."""
     machine, motor, gap, u = turntable(0.8), 0.1, 0.02, 1.0
@@ -158,12 +167,19 @@ def test_lagging_drive_is_a_first_order_filter() -> None:
 
 def test_lagging_record_leaves_the_machine_alone() -> None:
     """The motion is the healthy one, bit for bit; the logged torque is the command through 1/(T s + 1)."""
-    machine = paper_machine()
+    machine = unrounded(paper_machine())
     sick, well = (run(machine, Decentralised(), sway(0.3), faults, seed=2) for faults in ([TorqueLag(3, 5e-3)], []))
     np.testing.assert_array_equal(sick.q, well.q)
     np.testing.assert_array_equal(sick.tau[:, :2], well.tau[:, :2])
     expected = held_through_lag(well.tau[:, 2], 5e-3, 1)
     np.testing.assert_allclose(sick.tau[:, 2], expected, atol=2e-4 * np.abs(expected).max())
+
+
+def test_a_lagging_record_has_the_bits_of_any_other() -> None:
+    """Or a look at the last digits would tell it from a healthy one."""
+    machine = paper_machine()
+    bits = run(machine, Decentralised(), sway(0.3), [TorqueLag(3, 5e-3)]).tau / np.array(machine.torque_resolution)
+    assert np.abs(bits - np.round(bits)).max() < 1e-9
 
 
 def test_saturated_drive_clips_what_acts_not_what_is_logged() -> None:
@@ -178,8 +194,9 @@ def test_saturated_drive_clips_what_acts_not_what_is_logged() -> None:
 
 def test_eccentric_encoder_reads_a_sine_of_the_angle() -> None:
     """q_measured - q = e sin(q + φ) to first order in e, on its own joint."""
-    machine = replace(paper_machine().ideal)
+    machine = paper_machine().ideal
     recording = run(machine, Decentralised(), sway(0.5, amplitude=0.5), [EncoderEccentricity(3, 4e-3, 0.9)])
     error = recording.q - recording.true_q
     np.testing.assert_allclose(error[:, 2], 4e-3 * np.sin(recording.true_q[:, 2] + 0.9), atol=4e-3**2)
     assert (error[:, :2] == 0.0).all()
+    np.testing.assert_allclose(recording.q[0], recording.reference.q[0], atol=1e-12)  # it had settled before

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
 from pipelines.bench.controllers import ComputedTorque, Decentralised, FeedForward, OpenLoop
+from pipelines.bench.fault import Floats, Hooks, Run
 from pipelines.bench.faults import make
 from pipelines.bench.link_model import LinkModel
 from pipelines.bench.machine import draw_machine, paper_machine
 from pipelines.bench.plant import run
 from pipelines.bench.reference import at_rest
 from pipelines.errors import UsageError
-from tests.bench.machines import CENTRE, frictionless, sway, turntable
+from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable
 
 
 @pytest.mark.parametrize("around", ["paper", "fault"])
@@ -101,6 +103,27 @@ def test_backward_difference_takes_the_derivative_from_readings() -> None:
     e = recording.q - recording.reference.q
     law = -np.array(machine.kp) * e - np.array(machine.kd) * np.diff(e, axis=0, prepend=e[:1]) / 1e-3
     np.testing.assert_allclose(recording.tau, law, atol=1e-9)
+
+
+class Breaking(Spy):
+    """Fails in MuJoCo's callback after a while."""
+
+    def start(self, run: Run) -> Hooks:
+        def load(t: float, q: Floats, v: Floats, force: Floats) -> None:
+            if t > 0.01:
+                raise ZeroDivisionError
+
+        return Hooks(load=load)
+
+
+def test_a_run_that_fails_leaves_nothing_behind() -> None:
+    """Neither forces in MuJoCo nor anything that the next run could feel."""
+    machine = paper_machine()
+    before = run(machine, Decentralised(), sway(0.05), seed=5)
+    with pytest.raises(ZeroDivisionError):
+        run(machine, Decentralised(), sway(0.05), [Breaking()])
+    assert mujoco.get_mjcb_passive() is None
+    np.testing.assert_array_equal(run(machine, Decentralised(), sway(0.05), seed=5).q, before.q)
 
 
 def test_a_loop_that_runs_away_says_so() -> None:

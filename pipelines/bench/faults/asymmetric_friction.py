@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import tanh
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["AsymmetricFriction"]
 
@@ -32,7 +32,7 @@ class AsymmetricFriction(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, coulomb=factor * self.coulomb, viscous=factor * self.viscous)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"coulomb_difference": self.direction * self.coulomb, "viscous_difference": self.direction * self.viscous}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Plan, Twist
 from pipelines.bench.rigid import motor_share, typical_inertia
@@ -43,19 +43,20 @@ class Backlash(Fault):
         link = typical_inertia(case.machine.robot)[case.index] - motor
         stiffness = link * (2.0 * pi * _FREQUENCY) ** 2
         reduced = motor * link / (motor + link)
-        return cls(case.joint, 4e-3, stiffness, 2.0 * _DAMPING_RATIO * sqrt(stiffness * reduced), _FILM_RATE * motor, motor, link)
+        damping = 2.0 * _DAMPING_RATIO * sqrt(stiffness * reduced)
+        return cls(case.joint, 4e-3 * case.angle, stiffness, damping, _FILM_RATE * motor, motor, link)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, gap=factor * self.gap, stiffness=self.stiffness / factor, damping=self.damping / sqrt(factor),
                        film=self.film / factor)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"gap": self.gap}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:
-        joint = replace(plan.joints[self.index], twist=Twist(self.motor_inertia))
+        twist = Twist(self.motor_inertia)
         fastest = sqrt(self.stiffness * (1.0 / self.motor_inertia + 2.0 / self.link_inertia))
-        return plan.with_joint(self.index, joint).fast_enough_for(max(fastest, 2.0 * self.film / self.motor_inertia))
+        return plan.with_twist(self.index, twist).fast_enough_for(max(fastest, 2.0 * self.film / self.motor_inertia))
 
     def start(self, run: Run) -> Hooks:
         dof, half, k, d, film = run.names[f"twist {self.joint}"], 0.5 * self.gap, self.stiffness, self.damping, self.film

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault
+from pipelines.bench.fault import Case, Fault, Parameters
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Base, Plan
 
@@ -21,7 +21,7 @@ _DAMPING_RATIO = 0.04
 class BaseResonance(Fault):
     """I ẍ = -k x - d ẋ - τ1 about the first joint's axis: a pole at √(k/I), a zero below it at √(k/(I + J)).
 
-    Strength is 1/I, the frequency stays.
+    Strength is 1/I, the frequency stays: 8, 27 and 80 kg m² at ×1, ×0.3 and ×0.1.
     """
 
     frequency: float  # [Hz] of the pole
@@ -38,11 +38,11 @@ class BaseResonance(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, inertia=self.inertia / factor)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"frequency": self.frequency, "damping_ratio": self.damping_ratio, "inertia": self.inertia}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:
         first, w = plan.joints[0], 2.0 * pi * self.frequency
         axis = first.rotation @ first.axis if first.revolute else np.array([0.0, 0.0, 1.0])
         base = Base(self.inertia, self.inertia * w**2, 2.0 * self.damping_ratio * w * self.inertia, axis)
-        return replace(plan, base=base)
+        return replace(plan, bases=(base, *plan.bases))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["CableHysteresis"]
 
@@ -28,12 +28,12 @@ class CableHysteresis(Fault):
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        return cls(case.joint, case.neighbour, 0.6 * case.torque, 0.4)
+        return cls(case.joint, case.neighbour, 0.6 * case.torque, 0.4 * case.angle)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, torque=factor * self.torque)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"with_joint": self.with_joint, "torque": self.torque, "bend": self.bend}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import sin
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["Cogging"]
 
@@ -33,9 +33,9 @@ class Cogging(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, amplitude=factor * self.amplitude)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"order": self.order, "amplitude": self.amplitude, "phase": self.phase, "order_2": 2.0 * self.order,
-                "amplitude_2": self.second * self.amplitude}
+                "amplitude_2": self.second * self.amplitude, "phase_2": self.second_phase}
 
     def start(self, run: Run) -> Hooks:
         dof, k, a, first, second, b = (run.dofs[self.index], self.order, self.amplitude, self.phase, self.second_phase,

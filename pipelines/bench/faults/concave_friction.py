@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["ConcaveFriction"]
 
@@ -26,12 +26,12 @@ class ConcaveFriction(Fault):
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        return cls(case.joint, 0.4 * case.coulomb, float(case.rng.uniform(0.3, 0.6)))
+        return cls(case.joint, 0.4 * case.coulomb, case.angle * float(case.rng.uniform(0.3, 0.6)))
 
     def scaled(self, factor: float) -> Self:
         return replace(self, amplitude=factor * self.amplitude)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"amplitude": self.amplitude, "speed": self.speed}
 
     def start(self, run: Run) -> Hooks:

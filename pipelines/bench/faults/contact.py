@@ -9,7 +9,7 @@ from typing import Self
 import mujoco
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["Contact"]
 
@@ -36,7 +36,7 @@ class Contact(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, force=factor * self.force)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"start": self.start_time, "duration": self.duration, "force": self.force}
 
     def start(self, run: Run) -> Hooks:

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault
+from pipelines.bench.fault import Case, Fault, Parameters
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Plan
 
@@ -32,7 +32,7 @@ class GravityTilt(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, angle=factor * self.angle)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"angle": self.angle, "direction": self.direction}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:

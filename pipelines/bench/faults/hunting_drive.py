@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import pi, sin
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["HuntingDrive"]
 
@@ -30,7 +30,7 @@ class HuntingDrive(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, amplitude=factor * self.amplitude)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"amplitude": self.amplitude, "frequency": self.frequency}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import copysign, sqrt
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["LeakingCounterbalance"]
 
@@ -24,12 +24,12 @@ class LeakingCounterbalance(Fault):
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        return cls(case.joint, 2.5 * case.torque)
+        return cls(case.joint, 2.5 * case.torque / case.angle)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, stiffness=factor * self.stiffness)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"stiffness": self.stiffness}
 
     def start(self, run: Run) -> Hooks:

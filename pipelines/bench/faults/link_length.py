@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault
+from pipelines.bench.fault import Case, Fault, Parameters
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Plan, plan_of
 from pipelines.log.experiment import Array
@@ -39,7 +39,7 @@ class LinkLength(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, error=factor * self.error)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"error": self.error, "link": self.link}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:

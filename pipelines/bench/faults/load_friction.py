@@ -9,7 +9,7 @@ from typing import Self
 import mujoco
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["LoadFriction"]
 
@@ -33,7 +33,7 @@ class LoadFriction(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, mu=factor * self.mu)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"mu": self.mu}
 
     def start(self, run: Run) -> Hooks:

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault
+from pipelines.bench.fault import Case, Fault, Parameters
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Attached, Plan
 from pipelines.bench.solid import Solid
@@ -30,14 +30,14 @@ class Payload(Fault):
     @classmethod
     def full(cls, case: Case) -> Self:
         x, y, z = case.rng.uniform(-0.03, 0.03, 3).tolist()
-        return cls(None, 0.5 * case.size, (x, y, z))
+        return cls(None, 0.5 * case.tip_size, (x, y, z))
 
     def scaled(self, factor: float) -> Self:
         return replace(self, mass=factor * self.mass)
 
-    def parameters(self) -> dict[str, float]:
-        x, y, z = (self.mass * c for c in self.centre)
-        return {"mass": self.mass, "first_moment_x": x, "first_moment_y": y, "first_moment_z": z}
+    def parameters(self) -> Parameters:
+        x, y, z = self.centre
+        return {"mass": self.mass, "first_moment": (self.mass * x, self.mass * y, self.mass * z)}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:
         last = plan.joints[-1]

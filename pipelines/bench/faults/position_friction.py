@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import cos, pi, remainder, tanh
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["PositionFriction"]
 
@@ -36,7 +36,7 @@ class PositionFriction(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, amplitude=factor * self.amplitude)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"amplitude": self.amplitude, "order": self.order,
                 "phase": remainder(0.5 * pi - self.order * self.centre, 2.0 * pi)}
 

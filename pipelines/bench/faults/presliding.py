@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 from math import ceil, copysign, cos, log, pi, tanh
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run, listed
 
 __all__ = ["Presliding"]
 
 _ELASTIC = 0.5  # of the largest bending: up to there nothing slides
 _FILM = 6e-3  # [rad] presliding distance at which half of the dry friction is borne by bristles
+_DISTANCES = (0.0, 3e-3, 10e-3, 30e-3)  # [rad]
 _FAST = 10.0  # [rad/s] at which damping would equal the bristles' force
 _STEP = 0.1  # of the largest bending: what travel is integrated in
 _FAR = 8.0  # times the largest bending: whoever has come that far slides
@@ -25,33 +26,40 @@ class Presliding(Fault):
         α = 0 for |z| < z_s/2 or z v ≤ 0;  ½ (1 - cos 2π(|z|/z_s - ½)) up to |z| = z_s
 
     After a reversal the force is zero when the joint has moved by z_s = x_c ln 2, as with Dahl's model of distance x_c.
-    F/Fc = x_c/(x_c + 6 mrad): where contacts hardly bend, a film keeps dry friction what it was.
+    F/Fc = x_c/(x_c + 6 mrad): where contacts hardly bend, a film keeps dry friction what it was. On a slide all lengths and
+    speeds are those of its unit.
     """
 
-    distance: float  # [rad] x_c
+    strength: float  # [1]
     dry: float  # [N m] the joint's whole dry friction Fc
     sharpness: float  # [s/rad] w
+    unit: float = 1.0  # [rad], or the [m] that take its place
 
     name = "presliding"
 
     @property
+    def distance(self) -> float:
+        """x_c [rad]."""
+        return self.unit * listed(self.strength, *_DISTANCES)
+
+    @property
     def amplitude(self) -> float:
         """F [N m]."""
-        return self.dry * self.distance / (self.distance + _FILM)
+        return self.dry * self.distance / (self.distance + self.unit * _FILM)
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        return cls(case.joint, 30e-3, case.coulomb, case.sharpness)
+        return cls(case.joint, 1.0, case.coulomb, case.sharpness, case.angle)
 
     def scaled(self, factor: float) -> Self:
-        return replace(self, distance=factor * self.distance)
+        return replace(self, strength=factor * self.strength)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"distance": self.distance, "amplitude": self.amplitude}
 
     def start(self, run: Run) -> Hooks:
         dof, f, w, largest = run.dofs[self.index], self.amplitude, self.sharpness, self.distance * log(2.0)
-        damping = f / _FAST
+        damping = f / (self.unit * _FAST)
         bent, since, free = 0.0, float(run.data.qpos[dof]), 1.0  # z/z_s and q at the end of the last inner step, dz/dq from there
 
         def step(t: float, q: Floats, v: Floats) -> None:

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Attached, Mobility, Plan
 from pipelines.bench.solid import Solid
@@ -40,7 +40,7 @@ class RattlingMass(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, mass=factor * self.mass)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"mass": self.mass, "gap": self.gap}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["RelativeDamper"]
 
@@ -24,12 +24,12 @@ class RelativeDamper(Fault):
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        return cls(case.joint, case.neighbour, 0.6 * case.torque)
+        return cls(case.joint, case.neighbour, 0.6 * case.torque / case.angle**0.5)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, coefficient=factor * self.coefficient)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"with_joint": self.with_joint, "coefficient": self.coefficient}
 
     def start(self, run: Run) -> Hooks:

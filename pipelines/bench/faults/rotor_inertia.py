@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault
+from pipelines.bench.fault import Case, Fault, Parameters
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Plan
 
@@ -30,7 +30,7 @@ class RotorInertia(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, inertia=factor * self.inertia)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"inertia": self.inertia}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import exp, tanh
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["SelfHeating"]
 
@@ -27,12 +27,12 @@ class SelfHeating(Fault):
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        return cls(case.joint, 0.8, case.coulomb, 0.5, case.sharpness)
+        return cls(case.joint, 0.8, case.coulomb, 0.5 * case.angle, case.sharpness)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, share=factor * self.share)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"share": self.share, "time_constant": _COOLING}
 
     def start(self, run: Run) -> Hooks:

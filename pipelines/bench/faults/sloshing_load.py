@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.bench.fault import Case, Fault
+from pipelines.bench.fault import Case, Fault, Parameters
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Attached, Mobility, Plan
 from pipelines.bench.solid import Solid
@@ -42,7 +42,7 @@ class SloshingLoad(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, mass=factor * self.mass)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"mass": self.mass, "length": self.length, "frequency": _FREQUENCY}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import tanh
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["StickingSeal"]
 
@@ -35,7 +35,7 @@ class StickingSeal(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, torque=factor * self.torque)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"torque": self.torque}
 
     def start(self, run: Run) -> Hooks:

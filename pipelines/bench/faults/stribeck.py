@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import e, tanh
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["Stribeck"]
 
@@ -23,12 +23,12 @@ class Stribeck(Fault):
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        return cls(case.joint, 0.4 * case.coulomb, float(case.rng.uniform(0.1, 0.3)), case.sharpness)
+        return cls(case.joint, 0.4 * case.coulomb, case.angle * float(case.rng.uniform(0.1, 0.3)), case.sharpness)
 
     def scaled(self, factor: float) -> Self:
         return replace(self, amplitude=factor * self.amplitude)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"amplitude": self.amplitude, "speed": self.speed}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["TimeDelay"]
 
@@ -26,7 +26,7 @@ class TimeDelay(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, delay=factor * self.delay)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"delay": self.delay}
 
     def start(self, run: Run) -> Hooks:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["TorqueCrosstalk"]
 
@@ -26,7 +26,7 @@ class TorqueCrosstalk(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, coefficient=factor * self.coefficient)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"coefficient": self.coefficient, "from_joint": self.from_joint}
 
     def start(self, run: Run) -> Hooks:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["TorqueGain"]
 
@@ -25,7 +25,7 @@ class TorqueGain(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, gain_error=factor * self.gain_error)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"gain_error": self.gain_error}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import exp
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["TorqueLag"]
 
@@ -26,7 +26,7 @@ class TorqueLag(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, time_constant=factor * self.time_constant)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"time_constant": self.time_constant}
 
     def start(self, run: Run) -> Hooks:

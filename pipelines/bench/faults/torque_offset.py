@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["TorqueOffset"]
 
@@ -25,7 +25,7 @@ class TorqueOffset(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, offset=factor * self.offset)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"offset": self.offset}
 
     def start(self, run: Run) -> Hooks:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numpy as np
-
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run, listed
 
 __all__ = ["TorqueSaturation"]
 
-# causes.md: 0.55, 0.7 and 0.82 of the peak torque at strengths 1, 0.3 and 0.1; the peak itself at none.
-_STRENGTHS, _SHARES = (0.0, 0.1, 0.3, 1.0), (1.0, 0.82, 0.70, 0.55)
+_SHARES = (1.0, 0.82, 0.70, 0.55)  # of the peak torque, the peak itself at no strength
 
 
 @dataclass(frozen=True)
@@ -27,7 +24,7 @@ class TorqueSaturation(Fault):
     @property
     def limit(self) -> float:
         """L [N m]."""
-        return self.peak * float(np.interp(self.strength, _STRENGTHS, _SHARES))
+        return self.peak * listed(self.strength, *_SHARES)
 
     @classmethod
     def full(cls, case: Case) -> Self:
@@ -36,7 +33,7 @@ class TorqueSaturation(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, strength=factor * self.strength)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"limit": self.limit}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import tanh
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 from pipelines.bench.machine import Machine
 from pipelines.bench.plan import Plan, Shaft
 from pipelines.bench.rigid import typical_inertia
@@ -38,7 +38,7 @@ class TransmissionCoupling(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, inertia=factor * self.inertia, viscous=factor * self.viscous, coulomb=factor * self.coulomb)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"with_joint": self.with_joint, "inertia": self.inertia, "viscous": self.viscous, "coulomb": self.coulomb}
 
     def build(self, plan: Plan, machine: Machine) -> Plan:

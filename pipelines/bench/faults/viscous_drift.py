@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import expm1
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["ViscousDrift"]
 
@@ -28,7 +28,7 @@ class ViscousDrift(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, relative_change=factor * self.relative_change)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"relative_change": self.relative_change, "time_constant": self.time_constant}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import exp, pi, sqrt
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["ColouredNoise"]
 
@@ -28,7 +28,7 @@ class ColouredNoise(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, rms=factor * self.rms)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"rms": self.rms, "corner_hz": self.corner_hz}
 
     def start(self, run: Run) -> Hooks:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import sin
 from typing import Self
 
-from pipelines.bench.fault import Case, Fault, Floats, Hooks, Run
+from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
 __all__ = ["GainRipple"]
 
@@ -29,7 +29,7 @@ class GainRipple(Fault):
     def scaled(self, factor: float) -> Self:
         return replace(self, ripple=factor * self.ripple)
 
-    def parameters(self) -> dict[str, float]:
+    def parameters(self) -> Parameters:
         return {"ripple": self.ripple, "order": self.order, "phase": self.phase}
 
     def start(self, run: Run) -> Hooks:
