@@ -13,9 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.log.derive import recording
 from pipelines.log.doctor.checks import Subject, check_log
+from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import Opened, write_log
 from pipelines.log.model_file import read_model
 from pipelines.log.results import encode
@@ -54,8 +57,10 @@ class Result:
     """Every log that was imitated."""
 
     model: str
+    others: tuple[str, ...]  # robots of the logs that are not the model's
     faults: tuple[str, ...]  # as they were written
     logs: tuple[Imitation, ...]
+    tracking_rms: tuple[Array | None, ...]  # [rad] measured minus reference, of each log that was simulated in closed loop
     doctor: tuple[Check, ...]  # what the logs are like
 
 
@@ -63,7 +68,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     """The model, and the logs to imitate.
 
     Raises:
-        UsageError: C02, no model was named; C04, no such file.
+        UsageError: C02, no model was named, or one without inertia; C04, no such file.
     """
     if not settings.model:
         raise UsageError("C02", "no model", where="simulate", remedy="name a model.json, or the shipped 'rrr'")
@@ -72,7 +77,11 @@ def read(request: Request, settings: Settings) -> Inputs:
     inputs = read_logs(request, settings)
     path = Path(settings.model).absolute()
     sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
-    return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
+    arm = Arm.from_model(read_model(settings.model), path)
+    if not arm.p.any() and not arm.effects:
+        raise UsageError("C02", f"the model {path.name} holds friction alone, no inertia", where="simulate",
+                         remedy="name the model.json of estimate-bps")
+    return replace(inputs, sources=(*inputs.sources, *sources), material=arm)
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
@@ -93,13 +102,27 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     taken: set[str] = set()
     for opened in inputs.logs:
         stem = slug(opened.path.stem)
-        while stem in taken:
+        while taken & (names := _names(stem, settings.replicas)):
             stem += "+"
-        taken.add(stem)
+        taken |= names
         said += _examined(opened)
         one = imitate(opened.log, arm, settings.how, f"logs/{stem}", told, len(found) < _DRAWN)
         found.append(replace(one, source=opened.path.name))
-    return Result(nominal.name, settings.fault, tuple(found), tuple(said))
+    tracking = tuple(_tracking(opened.log, one) for opened, one in zip(inputs.logs, found, strict=True))
+    others = sorted({opened.log.robot.name for opened in inputs.logs} - {nominal.robot.name})
+    return Result(nominal.name, tuple(others), settings.fault, tuple(found), tracking, tuple(said))
+
+
+def _names(stem: str, replicas: int) -> set[str]:
+    """What the simulated logs of one log are called: replicas of "run" could be called as another log is, "run-2"."""
+    return {stem, *(f"{stem}-{k + 1}" for k in range(1, replicas))}
+
+
+def _tracking(log: ExperimentLog, one: Imitation) -> Array | None:
+    """Root mean square (joints,) of measured minus reference position: feedback hides a model's error behind this one."""
+    if one.position_rms is None or one.simulation == "windowed" or one.law == "open-loop" or "q_ref" not in log:
+        return None
+    return np.asarray(np.sqrt(np.nanmean((log.q - log["q_ref"])**2, axis=0)))
 
 
 def _examined(opened: Opened) -> list[Check]:
@@ -130,7 +153,8 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 def report(result: Result) -> Report:
     """Measured over simulated position, speed and torque, their difference and its spectrum."""
-    return simulation_report(result.model, result.faults, result.logs)
+    model = result.model if not result.others else f"{result.model} in logs of {', '.join(result.others)}"
+    return simulation_report(model, result.faults, result.logs, result.tracking_rms)
 
 
 STAGE = Stage("simulate", "Simulate a model", Settings, compute, report, read, write, checks=_checks)

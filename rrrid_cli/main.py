@@ -173,12 +173,15 @@ def estimate_bps(
 @with_common
 def simulate(
     common: Common,
-    model: Annotated[str, typer.Argument(help="A model.json, or the name of a shipped one.", show_default=False)],
+    model: Annotated[str, typer.Argument(help="The model.json of estimate-bps, or the shipped 'rrr'.", show_default=False)],
     like: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to imitate, or a folder. Repeatable.")] = None,
-    fault: Annotated[list[str] | None, typer.Option(help="CAUSE:JOINT:NAME=VALUE,…: cogging:2:amplitude=0.1. Repeatable.")] = None,
-    replicas: Annotated[int | None, typer.Option(help="Simulations that differ in their noise. [1]")] = None,
+    fault: Annotated[list[str] | None, typer.Option(
+        help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. A wrong CAUSE "
+             "or NAME is refused with a list of the right ones.")] = None,
+    replicas: Annotated[int | None, typer.Option(help="Simulations that differ in their noise; windows have one. [1]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first one's noise. [1]")] = None,
-    noise: Annotated[list[str] | None, typer.Option(help="Torque noise of the drives, std [N m]: one, or one a joint.")] = None,
+    noise: Annotated[list[str] | None, typer.Option(
+        help="Torque noise of the drives, std [N m], one or one a joint: 0.02,0.01,0.005. Windows have none. [0]")] = None,
     windowed: Annotated[bool | None, typer.Option("--windowed", help="In short windows, though the controller is known.")] = None,
     window: Annotated[float | None, typer.Option(help="Length of such a window [s]. [0.1]")] = None,
     steps: Annotated[int | None, typer.Option(help="Integrator steps a sample. [as few as the error allows]")] = None,

@@ -23,20 +23,22 @@ if TYPE_CHECKING:
 __all__ = ["draw_compared", "draw_drift", "simulation_report"]
 
 
-def simulation_report(model: str, faults: Sequence[str], logs: Sequence[Imitation]) -> Report:
-    """Verdict, key figures, one section a log."""
+def simulation_report(model: str, faults: Sequence[str], logs: Sequence[Imitation],
+                      tracking: Sequence[Array | None]) -> Report:
+    """Verdict, key figures, one section a log. `tracking` [rad] is the measured tracking error of each log (joints,)."""
     ailing = f" with {', '.join(faults)}" if faults else ""
     compared = [one for one in logs if one.position_rms is not None]
     if not compared:
         said = f"The model {model}{ailing} was simulated in {_many(logs, 'planned experiment')}; nothing was measured to compare"
     else:
         worst = _worst(compared)
-        said = (f"The simulation of {model}{ailing} {_stays(worst)} the measured position"
+        reference = next(error for one, error in zip(logs, tracking, strict=True) if one is worst)
+        said = (f"The simulation of {model}{ailing} {_differs(worst, reference)}"
                 f"{'' if len(logs) == 1 else f' ({worst.name}, {_rank(worst, compared)})'}, {_way(worst)}")
     sections = [_section(one, one.course) for one in logs if one.course is not None]
     if more := [one.name for one in logs if one.course is None]:
         sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
-    return Report("Simulation", f"{said}.", "neutral", _key_figures(logs), tuple(sections))
+    return Report("Simulation", f"{said}.", "neutral", _key_figures(logs, tracking), tuple(sections))
 
 
 def _worst(compared: Sequence[Imitation]) -> Imitation:
@@ -61,30 +63,39 @@ def _many(logs: Sequence[Imitation], what: str) -> str:
     return f"one {what}" if len(logs) == 1 else f"{len(logs)} {what}s"
 
 
-def _stays(one: Imitation) -> str:
+def _differs(one: Imitation, tracking: Array | None) -> str:
+    """The largest difference, beside what the controller leaves of the reference and what noise alone makes."""
     assert one.position_rms is not None
     joint = int(np.argmax(one.position_rms))
-    place = f"joint {joint + 1}"
+    off = float(one.position_rms[joint])
+    beside = []
+    if tracking is not None and tracking[joint] > 0.0:
+        beside.append(f"{format_number(100.0 * off / float(tracking[joint]), 2)} % of the tracking error")
     if one.noise_rms is not None and one.noise_rms[joint] > 0.0:
-        place += f": {format_number(float(one.position_rms[joint] / one.noise_rms[joint]), 2)} times what different noise does"
-    return f"stays within {format_number(float(one.position_rms[joint]), 2)} {one.units[joint]} rms ({place}) of"
+        beside.append(f"{format_number(off / float(one.noise_rms[joint]), 2)} times what other noise makes")
+    place = f"joint {joint + 1}{': ' if beside else ''}{', '.join(beside)}"
+    return f"differs from the measured position by {format_number(off, 2)} {one.units[joint]} rms ({place})"
 
 
 def _way(one: Imitation) -> str:
     if one.window is not None:
         return f"in windows of {format_number(one.window * 1e3, 3)} ms that each start where the arm was"
-    return "under the logged torque, without feedback" if one.law == "open-loop" else "in closed loop"
+    if one.law == "open-loop":
+        return "under the logged torque, without feedback: the smallest error grows with time (--windowed compares over short ones)"
+    return "in closed loop"
 
 
-def _key_figures(logs: Sequence[Imitation]) -> Table:
+def _key_figures(logs: Sequence[Imitation], tracking: Sequence[Array | None]) -> Table:
     rows = []
-    for one in logs:
+    for one, reference in zip(logs, tracking, strict=True):
         for j, unit in enumerate(one.units):
-            figures = (one.position_rms, one.position_max, one.speed_rms, one.torque_rms)
+            figures = (one.position_rms, one.position_max, reference, one.speed_rms, one.torque_rms)
             values = [None if x is None else float(x[j]) for x in figures]
             rows.append((one.name, j + 1, unit, *values, _how(one)))
-    return Table(("log", "joint", "unit of position", "position, rms", "position, largest", "speed, rms [unit/s]",
-                  "torque, rms [N m]", "simulated in"), tuple(rows), "Simulated minus measured, joint by joint.")
+    return Table(("log", "joint", "unit of position", "position, rms", "position, largest", "tracking error, rms",
+                  "speed, rms [unit/s]", "torque, rms [N m]", "simulated in"), tuple(rows),
+                 "Simulated minus measured, joint by joint. Tracking error: measured minus reference, by which feedback hides what "
+                 "a model gets wrong.")
 
 
 def _section(one: Imitation, s: Course) -> Section:
@@ -121,7 +132,7 @@ def _figures(one: Imitation, s: Course) -> list[Figure]:
                   "position"),
         joint_signal_figure(f"position-difference-{one.name}", "What the simulation gets wrong: simulated minus measured position.",
                             s.t, s.position_difference, unit, quantity="simulated − measured")]
-    if s.frequency is not None and s.position_density is not None:
+    if s.frequency is not None and s.position_density is not None and one.law != "open-loop":  # of a drift it tells nothing
         figures.append(_density(f"position-spectrum-{one.name}", "Spectrum of that difference. Low frequencies are model errors, "
                                 "peaks are vibrations or ripples that the model lacks.", s.frequency, s.position_density, unit))
     if s.elapsed is not None and s.drift is not None:
@@ -134,10 +145,12 @@ def _figures(one: Imitation, s: Course) -> list[Figure]:
         return figures
     figures += [_compared(f"torque-{one.name}", "Torque that the controller commanded, measured and simulated.", s.t, s.torque,
                           s.torque_simulated, torque_unit, "torque"),
-                joint_signal_figure(f"torque-difference-{one.name}", "Simulated minus measured torque.", s.t, s.torque_difference,
-                                    torque_unit, quantity="simulated − measured")]
+                joint_signal_figure(f"torque-difference-{one.name}", "Simulated minus measured torque. A controller turns encoder "
+                                    "steps and noise into torque, which no model repeats sample by sample.", s.t,
+                                    s.torque_difference, torque_unit, quantity="simulated − measured")]
     if s.frequency is not None and s.torque_density is not None:
-        figures.append(_density(f"torque-spectrum-{one.name}", "Spectrum of that difference.", s.frequency, s.torque_density,
+        figures.append(_density(f"torque-spectrum-{one.name}", "Spectrum of that difference. At high frequencies it is "
+                                "what the controller makes of encoder steps and noise.", s.frequency, s.torque_density,
                                 torque_unit))
     return figures
 
