@@ -104,7 +104,10 @@ def _started(machine: Machine, faults: Sequence[Fault], built: Built, data: Any,
 @contextmanager
 def _forces(machine: Machine, built: Built, data: Any,
             loads: list[Callable[[float, Floats, Floats, Floats], None]]) -> Iterator[None]:
-    """Friction and loads as MuJoCo's passive force while the context lasts."""
+    """Friction and loads as MuJoCo's passive force while the context lasts.
+
+    MuJoCo's warnings, which would go to a file in the working directory, are left out: `_loop` sees a runaway itself.
+    """
     laws = [(dof, law.law()) for dof, law in zip(built.joints, machine.friction, strict=True)]
     position, speed, passive, nothing = data.qpos, data.qvel, data.qfrc_passive, [0.0] * built.model.nv
 
@@ -119,11 +122,14 @@ def _forces(machine: Machine, built: Built, data: Any,
                 load(t, q, v, force)
         passive[:] += force
 
+    told = mujoco.get_mju_user_warning()
     mujoco.set_mjcb_passive(friction_and_loads)
+    mujoco.set_mju_user_warning(lambda text: None)
     try:
         yield
     finally:
         mujoco.set_mjcb_passive(None)
+        mujoco.set_mju_user_warning(told)
 
 
 def _mover(built: Built, data: Any, applied: Floats, hooks: list[Hooks], substeps: int) -> Callable[[Floats], None]:
@@ -183,7 +189,7 @@ def _loop(machine: Machine, law: Law, reference: Reference, built: Built, data: 
         for row, values in zip(rows, (q, logged, truth, speed, observer.e, observer.de, observer.nu), strict=True):
             row.append(values.copy())
         move([a + b for a, b in zip(tau, noise[k], strict=True)])
-        if not max(map(abs, speed)) < _RUNAWAY:
+        if not all(abs(x) < _RUNAWAY for x in speed):  # nor what is not a number
             raise UsageError("C02", f"the loop runs away at {t:.3f} s", remedy="lower the gains, the reference or the strength")
     q_all, tau_all, true_q, true_dq, e, de, nu = (np.array(row) for row in rows)
     observed = (reference.q + e, reference.dq + de, reference.ddq + nu)

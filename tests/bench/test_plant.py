@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from pipelines.bench.controllers import ComputedTorque, Decentralised, FeedForward, OpenLoop
 from pipelines.bench.fault import Floats, Hooks, Run
 from pipelines.bench.faults import make
+from pipelines.bench.faults.base_resonance import BaseResonance
 from pipelines.bench.link_model import LinkModel
 from pipelines.bench.machine import draw_machine, paper_machine
 from pipelines.bench.plant import run
@@ -124,6 +126,15 @@ def test_a_run_that_fails_leaves_nothing_behind() -> None:
         run(machine, Decentralised(), sway(0.05), [Breaking()])
     assert mujoco.get_mjcb_passive() is None
     np.testing.assert_array_equal(run(machine, Decentralised(), sway(0.05), seed=5).q, before.q)
+
+
+def test_what_cannot_be_integrated_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring far too stiff for the inner step: the same error, and MuJoCo writes no log of its own where we are."""
+    monkeypatch.chdir(tmp_path)
+    impossible = [BaseResonance(None, 400.0, 0.08, 8e4), BaseResonance(None, 28.0, 0.08, 8.0)]
+    with pytest.raises(UsageError, match="RRID-C02 the loop runs away at"):
+        run(turntable(), OpenLoop(np.ones((100, 1)), (True,)), at_rest(np.zeros(1), 0.1), impossible)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_loop_that_runs_away_says_so() -> None:
