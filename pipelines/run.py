@@ -99,10 +99,7 @@ def _without(stage: Stage[Any, Any], problem: RrridError) -> Step:
 
 def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
     """The inputs, one robot and one day of recording at a time. Files that no log came out of go with the first."""
-    groups: dict[tuple[str, str, str], list[Opened]] = {}
-    for opened in inputs.logs:
-        log = opened.log
-        groups.setdefault((log.robot_name, log.robot_text, (log.recorded or "")[:10]), []).append(opened)
+    groups = _sessions(inputs.logs)
     if len(groups) < 2:
         return [("", inputs)]
     parts = []
@@ -111,6 +108,26 @@ def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
         parts.append((" ".join(filter(None, (robot, day))), part))
     names = [name for name, _ in parts]
     return [(name if names.count(name) == 1 else f"{name} ({i + 1})", part) for i, (name, part) in enumerate(parts)]
+
+
+def _sessions(logs: Iterable[Opened]) -> dict[tuple[str, str, str], list[Opened]]:
+    """Logs by the robot's name, its description, and the day.
+
+    What a robot was like before (role "reference") goes with every later day, or with the only one.
+    """
+    groups: dict[tuple[str, str, str], list[Opened]] = {}
+    by_day = [((o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]), o) for o in logs]
+    for key, opened in by_day:
+        if opened.log.role != "reference":
+            groups.setdefault(key, []).append(opened)
+    sessions = tuple(groups)
+    for key, opened in by_day:
+        if opened.log.role == "reference":
+            days = [other for other in sessions if other[:2] == key[:2]]
+            later = [other for other in days if not other[2] or key[2] <= other[2]]
+            for other in later or (days if len(days) == 1 else [key]):
+                groups.setdefault(other, []).append(opened)
+    return groups
 
 
 def report(result: Result) -> Report:

@@ -13,7 +13,7 @@ import pytest
 from pipelines import estimate_bps, run
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
-from pipelines.stage import Outcome, Request, run_stage
+from pipelines.stage import Outcome, Request, read_logs, run_stage
 
 
 @pytest.fixture(scope="module")
@@ -82,3 +82,36 @@ def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> Non
     assert outcome.json["stages"] == []
     assert [group["name"] for group in outcome.json["runs"]] == ["rrr-tue", "other"]
     assert {p.name for p in (tmp_path / "out").iterdir() if p.is_dir()} == {"rrr-tue", "other"}
+
+
+def session(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> dict[str, set[str]]:
+    """Which logs (name -> role and time of recording) go together, by the name of their session."""
+    log = open_log(samples / "rrr-closed-form/hold-1.h5").log
+    for name, (role, recorded) in logs.items():
+        write_log(tmp_path / f"{name}.h5", replace(log, name=name, role=role, recorded=recorded))
+    inputs = read_logs(Request((tmp_path,)), run.Settings())
+    return {name: {opened.log.name for opened in part.logs} for name, part in run._apart(inputs)}
+
+
+def test_days_are_apart_and_share_what_was_recorded_before(samples: Path, tmp_path: Path) -> None:
+    """A reference tells of every later day and of none before it."""
+    first, between, last = "2026-03-02T09:00:00Z", "2026-03-04T10:00:00Z", "2026-05-18T09:00:00Z"
+    found = session(tmp_path, samples, a=("identify", first), b=("validate", first), c=("reference", between),
+                    d=("identify", last), e=("validate", last))
+    assert found == {"rrr-tue 2026-03-02": {"a", "b"}, "rrr-tue 2026-05-18": {"c", "d", "e"}}
+
+
+def test_a_reference_belongs_to_what_it_is_compared_with(samples: Path, tmp_path: Path) -> None:
+    """One session from whenever its reference is; a time that nobody told, or a wrong one, parts nothing from its reference."""
+    day, later = "2026-03-04T10:00:00Z", "2026-05-18T09:00:00Z"
+    for number, (reference, rest) in enumerate(((day, later), (None, later), (day, None), (day, day), (later, day))):
+        (tmp_path / str(number)).mkdir()
+        assert session(tmp_path / str(number), samples, c=("reference", reference), d=("identify", rest)) == {"": {"c", "d"}}
+
+
+def test_the_sample_logs_are_three_sessions(samples: Path) -> None:
+    """The arm in closed form; the arm of the bench in order; the same one later, with its commissioning."""
+    inputs = read_logs(Request((samples,)), run.Settings())
+    parts = [sorted({opened.path.parent.name for opened in part.logs}) for _, part in run._apart(inputs)]
+    assert sorted(parts) == [["rrr-changed"], ["rrr-closed-form"], ["rrr-healthy"]]
+    assert sum(len(part.logs) for _, part in run._apart(inputs)) == len(inputs.logs)
