@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from datetime import datetime, timedelta
 
 import numpy as np
 
@@ -35,6 +36,7 @@ _LINK_ERROR, _FRICTION_ERROR = 0.05, 0.08  # of each number that the controllers
 _BITS = {"q_ref": 34, "dq_ref": 30, "ddq_ref": 26, "r": 20, "v": 20, "tau_friction": 24, "tau_feedforward": 24,
          "q_obs": 30, "dq_obs": 24, "ddq_obs": 14}
 _OBSERVED = ("q_obs", "dq_obs", "ddq_obs")
+_BETWEEN = timedelta(seconds=60)  # from the end of one log to the start of the next, and what is left of a second
 
 
 def machine() -> Machine:
@@ -71,20 +73,22 @@ def controllers_model(machine: Machine) -> ControllerModel:
     return controller_model(arm_of(with_links(machine.described, links), friction, "rrr-earlier"))
 
 
-def recorded(machine: Machine, experiments: Iterable[Experiment], faults: Sequence[Fault] = (), seed: int = 0,
+def recorded(machine: Machine, experiments: Iterable[Experiment], begun: datetime, faults: Sequence[Fault] = (), seed: int = 0,
              only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
     """The log of each experiment, after the name of its file. What it says of its reference is so to the last bit.
 
     Args:
+        begun: UTC; when the first log was recorded, the others follow minute by minute.
         seed: of the session's noise.
         only: the name of an experiment, where no other has to be recorded.
     """
     for place, one in enumerate(experiments):
+        at, begun = begun, begun + _BETWEEN + timedelta(seconds=round(float(one.reference.t[-1])))
         if only not in (None, one.name):
             continue
         plan = replace(one, reference=rounded(one.reference))
         (log,) = record(machine, faults, [plan], seed=1000 * seed + place)
-        yield f"{log.name}.h5", _compact(log)
+        yield f"{log.name}.h5", replace(_compact(log), recorded=f"{at:%Y-%m-%dT%H:%M:%SZ}")
 
 
 def rounded(reference: Reference) -> Reference:

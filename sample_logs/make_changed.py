@@ -6,6 +6,7 @@ What happened stands at the end of this file, and of README.md: do not read ther
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import datetime
 
 from pipelines.bench import experiments
 from pipelines.bench.experiments import FEEDFORWARD, Experiment
@@ -16,7 +17,9 @@ from pipelines.log.experiment import ExperimentLog
 from sample_logs.bench_session import controllers_model, machine, recorded
 from sample_logs.make_healthy import WRITING_STIFFNESS, text
 
-__all__ = ["changed_logs", "plans_after", "plans_before"]
+__all__ = ["AFTER", "BEFORE", "changed_logs", "plans_after", "plans_before"]
+
+BEFORE, AFTER = datetime(2026, 3, 4, 10, 0), datetime(2026, 5, 18, 9, 0)  # UTC, when each began
 
 
 def plans_before(machine: Machine) -> Iterator[Experiment]:
@@ -39,8 +42,8 @@ def plans_after(machine: Machine) -> Iterator[Experiment]:
 def changed_logs(only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
     """Every log of `rrr-changed/`, after the name of its file; or the one of this name."""
     at_hand = machine()
-    yield from recorded(at_hand, plans_before(at_hand), seed=2, only=only)
-    yield from recorded(at_hand, plans_after(at_hand), _what_happened(), seed=3, only=only)
+    yield from recorded(at_hand, plans_before(at_hand), BEFORE, seed=2, only=only)
+    yield from recorded(at_hand, plans_after(at_hand), AFTER, _what_happened(), seed=3, only=only)
 
 
 def _what_happened() -> tuple[Fault, ...]:

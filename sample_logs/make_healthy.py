@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import datetime
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.model.writing.reference import writing_task
 from sample_logs.bench_session import controllers_model, machine, recorded
 
-__all__ = ["WRITING_STIFFNESS", "healthy_logs", "plans", "text"]
+__all__ = ["RECORDED", "WRITING_STIFFNESS", "healthy_logs", "plans", "text"]
 
+RECORDED = datetime(2026, 3, 2, 9, 0)  # UTC
 POSTURES = ((0.4, 0.6, -1.1), (0.0, -1.2, 0.8))  # [rad] at rest
 WRITING_STIFFNESS = 1.1  # times the machine's gains: PD alone then errs by millimetres, as in Kostić et al. 2004, Table IV
 FRF_SECONDS = 32.0  # eight periods of the excitation
@@ -45,4 +47,4 @@ def plans(machine: Machine) -> Iterator[Experiment]:
 def healthy_logs(only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
     """Every log of `rrr-healthy/`, after the name of its file; or the one of this name."""
     at_hand = machine()
-    return recorded(at_hand, plans(at_hand), seed=1, only=only)
+    return recorded(at_hand, plans(at_hand), RECORDED, seed=1, only=only)

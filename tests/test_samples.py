@@ -76,10 +76,14 @@ def test_every_log_is_what_the_script_makes(name: str, samples: Path) -> None:
 
 
 def test_nothing_in_the_changed_logs_tells_what_changed(samples: Path) -> None:
-    """Logs from before and after of one experiment differ in name, role and samples, and in nothing else."""
+    """Logs from before and after of one experiment differ in name, role, date and samples, and in nothing else."""
     before, after = (open_log(samples / f"rrr-changed/{name}.h5").log for name in ("excitation-3-commissioning", "excitation-3"))
     assert (before.role, after.role) == ("reference", "identify")
-    assert replace(after, name=before.name, role=before.role, signals=before.signals, source=before.source) == before
+    assert before.recorded is not None
+    assert after.recorded is not None
+    assert before.recorded < after.recorded
+    told = {key: getattr(before, key) for key in ("name", "role", "recorded", "signals", "source")}
+    assert replace(after, **told) == before
     assert set(after.signals) == set(before.signals)
     assert "link" not in after.robot_text
 
