@@ -33,8 +33,9 @@ def simulation_report(model: str, faults: Sequence[str], logs: Sequence[Imitatio
     else:
         worst = _worst(compared)
         reference = next(error for one, error in zip(logs, tracking, strict=True) if one is worst)
-        said = (f"The simulation of {model}{ailing} {_differs(worst, reference)}"
-                f"{'' if len(logs) == 1 else f' ({worst.name}, {_rank(worst, compared)})'}, {_way(worst)}")
+        which = "" if len(logs) == 1 else f" ({worst.name}, {_rank(worst, compared)})"
+        said = (f"The simulation of {model}{ailing} differs from the measured position{which} {_by(worst, reference)}, "
+                f"{_way(worst)}")
     sections = [_section(one, one.course) for one in logs if one.course is not None]
     if more := [one.name for one in logs if one.course is None]:
         sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
@@ -63,7 +64,7 @@ def _many(logs: Sequence[Imitation], what: str) -> str:
     return f"one {what}" if len(logs) == 1 else f"{len(logs)} {what}s"
 
 
-def _differs(one: Imitation, tracking: Array | None) -> str:
+def _by(one: Imitation, tracking: Array | None) -> str:
     """The largest difference, beside what the controller leaves of the reference and what noise alone makes."""
     assert one.position_rms is not None
     joint = int(np.argmax(one.position_rms))
@@ -74,7 +75,7 @@ def _differs(one: Imitation, tracking: Array | None) -> str:
     if one.noise_rms is not None and one.noise_rms[joint] > 0.0:
         beside.append(f"{format_number(off / float(one.noise_rms[joint]), 2)} times what other noise makes")
     place = f"joint {joint + 1}{': ' if beside else ''}{', '.join(beside)}"
-    return f"differs from the measured position by {format_number(off, 2)} {one.units[joint]} rms ({place})"
+    return f"by {format_number(off, 2)} {one.units[joint]} rms ({place})"
 
 
 def _way(one: Imitation) -> str:
@@ -90,10 +91,10 @@ def _key_figures(logs: Sequence[Imitation], tracking: Sequence[Array | None]) ->
     for one, reference in zip(logs, tracking, strict=True):
         for j, unit in enumerate(one.units):
             figures = (one.position_rms, one.position_max, reference, one.speed_rms, one.torque_rms)
-            values = [None if x is None else float(x[j]) for x in figures]
+            values = [None if x is None else float(f"{x[j]:.3g}") for x in figures]
             rows.append((one.name, j + 1, unit, *values, _how(one)))
-    return Table(("log", "joint", "unit of position", "position, rms", "position, largest", "tracking error, rms",
-                  "speed, rms [unit/s]", "torque, rms [N m]", "simulated in"), tuple(rows),
+    return Table(("log", "joint", "unit", "position, rms", "position, largest", "tracking error, rms", "speed, rms [unit/s]",
+                  "torque, rms [N m]", "simulated in"), tuple(rows),
                  "Simulated minus measured, joint by joint. Tracking error: measured minus reference, by which feedback hides what "
                  "a model gets wrong.")
 
