@@ -40,8 +40,7 @@ def ours(y: np.ndarray, tau: np.ndarray, rounds: int) -> LawFit:
     states = smooth(y[:, None], design(STEP, jerk, causal.noise_variance, 3)).states[..., 0]
     spoilt = np.zeros(len(y), dtype=bool)
     spoilt[:50] = spoilt[-50:] = True
-    stretch = Stretch("log", np.arange(len(y)) * STEP, y, tau, states[0], states[1], spoilt, True, 20, True, (),
-                      np.zeros((len(y), 0)))
+    stretch = Stretch("log", np.arange(len(y)) * STEP, y, tau, states[0], states[1], spoilt, True, 20, True, ())
     joint, law = OneJoint.of(recorded("three_sigmoid", 0).robot, JOINT), law_named("three_sigmoid")
     assert law is not None
     fit = fit_law(LawEquations.of((stretch,), joint), law)

@@ -25,6 +25,7 @@ _STEP = 1e-4  # of a finite difference in θ
 _GAIN = 1e-6  # of the sum of squares: of a thousand rows, a thousandth of what noise alone is worth
 _MOST = 40  # steps
 _DAMPING = 1e-3
+_PULLED = 0.1  # the least that 1 - leverage may be
 _UNSHOWN = 1e-9  # of the largest slope's square: what hardly shows is held where it is
 
 
@@ -144,7 +145,9 @@ def _slopes(problem: Separable, theta: Array, now: Linear) -> Array:
 def _with_covariance(problem: Separable, theta: Array, now: Linear, lags: int | None) -> SeparableFit:
     """The sandwich B M B with B = (FᵀF)⁻¹ over what the rows show, and M allowing for rows that depend on one another.
 
-    Newey & West 1987: M = Σ_l w_l Σ_i (f_i r_i)(f_{i+l} r_{i+l})ᵀ with falling weights w_l keeps M positive.
+    Newey & West 1987: M = Σ_l w_l Σ_i (f_i r_i)(f_{i+l} r_{i+l})ᵀ with falling weights w_l keeps M positive. A row that alone
+    shows a number draws the fit to itself; r_i / (1 - h_i), h_i its leverage, is what it leaves when it is left out: HC3 of
+    MacKinnon & White 1985, J. Econometrics 29, p. 305. Inertia hangs on the few rows in which a joint is sped up.
     """
     jacobian = np.hstack([now.columns, _slopes(problem, theta, now)])
     scale = np.linalg.norm(jacobian, axis=0)
@@ -153,14 +156,14 @@ def _with_covariance(problem: Separable, theta: Array, now: Linear, lags: int | 
     values, vectors = np.linalg.eigh(unit.T @ unit)
     kept = values > _RANK**2 * values[-1]
     bread = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    scores = unit * now.residual[:, None]
+    leverage = np.square(unit @ (vectors[:, kept] / np.sqrt(values[kept]))).sum(axis=1)
+    scores = unit * (now.residual / np.maximum(1.0 - leverage, _PULLED))[:, None]
     rows, width = scores.shape
     reach = int(4.0 * (rows / 100.0) ** (2.0 / 9.0)) if lags is None else lags
     meat = scores.T @ scores
     for lag in range(1, min(reach, rows - 1) + 1):
         cross = scores[lag:].T @ scores[:-lag]
         meat += (1.0 - lag / (reach + 1.0)) * (cross + cross.T)
-    meat *= rows / max(rows - int(kept.sum()), 1)
     inverse = np.where(np.isinf(scale), 0.0, 1.0 / scale)
     covariance = bread @ meat @ bread * inverse * inverse[:, None]
     seen = np.where(np.isinf(scale), 0.0, np.square(vectors[:, kept]).sum(axis=1))

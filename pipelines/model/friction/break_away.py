@@ -60,7 +60,7 @@ def friction_torque(stretch: Stretch, fit: LawFit) -> Array:
     if stretch.held:
         tau = np.concatenate([tau[:1], 0.5 * (tau[1:] + tau[:-1])])
     rigid = arm.inertia * np.gradient(stretch.dq, stretch.t) + gravity_columns(stretch.q, stretch.revolute) @ np.array(arm.gravity)
-    return np.asarray(tau - rigid - stretch.sway() @ coupling)
+    return np.asarray(tau - rigid - stretch.sway @ coupling)
 
 
 def _events(stretch: Stretch, creep: float, step: float) -> list[tuple[int, int, int]]:

@@ -49,7 +49,7 @@ class Number:
 class LawFit:
     """A law with its numbers and their covariance.
 
-    Order of `beta`: J, c, c' and couplings of each posture, then the law's amplitudes.
+    Order of `beta`: J, c, c' and those of the sway, posture by posture, then the law's amplitudes.
     """
 
     law: Law
@@ -75,7 +75,7 @@ class LawFit:
         return tuple(map(float, self.found.beta[1:1 + len(gravity_names(self.joint.revolute))]))
 
     def at(self, stretch: Stretch) -> tuple[OneJoint, Array]:
-        """The joint as it is in the posture of `stretch`, and the inertias (coupled,) of the joints that sway beside it."""
+        """The joint as it is in the posture of `stretch`, and what multiplies the sway of the joints beside it (columns,)."""
         rigid = self.found.beta[:self.rigid_size * len(self.postures)].reshape(-1, self.rigid_size)
         own = rigid[nearest(stretch.posture, self.postures)]
         last = 1 + len(gravity_names(self.joint.revolute))
@@ -83,7 +83,7 @@ class LawFit:
 
     @cached_property
     def std(self) -> Array:
-        """Of J, c, c' and couplings of each posture, the amplitudes, and θ."""
+        """Of J, c, c' and those of the sway, posture by posture, the amplitudes, and θ."""
         return np.sqrt(np.maximum(np.diag(self.found.covariance), 0.0))
 
     @cached_property
@@ -184,7 +184,7 @@ class LawEquations:
 
     @cached_property
     def width(self) -> int:
-        """Numbers of one posture: J, c, c', and the inertias that couple joints which sway."""
+        """Numbers of one posture: J, c, c', and what multiplies the sway of joints that are held."""
         return int(self.stretches[0].rigid.shape[1])
 
     @cached_property

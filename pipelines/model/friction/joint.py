@@ -83,8 +83,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
     robot = logs.identify[0][0].robot
     arm = OneJoint.of(robot, logs.joint)
     resolution = max(float(encoder_resolution(found.good)[logs.joint - 1]) for _, found in logs.identify)
-    coupled = _swaying(logs)
-    identify, validate = (_stretches(part, logs.joint, window, coupled) for part in (logs.identify, logs.validate))
+    beside = _swaying(logs)
+    identify, validate = (_stretches(part, logs.joint, window, beside) for part in (logs.identify, logs.validate))
     flexible = law_named(_FLEXIBLE) or LADDER[-1]
     fit = fit_law(LawEquations.of(identify, arm), flexible)
     for _ in range(_ROUNDS):
@@ -99,7 +99,7 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
     covered = coverage(identify)
-    at_rest = [stretch for stretch in _stretches(logs.hold, logs.joint, window, coupled)
+    at_rest = [stretch for stretch in _stretches(logs.hold, logs.joint, window, beside)
                if any(alike(stretch.posture, posture) for posture in final.postures)]
     return JointFit(logs, final, ladder, identify, driven, covered, unseen(covered, ladder), speed_map(identify, final),
                     break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window)
@@ -111,8 +111,8 @@ def _swaying(logs: JointLogs) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def _stretches(seen: Sequence[Seen], joint: int, window: float, coupled: tuple[int, ...]) -> tuple[Stretch, ...]:
-    return tuple(stretch for log, found in seen for stretch in stretches_of(log, joint, found, window, coupled))
+def _stretches(seen: Sequence[Seen], joint: int, window: float, beside: tuple[int, ...]) -> tuple[Stretch, ...]:
+    return tuple(stretch for log, found in seen for stretch in stretches_of(log, joint, found, window, beside))
 
 
 def with_fit(joint: JointFit, fit: LawFit) -> JointFit:

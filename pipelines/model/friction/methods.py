@@ -72,7 +72,7 @@ def filtered(stretches: tuple[Stretch, ...], joint: OneJoint, resolution: float)
     for stretch in stretches:
         mean = start.mean.copy()
         mean[:2] = stretch.q[0], stretch.dq[0]
-        tau = np.where(np.isfinite(stretch.tau), stretch.tau, 0.0) - stretch.sway() @ begun.at(stretch)[1]
+        tau = np.where(np.isfinite(stretch.tau), stretch.tau, 0.0) - stretch.sway @ begun.at(stretch)[1]
         if not stretch.held:
             tau[:-1] = 0.5 * (tau[:-1] + tau[1:])
         step = float(np.median(np.diff(stretch.t)))

@@ -40,7 +40,7 @@ class _Windows:
     start: Array  # (windows, 2) position and speed it begins with
     measured: Array  # (windows, samples + 1) [rad]
     torque: Array  # (windows, samples, 2) [N m] at the beginning and at the end of every step
-    sway: Array  # (windows, samples, coupled) [rad/s^2]
+    sway: Array  # (windows, samples, columns) of joints that are held and sway
     posture: Array  # (windows,) which one
 
 
@@ -84,7 +84,7 @@ def _windows(stretches: Sequence[Stretch], fit: LawFit) -> _Windows:
     for stretch in stretches:
         tau = np.where(np.isfinite(stretch.tau), stretch.tau, 0.0)
         ends = np.stack([tau[:-1], tau[:-1] if stretch.held else tau[1:]], axis=1)
-        sway = stretch.sway()[:-1]
+        sway = stretch.sway[:-1]
         for first in range(0, len(stretch.t) - size - 1, size):
             rows = slice(first, first + size + 1)
             if stretch.spoilt[rows].any() or not np.isfinite(stretch.measured[rows]).all():

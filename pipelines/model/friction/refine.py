@@ -54,7 +54,7 @@ def reference_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
     nodes = stretch.nodes
     load = gravity_columns(nodes.q[:, 0], stretch.revolute) @ np.array(arm.gravity)
     load = load + fit.law.columns(nodes, arm, fit.theta) @ fit.amplitudes
-    dq = (stretch.impulse - stretch.accumulated(load) - (stretch.coupled - stretch.coupled[0]) @ coupling) / arm.inertia
+    dq = (stretch.impulse - stretch.accumulated(load) - stretch.swayed @ coupling) / arm.inertia
     step = np.diff(stretch.t)
     q = np.concatenate([[0.0], np.cumsum(0.5 * step * (dq[1:] + dq[:-1]))])
     shift = np.nanmedian(stretch.measured[:50] - q[:50]) if np.isfinite(stretch.measured[:50]).any() else 0.0

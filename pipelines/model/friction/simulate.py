@@ -44,7 +44,7 @@ def simulate_joint(stretch: Stretch, fit: LawFit, friction: bool = True) -> Simu
     weight = gravity_columns(stretch.q, stretch.revolute) @ np.array(joint.gravity)
     if stretch.held:
         weight[:-1] = 0.5 * (weight[1:] + weight[:-1])
-    given = weight + stretch.sway() @ coupling
+    given = weight + stretch.sway @ coupling
     if joint.inertia <= 0.0:
         lost = np.full(len(stretch.t), np.nan)
         return Simulated(lost, lost)

@@ -19,10 +19,15 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.one_joint import gravity_columns
-from pipelines.model.motion import Reconstructed
+from pipelines.model.friction.sway import Sway, sway_columns
+from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
+from pipelines.signal.observer import design
+from pipelines.signal.smoother import smooth
+from pipelines.signal.tuning import tune_jerk
 
 __all__ = ["Stretch", "Windows", "stretches_of", "swaying"]
 
@@ -36,6 +41,7 @@ _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and g
 _SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
 _FEWEST = 10  # windows of a stretch that is worth using
 _SHORTEST = 4  # samples of a window
+_KINKED = 2  # order of a smoother for motion whose acceleration jumps
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +83,7 @@ class Stretch:
     window: int  # samples
     revolute: bool
     posture: tuple[float, ...]  # [rad] of the other joints
-    coupled: Array  # [rad/s] (samples, coupled) speeds of joints that are held and give way
+    beside: tuple[Sway, ...] = ()  # joints that are held and give way
 
     def moved(self, q: Array, dq: Array) -> Stretch:
         """The same with a better motion."""
@@ -117,14 +123,13 @@ class Stretch:
 
     @cached_property
     def rigid(self) -> Array:
-        """Columns of J, of gravity, and of the inertias J_k that couple joints which are held and sway: (rows, width).
-
-        A controller that holds a joint lets it give way a little; J_k ddq_k then is a torque on this one, and larger than noise.
-        """
+        """Columns of J, of gravity, and of the sway of joints that are held: (rows, width)."""
         mean = np.diff(self.dq[self.edges]) / self.length
-        beside = np.diff(self.coupled[self.edges], axis=0) / self.length[:, None]
         gravity = self.windows.means(gravity_columns(self.nodes.q[:, 0], self.revolute))
-        return np.hstack([mean[self.kept, None], gravity, beside[self.kept]])
+        columns = [mean[self.kept, None], gravity]
+        if self.beside:
+            columns.append((np.diff(self.swayed[self.edges], axis=0) / self.length[:, None])[self.kept])
+        return np.hstack(columns)
 
     @cached_property
     def ends(self) -> Array:
@@ -172,10 +177,15 @@ class Stretch:
         length[:first[-1]] = np.repeat(self.length, np.diff(first))
         return Windows(self.nodes, np.diff(self.ends) / length, first[:-1], self.kept)
 
+    @cached_property
     def sway(self) -> Array:
-        """Accelerations of the coupled joints over the step after each sample (samples, coupled) [rad/s^2]."""
-        each = np.diff(self.coupled, axis=0) / np.diff(self.t)[:, None]
-        return np.vstack([each, np.zeros((1, each.shape[1]))])
+        """Columns of the joints that are held and sway, over the step after each sample (samples, columns)."""
+        return sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)
+
+    @cached_property
+    def swayed(self) -> Array:
+        """∫ sway dt from the first sample (samples, columns)."""
+        return np.vstack([np.zeros((1, self.sway.shape[1])), np.cumsum(self.sway[:-1] * np.diff(self.t)[:, None], axis=0)])
 
     def accumulated(self, values: Array) -> Array:
         """∫ values dt of values (nodes,) from the first sample, at every sample."""
@@ -197,19 +207,20 @@ def swaying(found: Reconstructed, joint: int, resolution: Array) -> tuple[int, .
 
 
 def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: float,
-                 coupled: Sequence[int] = ()) -> tuple[Stretch, ...]:
+                 beside: Sequence[int] = ()) -> tuple[Stretch, ...]:
     """What of `log` can be used for its joint `joint`, counted from 1, in windows of `window` [s].
 
     Args:
-        coupled: joints that are held and sway.
+        beside: joints that are held and sway.
     """
     good, j = found.good, joint - 1
     others = tuple(float(np.nanmedian(good.log.q[:, k])) for k in range(log.n_joints) if k != j)
     size = max(_SHORTEST, round(window / log.sample_time))
-    stretches = []
+    motion, stretches = found.motion, []
     for run in good.runs:
         rows = good.kept[run]
-        q, dq = found.motion.q[rows, j], found.motion.dq[rows, j]
+        q, dq = motion.q[rows, j], motion.dq[rows, j]
+        sways = tuple(_sway(found, run, rows, k - 1, log.sample_time, k - 1 < j) for k in beside)
         spoilt = (good.missing | good.spikes | good.saturated)[run, j] | ~np.isfinite(q + dq)
         if found.std is not None:
             speed = found.std[1][rows, j]
@@ -217,8 +228,20 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
         measured = np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j])
         stretch = Stretch(log.name, good.log.t[run], measured, good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
                           np.where(np.isfinite(dq), dq, 0.0), spoilt, log.torque != "measured", size,
-                          log.robot.joints[j].revolute, others,
-                          np.nan_to_num(found.motion.dq[rows][:, [k - 1 for k in coupled]]))
+                          log.robot.joints[j].revolute, others, sways)
         if len(stretch.edges) > _FEWEST and stretch.rows >= _FEWEST:
             stretches.append(stretch)
     return tuple(stretches)
+
+
+def _sway(found: Reconstructed, run: slice, rows: npt.NDArray[np.intp], k: int, step: float, nearer: bool) -> Sway:
+    """The sway of joint `k`, counted from 0. Torque of the driven joint comes in steps: its speed has kinks."""
+    good = found.good
+    seen = np.where(good.position_spikes[run, k], np.nan, good.log.q[run, k])
+    lean = seen - np.nanmedian(good.log.q[:, k])
+    try:
+        tuned = tune_jerk(lean[:, None], step, encoder_resolution(good)[[k]], _KINKED)
+    except InputRejected:
+        return Sway(found.motion.q[rows, k] - np.nanmedian(good.log.q[:, k]), found.motion.dq[rows, k], nearer)
+    states = smooth(lean[:, None], design(step, tuned.jerk_std, tuned.noise_variance, _KINKED)).states
+    return Sway(states[0, :, 0], states[1, :, 0], nearer)
