@@ -18,7 +18,9 @@ import statistics
 import numpy as np
 
 from pipelines.model.friction.ekf import joint_step
-from pipelines.model.friction.fit_law import LawEquations, LawFit, fit_law
+from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.fit_law import fit_law
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.friction.refine import refined

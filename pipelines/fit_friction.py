@@ -31,8 +31,8 @@ from pipelines.model.estimation.logs import Recipe
 from pipelines.model.estimation.nominal import fitted_arm
 from pipelines.model.estimation.outcome import validity
 from pipelines.model.friction.findings import findings
-from pipelines.model.friction.fit_law import LawFit
 from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.methods import METHODS, by_method
 from pipelines.model.friction.one_joint import OneJoint

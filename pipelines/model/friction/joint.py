@@ -13,10 +13,13 @@ import numpy as np
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.break_away import BreakAway, break_away, held_at_least
 from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
-from pipelines.model.friction.fit_law import LawEquations, LawFit, alike, fit_law
+from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.fit_law import fit_law
 from pipelines.model.friction.ladder import Judge, Ladder, climb
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.one_joint import OneJoint, gravity_columns
+from pipelines.model.friction.postures import alike
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.simulate import Simulated, simulate_joint
 from pipelines.model.friction.speed_map import SpeedMap, speed_map

@@ -13,7 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.fit.varpro import linear_part
-from pipelines.model.friction.fit_law import Equations, LawFit, fit_law, takes_power
+from pipelines.model.friction.equations import Equations
+from pipelines.model.friction.fit_law import fit_law, takes_power
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.rigid.body import Array
 

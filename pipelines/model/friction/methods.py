@@ -9,8 +9,10 @@ import numpy as np
 
 from pipelines.errors import UsageError
 from pipelines.model.friction.ekf import EkfStart, run_ekf
-from pipelines.model.friction.fit_law import LawEquations, LawFit, fit_law
+from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.fit_law import fit_law
 from pipelines.model.friction.joint import JointFit, with_fit
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.friction.polish import polished

@@ -17,8 +17,10 @@ import numpy as np
 from pipelines.errors import UsageError
 from pipelines.fit.varpro import SeparableFit
 from pipelines.model.effects.base import Effect
-from pipelines.model.friction.fit_law import LawEquations, LawFit, nearest
+from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.one_joint import gravity_names
+from pipelines.model.friction.postures import nearest
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array, Motion
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.model.friction.fit_law import LawFit
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.one_joint import gravity_columns
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array

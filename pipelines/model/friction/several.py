@@ -18,8 +18,9 @@ from pipelines.fit.varpro import Separable
 from pipelines.model.estimation.logs import Fitted, Motions, Recipe, equations_of, fit_logs, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns, LogEquations
-from pipelines.model.friction.fit_law import LawFit, Predicted
+from pipelines.model.friction.equations import Predicted
 from pipelines.model.friction.ladder import Judge, Ladder, climb
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.rigid.body import Array, Motion

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.model.effects.base import Hooks
-from pipelines.model.friction.fit_law import LawFit
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.one_joint import OneJoint, gravity_columns
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array, Motion

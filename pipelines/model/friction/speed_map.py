@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.friction.fit_law import LawFit
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.friction.coverage import coverage, unseen
-from pipelines.model.friction.fit_law import LawEquations
+from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.model.friction.ladder import Judge, climb
 from pipelines.model.friction.one_joint import OneJoint

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipelines.fit.varpro import SeparableFit
-from pipelines.model.friction.fit_law import LawFit
+from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import Law, law_named
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.friction.simulate import simulate_joint

@@ -1,0 +1,141 @@
+"""Rows that a friction law can be fitted to, and those of a joint that was driven alone.
+
+Logs in which the other joints stand elsewhere have an inertia and a gravity of their own; friction is the same in all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from pipelines.fit.varpro import Separable
+from pipelines.model.friction.law_fit import LawFit
+from pipelines.model.friction.laws import Law
+from pipelines.model.friction.one_joint import OneJoint, gravity_names
+from pipelines.model.friction.postures import nearest, posture_groups
+from pipelines.model.friction.weak_form import Stretch, Windows
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["Equations", "LawEquations", "Predicted"]
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """What a fit says of rows, and what they measured. (rows,) [N m]"""
+
+    measured: Array
+    model: Array
+
+    @property
+    def residual(self) -> Array:
+        return self.measured - self.model
+
+
+class Equations(Protocol):
+    """Rows of one joint that a law can be fitted to: those of a joint driven alone, or its rows among all joints'."""
+
+    @property
+    def y(self) -> Array: ...
+
+    @property
+    def width(self) -> int: ...
+
+    @property
+    def postures(self) -> tuple[tuple[float, ...], ...]: ...
+
+    @property
+    def nodes(self) -> Motion: ...
+
+    def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]: ...
+
+    def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array: ...
+
+    def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable: ...
+
+    def thinned(self, rows: int) -> Equations: ...
+
+    def predicted(self, fit: LawFit) -> Predicted: ...
+
+
+@dataclass(frozen=True, eq=False)
+class LawEquations:
+    """Stretches of one joint, posture by posture."""
+
+    stretches: tuple[Stretch, ...]
+    joint: OneJoint
+    postures: tuple[tuple[float, ...], ...]
+    every: int = 1  # so-manieth row only: for a scan
+
+    @classmethod
+    def of(cls, stretches: Sequence[Stretch], joint: OneJoint) -> LawEquations:
+        return cls(tuple(stretches), joint, posture_groups(stretches))
+
+    @cached_property
+    def y(self) -> Array:
+        return np.concatenate([stretch.torque[::self.every] for stretch in self.stretches])
+
+    @cached_property
+    def width(self) -> int:
+        """Numbers of one posture: J, c, c', and what multiplies the sway of joints that are held."""
+        return int(self.stretches[0].rigid.shape[1])
+
+    @cached_property
+    def fixed(self) -> Array:
+        """(rows, postures × width)"""
+        parts = []
+        for stretch, k in zip(self.stretches, self.groups, strict=True):
+            part = np.zeros((len(stretch.torque[::self.every]), self.width * len(self.postures)))
+            part[:, self.width * k:self.width * (k + 1)] = stretch.rigid[::self.every]
+            parts.append(part)
+        return np.vstack(parts)
+
+    @property
+    def nodes(self) -> Motion:
+        """Motion of the longest stretch: where searches for shapes look for speeds and travel."""
+        return max(self.stretches, key=lambda stretch: len(stretch.t)).nodes
+
+    def thinned(self, rows: int) -> LawEquations:
+        """About so many rows, for a scan."""
+        return replace(self, every=max(1, len(self.y) // rows))
+
+    @cached_property
+    def groups(self) -> tuple[int, ...]:
+        """Posture of every stretch."""
+        return tuple(nearest(stretch.posture, self.postures) for stretch in self.stretches)
+
+    def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]:
+        """The joint in every posture, with the inertia and gravity that `beta` gives it."""
+        if beta is None:
+            return (self.joint,) * len(self.postures)
+        parts = beta[:self.width * len(self.postures)].reshape(-1, self.width)
+        gravity = len(gravity_names(self.joint.revolute))
+        return tuple(self.joint.carrying(float(part[0]), tuple(map(float, part[1:1 + gravity]))) for part in parts)
+
+    def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array:
+        """The law's columns (rows, amplitudes)."""
+        parts = []
+        for stretch, few, k in zip(self.stretches, self.few, self.groups, strict=True):
+            if law.pointwise:
+                parts.append(few.means(law.columns(few.nodes, arms[k], theta)))
+            else:
+                parts.append(stretch.windows.means(law.columns(stretch.nodes, arms[k], theta))[::self.every])
+        return np.vstack(parts) if len(parts) > 1 else parts[0]
+
+    @cached_property
+    def few(self) -> tuple[Windows, ...]:
+        return tuple(stretch.windows if self.every == 1 else stretch.windows.some(self.every) for stretch in self.stretches)
+
+    def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable:
+        lower, upper = law.bounds
+        return Separable(self.y, self.fixed, lambda theta: self.build(law, arms, theta), lower, upper)
+
+    def predicted(self, fit: LawFit) -> Predicted:
+        """What `fit`, of these postures or of others, says of these rows; one it does not know takes the nearest's numbers."""
+        rigid = fit.found.beta[:fit.rigid_size * len(fit.postures)].reshape(-1, fit.rigid_size)
+        own = np.concatenate([rigid[nearest(posture, fit.postures)] for posture in self.postures])
+        law = self.build(fit.law, self.arms(own), fit.theta) @ fit.amplitudes
+        return Predicted(self.y, self.fixed @ own + law)
