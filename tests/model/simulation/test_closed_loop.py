@@ -15,7 +15,7 @@ from pipelines.model.simulation import Noise, Plant, run
 from tests.model.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop, TransferObserver
 
-SAMPLES = 800
+SAMPLES = 500
 NOISE = Noise(np.array([0.020, 0.010, 0.005]), np.zeros(3))
 Law = Callable[[int, Array], Array]
 

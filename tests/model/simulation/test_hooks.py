@@ -18,7 +18,7 @@ from pipelines.model.simulation import Plant, run
 from tests.model.simulation.arms import KD, KP, TS, Case, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop
 
-SAMPLES = 600
+SAMPLES = 300
 
 
 @dataclass(frozen=True)
