@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from pipelines.fit.equations import Array
 
-__all__ = ["Linear", "Separable", "SeparableFit", "fit_separable", "linear_part", "search"]
+__all__ = ["Linear", "Separable", "SeparableFit", "fit_separable", "linear_part", "scan", "search"]
 
 _RANK = 1e-5  # singular values of unit columns below it: two columns that are one to within what any log can tell
 _STEP = 1e-4  # of a finite difference in θ
@@ -54,11 +54,15 @@ class Linear:
     columns: Array  # (m, z + k)
     beta: Array  # (z + k,) the smallest that explains y, where columns depend on one another
     residual: Array  # (m,)
-    basis: Array  # (m, rank) orthonormal
+    root: Array  # (z + k, rank) columns @ root is orthonormal
 
     @property
     def rss(self) -> float:
         return float(self.residual @ self.residual)
+
+    def beside(self, others: Array) -> Array:
+        """What of `others` (m, …) lies outside all columns."""
+        return np.asarray(others - self.columns @ (self.root @ (self.root.T @ (self.columns.T @ others))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +84,27 @@ class SeparableFit:
 
 def linear_part(columns: Array, y: Array) -> Linear:
     """Least squares with columns of unit length, cut off below `_RANK`."""
-    scale = np.linalg.norm(columns, axis=0)
+    root = _root((columns.T @ columns)[None])[0]
+    beta = root @ (root.T @ (columns.T @ y))
+    return Linear(columns, beta, y - columns @ beta, root)
+
+
+def _root(gram: Array) -> Array:
+    """W (…, k, k) with W Wᵀ the inverse of Gram matrices (…, k, k) over what they show; directions that they do not are zero."""
+    scale = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
     scale = np.where(scale > 0.0, scale, 1.0)
-    unit = columns / scale
-    values, vectors = np.linalg.eigh(unit.T @ unit)
-    kept = values > _RANK**2 * values[-1]
-    basis = unit @ (vectors[:, kept] / np.sqrt(values[kept]))
-    project = basis.T @ y
-    beta = vectors[:, kept] @ (project / np.sqrt(values[kept])) / scale
-    return Linear(columns, beta, y - basis @ project, basis)
+    values, vectors = np.linalg.eigh(gram / scale[..., :, None] / scale[..., None, :])
+    kept = values > _RANK**2 * values[..., -1:]
+    inverse = np.where(kept, 1.0 / np.sqrt(np.where(kept, values, 1.0)), 0.0)
+    return np.asarray(vectors * inverse[..., None, :] / scale[..., :, None])
+
+
+def scan(y: Array, fixed: Array, own: Array) -> Array:
+    """Σ residual² of many θ at once (θ,), from y (m,), fixed columns (m, z) and those of each θ (θ, m, k): Gram matrices alone."""
+    whole = np.concatenate([np.broadcast_to(fixed, (len(own), *fixed.shape)), own], axis=2)
+    turned = whole.swapaxes(1, 2)
+    project = (_root(turned @ whole).swapaxes(1, 2) @ (turned @ y)[..., None])[..., 0]
+    return np.asarray(y @ y - np.square(project).sum(axis=1))
 
 
 def fit_separable(problem: Separable, starts: Iterable[Array], lags: int | None = None) -> SeparableFit:
@@ -108,7 +124,7 @@ def search(problem: Separable, start: Array) -> tuple[Array, Linear]:
     damping = _DAMPING
     for _ in range(_MOST if theta.size else 0):
         slope = _slopes(problem, theta, now)
-        slope = slope - now.basis @ (now.basis.T @ slope)
+        slope = now.beside(slope)
         normal, downhill = slope.T @ slope, slope.T @ now.residual
         size = np.diag(normal)
         if not size.any():  # no row shows any of θ

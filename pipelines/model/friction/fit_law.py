@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipelines.fit.varpro import SeparableFit, fit_separable, linear_part, search
+from pipelines.fit.varpro import SeparableFit, fit_separable, scan, search
 from pipelines.model.friction.equations import Equations
 from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import Law, law_named
@@ -17,6 +17,7 @@ __all__ = ["fit_law", "takes_power"]
 
 _SCANNED = 120  # rows that a scan for starts looks at
 _STARTS = 2
+_AT_ONCE = 64  # starts: memory
 _OTHERS = 8
 _CARRIED = 3  # rounds in which a law that depends on the load sees the load of the fit before
 
@@ -55,10 +56,9 @@ def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableF
 
 def _other(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array], found: SeparableFit) -> SeparableFit:
     """The best of other local optima whose curve takes power; `found` where there is none."""
-    problem, scan = equations.problem(law, arms), equations.thinned(_SCANNED).problem(law, arms)
-    grid = [np.clip(theta, problem.lower, problem.upper) for theta in (
-        starts if len(starts) > 1 else law.starts(equations.nodes, arms[0]))]
-    ranked = sorted(grid, key=lambda theta: linear_part(scan.columns(theta), scan.y).rss)[:_OTHERS]
+    problem = equations.problem(law, arms)
+    grid = list(starts) if len(starts) > 1 else list(law.starts(equations.nodes, arms[0]))
+    ranked = _ranked(equations.thinned(_SCANNED), law, arms, grid)[:_OTHERS]
     ends = sorted((search(problem, theta) for theta in ranked), key=lambda end: end[1].rss)
     for theta, _ in ends:
         one = fit_separable(problem, [theta])
@@ -69,9 +69,16 @@ def _other(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: Seq
 
 def _best_of(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array]) -> list[Array]:
     """The best few of many starts by some of the rows, then the best end of a search among those."""
-    problem = equations.thinned(_SCANNED).problem(law, arms)
-    grid = [np.clip(theta, problem.lower, problem.upper) for theta in starts]
-    if len(grid) > _STARTS:
-        grid = sorted(grid, key=lambda theta: linear_part(problem.columns(theta), problem.y).rss)[:_STARTS]
+    few = equations.thinned(_SCANNED)
+    problem = few.problem(law, arms)
+    grid = _ranked(few, law, arms, starts)[:_STARTS]
     ends = sorted((search(problem, theta) for theta in grid), key=lambda end: end[1].rss)
     return [theta for theta, _ in ends[:1]]
+
+
+def _ranked(few: Equations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array]) -> list[Array]:
+    """`starts` within the bounds, those first that explain most."""
+    grid = np.clip(np.array(starts), *law.bounds)
+    left = np.concatenate([scan(few.y, few.fixed, np.stack([few.build(law, arms, theta) for theta in part]))
+                           for part in np.array_split(grid, -(-len(grid) // _AT_ONCE))])
+    return list(grid[np.argsort(left, kind="stable")])
