@@ -16,7 +16,7 @@ from pipelines.model.rigid.body import Array
 __all__ = ["fit_law", "takes_power"]
 
 _SCANNED = 120  # rows that a scan for starts looks at
-_STARTS = 2
+_STARTS = 4
 _AT_ONCE = 64  # starts: memory
 _OTHERS = 8
 _CARRIED = 3  # rounds in which a law that depends on the load sees the load of the fit before

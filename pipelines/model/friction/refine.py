@@ -13,18 +13,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.errors import InputRejected
 from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.one_joint import gravity_columns
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array
 from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
-from pipelines.signal.tuning import tune_jerk
 
 __all__ = ["reference_motion", "refined"]
 
 _ORDER = 2
+_LEAST = 1e-6  # of the torque: its noise, where a fit leaves none
 
 
 def refined(stretch: Stretch, fit: LawFit, resolution: float) -> Stretch:
@@ -40,12 +39,17 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float) -> Stretch:
     if not np.isfinite(deviation[~stretch.spoilt]).all():
         return stretch
     step = float(np.median(np.diff(stretch.t)))
-    try:
-        tuned = tune_jerk(deviation, step, np.array([resolution]), _ORDER)
-    except InputRejected:
-        return stretch
-    found = smooth(deviation, design(step, tuned.jerk_std, tuned.noise_variance, _ORDER)).states[:, :, 0]
+    # rms of a window's mean torque, were torque noise white from sample to sample: what the law misses is then let through, not lost
+    jerk = np.array([max(fit.found.rms, _LEAST * float(np.abs(stretch.torque).max())) * np.sqrt(stretch.window) / fit.inertia])
+    found = smooth(deviation, design(step, jerk, _noise(deviation[:, 0], jerk, step, resolution), _ORDER)).states[:, :, 0]
     return stretch.moved(q + found[0], dq + found[1])
+
+
+def _noise(deviation: Array, jerk: Array, step: float, resolution: float) -> Array:
+    """Variance of position noise [rad²] (1,): Δθ²/12, or more where second differences show it; they are 6 R + σ² T⁴/2."""
+    second = np.diff(deviation, n=2)
+    shown = (np.mean(np.square(second[np.isfinite(second)])) - 0.5 * jerk**2 * step**4) / 6.0
+    return np.maximum(shown, resolution**2 / 12.0)
 
 
 def reference_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
