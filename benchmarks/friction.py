@@ -6,7 +6,8 @@ Both take position and torque of one joint, 20 s at 1 kHz, friction of three sig
 (ten numbers). Theirs is the paper's filter: filterpy's ExtendedKalmanFilter over q, dq and the ten, one pass, started 15 % off
 the truth and told the true noise of torque and encoder; its model and derivatives are plain scalar arithmetic, faster than
 arrays of one. Ours is told neither: it tunes a smoother on 8 s, makes the equations, scans for starts and solves them; refined
-smooths again about what was fitted, once or twice. Errors are of the friction curve over the driven speeds, rms over its rms, medians over the seeds.
+smooths again about what was fitted, once or twice. Errors are of the friction curve over the driven speeds, rms over its rms,
+medians over the seeds.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float) -> Stretch:
     if not np.isfinite(deviation[~stretch.spoilt]).all():
         return stretch
     step = float(np.median(np.diff(stretch.t)))
-    # rms of a window's mean torque, were torque noise white from sample to sample: what the law misses is then let through, not lost
+    # Torque noise, were it white from sample to sample: what the law misses makes it look larger, and is let through, not lost.
     jerk = np.array([max(fit.found.rms, _LEAST * float(np.abs(stretch.torque).max())) * np.sqrt(stretch.window) / fit.inertia])
     found = smooth(deviation, design(step, jerk, _noise(deviation[:, 0], jerk, step, resolution), _ORDER)).states[:, :, 0]
     return stretch.moved(q + found[0], dq + found[1])
