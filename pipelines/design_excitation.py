@@ -1,6 +1,6 @@
 """Design the experiment that tells most about the arm, within its limits.
 
-Reads    a robot description; optionally a model, earlier logs, results of frf, a recipe
+Reads    a robot description; optionally a model or bounds on its parameters, earlier logs, results of frf, a recipe
 Writes   trajectory.h5 (a planned log), controller.csv, coefficients.json, result.json, result.h5, report.html
 Source   Kostić et al. 2004, Section IV.C.3, eq. (22), Figs. 8 and 9; Swevers et al. 1997
 
@@ -10,6 +10,7 @@ Source   Kostić et al. 2004, Section IV.C.3, eq. (22), Figs. 8 and 9; Swevers e
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +20,6 @@ import numpy as np
 
 from pipelines.errors import Check, NothingMatched, RrridError, UsageError
 from pipelines.log.atomic import write_file
-from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.files import write_log
 from pipelines.log.model_file import read_model
 from pipelines.log.recording.controller_side import controller_table, write_controller_table
@@ -29,17 +29,15 @@ from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
-from pipelines.model.excitation.columns import arm_columns
+from pipelines.model.excitation.bounds import parse_bounds
 from pipelines.model.excitation.design import Design, Effort, design
 from pipelines.model.excitation.earlier import USED, first_mode, information_of
-from pipelines.model.excitation.others import Plan, frf_plans, friction_plans, hold_plans
+from pipelines.model.excitation.others import frf_plans, friction_plans, hold_plans
 from pipelines.model.excitation.outcome import excitation
-from pipelines.model.excitation.rehearse import rehearse
+from pipelines.model.excitation.outputs import coefficients, joint_motion, log_of_plan
+from pipelines.model.excitation.rehearse import rehearse, rehearsed
 from pipelines.model.excitation.result import CostOfLimit, Result
 from pipelines.model.excitation.task import Task, Wishes, plan_task
-from pipelines.model.excitation.trajectory import Trajectory
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.writing.planned import planned_log
 from pipelines.report.excitation_report import excitation_report
 from pipelines.report.report import Report
@@ -67,6 +65,7 @@ class Settings:
     seed: int = 1
     symmetric: bool = False  # p4 = p15 = 0
     model: str | None = None  # predicts torque and friction
+    bounds: str | None = None  # a file of bounds on the parameters, where no model and no links are known
     home: tuple[float, ...] | None = None  # [rad]
     rest: bool = True
     periods: int = 1
@@ -94,6 +93,7 @@ class Material:
 
     robot: RobotDescription
     arm: Arm | None
+    bounds: str | None  # text of the file
     recipe: Recipe | None
     modes: tuple[Mapping[str, Any], ...]  # results of frf
     tell: Any = field(compare=False)
@@ -118,11 +118,18 @@ def read(request: Request, settings: Settings) -> Inputs:
         sources.append(path)
     modes = tuple(found for path in request.paths if (found := _frf_result(path)) is not None)
     logs = _earlier(request, settings, robot)
+    bounds = None
+    if settings.bounds is not None:
+        if arm is not None:
+            raise UsageError("C02", "the torque is known by the model or the described links", where="--bounds",
+                             remedy="leave --bounds out, or --model")
+        bounds = read_small_text(Path(settings.bounds), what="bounds of parameters (TOML)")
+        sources.append(Path(settings.bounds))
     if settings.model is not None and Path(settings.model).is_file():
         sources.append(Path(settings.model).absolute())
     sources = [*logs.sources, *(path.absolute() for path in sources)]
     return Inputs(logs.logs, logs.rejected, logs.checks, tuple(sources), logs.hashes, robot=robot,
-                  material=Material(robot, arm, recipe, modes, request.tell), label=settings.purpose, robot_name=robot.name)
+                  material=Material(robot, arm, bounds, recipe, modes, request.tell), label=settings.purpose, robot_name=robot.name)
 
 
 def _arm(model: str | None, robot: RobotDescription) -> Arm | None:
@@ -178,18 +185,39 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                          remedy=f"one of: {', '.join(PURPOSES)}; the writing task comes with its own command")
     if len(settings.keep_out) % 2:
         raise UsageError("C02", "bands to stay out of are pairs of frequencies", where="--keep-out", remedy="write 5,8 [Hz]")
+    _refuse_strange(settings)
     mode = first_mode(given.modes)
     wishes = replace(settings.wishes, top_hz=None if mode is None else mode / settings.mode_factor)
     logs = [o.log for o in inputs.logs if o.log.origin != "planned" and o.log.experiment in USED and o.log.role == "identify"]
-    told = None
-    if logs and settings.purpose == "excitation":
-        friction = plan_task(given.robot, given.arm, wishes).problem.columns.friction
-        told = information_of(logs, arm_columns(rigid_body(given.robot), friction=friction))
-    task = plan_task(given.robot, given.arm, wishes, told)
+    told = bounds = None
+    earlier = logs and settings.purpose == "excitation"
+    if earlier or given.bounds is not None:
+        columns = plan_task(given.robot, given.arm, wishes).problem.columns
+        told = information_of(logs, columns) if earlier else None
+        bounds = None if given.bounds is None else parse_bounds(given.bounds, columns, str(settings.bounds))
+    task = plan_task(given.robot, given.arm, wishes, told, bounds)
     if settings.purpose != "excitation":
         return _plans(task, settings, given)
     found = design(task, Effort(settings.seconds, settings.evaluations, given.tell), settings.seed)
     return _result(task, found, settings, given, tuple(log.name for log in logs), mode)
+
+
+def _refuse_strange(settings: Settings) -> None:
+    """C02 for a number that no design can have."""
+    positive = (("--seconds", settings.seconds), ("--evaluations", settings.evaluations), ("--cond-max", settings.cond_max),
+                ("--periods", settings.periods), ("--tip-speed", settings.tip_speed), ("sample_time", settings.sample_time),
+                ("torque_share", settings.torque_share), ("mode_factor", settings.mode_factor),
+                *(("noise", value) for value in settings.noise or ()))
+    for where, value in positive:
+        if value is not None and not 0.0 < value < math.inf:
+            raise UsageError("C02", f"{value:g} is not positive and finite", where=where, remedy="give a positive number")
+    if not all(map(math.isfinite, (*(settings.home or ()), *(settings.tip_box or ()), *settings.keep_out))):
+        raise UsageError("C02", "a number is not finite", where="--home, --tip-box, --keep-out", remedy="give finite numbers")
+    if settings.torque_share > 1.0:
+        raise UsageError("C02", f"{settings.torque_share:g} of the torque limits is more than there is", where="torque_share",
+                         remedy="give 1 at most")
+    if settings.seed < 0:
+        raise UsageError("C02", f"the seed {settings.seed} is negative", where="--seed", remedy="give 0 or more")
 
 
 def _result(task: Task, found: Design, settings: Settings, given: Material, after: tuple[str, ...], mode: float | None) -> Result:
@@ -203,7 +231,7 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
             rehearsal = rehearse(task.arm, settings.sample_time, motion, task.problem.goal.noise, settings.seed, _REHEARSED)
         except RrridError as problem:  # a model whose simulation runs away is worth saying, and no reason to lose the design
             failed = problem.message
-    log = planned_log(f"{task.robot.name} {settings.criterion} excitation", task.robot, _joint_motion(t, motion), "excitation",
+    log = planned_log(f"{task.robot.name} {settings.criterion} excitation", task.robot, joint_motion(t, motion), "excitation",
                       "identify")
     log = replace(log, period=trajectory.series.period if task.rest else None)
     goal, top = task.problem.goal, int(np.flatnonzero(task.harmonics.used.any(axis=0))[-1]) + 1
@@ -218,46 +246,22 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
         random=judged.random, course=judged.course, period=trajectory.series.period, periods=trajectory.periods,
         run_in=trajectory.run_in, duration=trajectory.duration, sample_time=settings.sample_time,
         home=None if task.home is None else tuple(map(float, task.home)), noise=tuple(map(float, goal.noise)),
-        friction_columns=task.problem.columns.friction, torque_checked=task.arm is not None, torque_share=settings.torque_share,
+        friction_columns=task.problem.columns.friction, torque_checked=task.torque is not None,
+        torque_bounded=task.arm is None and task.torque is not None, torque_share=settings.torque_share,
         after=after, first_mode=mode, mode_factor=settings.mode_factor, top_hz=top / trajectory.series.period,
         rehearsal=rehearsal, rehearsal_failed=failed, plans=(),
         logs=(("trajectory", log),), table=controller_table(given.recipe, task.robot, lambda at: trajectory.at(at)[0].T,
                                                             trajectory.duration, settings.sample_time),
-        coefficients=_coefficients(task, trajectory))
-
-
-def _joint_motion(t: Array, motion: Array) -> Motion:
-    q, dq, ddq = (np.ascontiguousarray(part.T) for part in motion)
-    return Motion(t, q, dq, ddq)
-
-
-def _coefficients(task: Task, trajectory: Trajectory) -> dict[str, object]:
-    """Eq. (22), joint by joint, at the harmonics each one has."""
-    series, used = trajectory.series, task.harmonics.used
-    joints = []
-    for j, joint in enumerate(task.robot.joints):
-        own = np.flatnonzero(used[j])
-        joints.append({"joint": j + 1, "name": joint.name, "q0": float(series.offset[j]), "harmonics": (own + 1).tolist(),
-                       "a": series.cosine[j, own].tolist(), "b": series.sine[j, own].tolist()})
-    return {"formula": "q = q0 + sum_j (a_j sin(w_j t) - b_j cos(w_j t))/w_j, w_j = 2 pi j / period", "period": series.period,
-            "units": {"period": "s", "q0": "rad", "a": "rad/s", "b": "rad/s"}, "run_in": trajectory.run_in,
-            "periods": trajectory.periods, "joints": joints}
+        coefficients=coefficients(task, trajectory))
 
 
 def _plans(task: Task, settings: Settings, given: Material) -> Result:
     """The other experiments of the workflow."""
     plans = {"friction": lambda: friction_plans(task), "frf": lambda: frf_plans(task, settings.seed),
              "hold": lambda: hold_plans(task, settings.seed)}[settings.purpose]()
+    rehearsals, failed = rehearsed(task, plans, settings.seed, given.tell) if settings.rehearse else ((), "")
     return Result.of_plans(task, settings.purpose, settings.seed, settings.sample_time, plans,
-                           tuple((plan.name, _log_of(plan, task)) for plan in plans))
-
-
-def _log_of(plan: Plan, task: Task) -> ExperimentLog:
-    log = planned_log(f"{task.robot.name} {plan.name}", task.robot, _joint_motion(plan.t, plan.motion), plan.experiment, "identify")
-    signals = dict(log.signals)
-    if plan.v is not None:
-        signals["v"] = Signal(plan.v, "rad/s^2", "injected excitation")
-    return replace(log, signals=signals, joint=plan.joint, posture=plan.posture, period=plan.period)
+                           tuple((plan.name, log_of_plan(plan, task)) for plan in plans), rehearsals, failed)
 
 
 def write(result: Result, folder: Path, request: Request) -> None:

@@ -211,6 +211,7 @@ def design_excitation(
     seed: Annotated[int | None, typer.Option(help="Seed of the search. [1]")] = None,
     symmetric: Annotated[bool | None, typer.Option("--symmetric", help="Mirror-symmetric links: p4 = p15 = 0.")] = None,
     model: Annotated[str | None, typer.Option(help="Model that predicts torque. [the described links]")] = None,
+    bounds: Annotated[str | None, typer.Option(help="Bounds on the parameters (TOML), where no model is known.")] = None,
     after: Annotated[list[Path] | None, typer.Option(readable=False, help="Earlier logs, or a result of frf. Repeatable.")] = None,
     home: Annotated[list[str] | None, typer.Option(help="Posture to start from [rad], one a joint: 0,-1.57,0.")] = None,
     no_rest: Annotated[bool, typer.Option("--no-rest", help="In motion at both ends, with run-in and run-out.")] = False,
@@ -228,9 +229,9 @@ def design_excitation(
         "robot": name, "purpose": purpose, "criterion": criterion, "cond_max": cond_max,
         "harmonics": whole_numbers(harmonics, "--harmonics"), "frequency": numbers(frequency, "--frequency"),
         "keep_out": numbers(keep_out, "--keep-out"), "seconds": seconds, "evaluations": evaluations, "seed": seed,
-        "symmetric": symmetric, "model": model, "home": numbers(home, "--home"), "rest": False if no_rest else None,
-        "periods": periods, "friction": friction, "tip_speed": tip_speed, "tip_box": numbers(tip_box, "--tip-box"),
-        "recipe": recipe})
+        "symmetric": symmetric, "model": model, "bounds": bounds, "home": numbers(home, "--home"),
+        "rest": False if no_rest else None, "periods": periods, "friction": friction, "tip_speed": tip_speed,
+        "tip_box": numbers(tip_box, "--tip-box"), "recipe": recipe})
 
 
 @app.command()

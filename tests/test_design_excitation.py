@@ -149,6 +149,101 @@ def test_without_links_torque_is_not_claimed_to_be_checked(tmp_path: Path) -> No
     assert all(one.quantity != "torque" for one in outcome.result.limits)
 
 
+def test_bounds_on_the_parameters_limit_the_torque(tmp_path: Path) -> None:
+    """No parameters between the bounds ask for more than the limit, on 0.1 ms; the corner that asks most comes near to it."""
+    body = Arm.from_links(load_robot("rrr")).body
+    p = body.known_parameters()
+    assert p is not None
+    middle, half = p, 0.2 * np.abs(p) + 0.01
+    lines = (f"{known.name} = [{m - h}, {m + h}]" for known, m, h in zip(body.parameters, middle, half, strict=True))
+    (tmp_path / "bounds.toml").write_text("\n".join(lines))
+    bare = _without_links(tmp_path)
+    done = _design(tmp_path / "out", replace(QUICK, robot=bare, bounds=str(tmp_path / "bounds.toml")))
+    series = done.result
+    told = json.loads((done.folder / "coefficients.json").read_text())
+    t = np.arange(0.0, told["period"], 1e-4)
+    q, dq, ddq = np.zeros((3, 3, len(t)))
+    for j, joint in enumerate(told["joints"]):
+        w = 2 * np.pi * np.array(joint["harmonics"])[:, None] / told["period"]
+        a, b = np.array(joint["a"]), np.array(joint["b"])
+        sine, cosine = np.sin(w * t), np.cos(w * t)
+        q[j], dq[j] = joint["q0"] + a / w[:, 0] @ sine - b / w[:, 0] @ cosine, a @ cosine + b @ sine
+        ddq[j] = (b * w[:, 0]) @ cosine - (a * w[:, 0]) @ sine
+    limit, rng, most = 0.9 * np.array([60.0, 30.0, 15.0]), np.random.default_rng(3), np.zeros(3)
+    regressor = body.regressor(q.T, dq.T, ddq.T)
+    for draw in range(20):
+        beta = middle + half * rng.choice([-1.0, 1.0], 15)
+        most = np.maximum(most, np.abs(regressor[draw % 5::5] @ beta).max(axis=0))
+    worst = (np.abs(regressor @ middle) + np.abs(regressor) @ half).max(axis=0)
+    assert (most <= limit).all()
+    assert (worst <= limit).all()
+    peaks = {one.joint: abs(one.peak) for one in series.limits if one.quantity == "torque"}
+    np.testing.assert_allclose([peaks[1], peaks[2], peaks[3]], worst, rtol=5e-3)
+    assert series.torque_checked
+    assert series.rehearsal is None
+    assert (worst / limit).max() > 0.5
+
+
+@pytest.mark.parametrize("text", ["p1 = [", "p1 = [0.0, 1.0]", "p1 = [1.0, 0.0]", "p99 = [0.0, 1.0]"])
+def test_bounds_that_make_no_sense_are_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "bounds.toml").write_text(text)
+    with pytest.raises(UsageError) as told:
+        _design(tmp_path / "out", replace(QUICK, robot=_without_links(tmp_path), bounds=str(tmp_path / "bounds.toml")))
+    assert told.value.code == "RRID-C02"
+
+
+def _without_links(folder: Path) -> str:
+    from pipelines.log.robot import format_robot
+
+    robot = load_robot("rrr")
+    text = format_robot(replace(robot, joints=tuple(replace(joint, link=None) for joint in robot.joints)))
+    (folder / "robot.toml").write_text(text)
+    return str(folder / "robot.toml")
+
+
+@pytest.mark.parametrize("purpose", ["friction", "frf"])
+def test_plans_keep_the_tip_speed_and_the_torque(purpose: str, tmp_path: Path) -> None:
+    """A slow tip makes plans slower: its speed from its places by differences; the torque of the excitation included."""
+    out = _design(tmp_path / "out", replace(QUICK, purpose=purpose, tip_speed=0.8)).folder
+    robot = load_robot("rrr")
+    arm = BaseArm(robot)
+    p = arm.known_parameters()
+    assert p is not None
+    for path in sorted((out / "logs").glob("*.h5")):
+        log = open_log(path).log
+        tip = arm.tip(log["q_ref"])
+        assert np.linalg.norm(np.diff(tip, axis=0), axis=1).max() / log.sample_time <= 0.8
+        ddq = log["ddq_ref"] + log["v"] if purpose == "frf" else log["ddq_ref"]
+        tau = arm.torque(log["q_ref"], log["dq_ref"], ddq, p)
+        assert (np.abs(tau).max(axis=0) <= 0.9 * np.array([60.0, 30.0, 15.0])).all()
+
+
+def test_held_postures_stay_in_the_box(tmp_path: Path) -> None:
+    box = (-0.4, 0.4, -0.4, 0.4, 0.4, 1.0)
+    out = _design(tmp_path / "out", replace(QUICK, purpose="hold", tip_box=box)).folder
+    postures = np.array([open_log(path).log.posture for path in (out / "logs").glob("*.h5")])
+    tip = BaseArm(load_robot("rrr")).tip(postures)
+    assert len(tip) == 8
+    assert ((tip >= np.array(box[::2])) & (tip <= np.array(box[1::2]))).all()
+
+
+def test_a_plan_that_no_limit_allows_names_the_limit(tmp_path: Path) -> None:
+    """Home lies outside the box: every friction plan leaves it."""
+    with pytest.raises(UsageError) as told:
+        _design(tmp_path / "out", replace(QUICK, purpose="friction", tip_box=(5.0, 6.0, -1.0, 1.0, 0.0, 2.0)))
+    assert told.value.code == "RRID-C08"
+    assert "tip x" in told.value.message
+
+
+def test_plans_are_rehearsed(tmp_path: Path) -> None:
+    """The simulated arm holds each posture, and no drive saturates."""
+    done = _design(tmp_path / "out", replace(QUICK, purpose="hold", rehearse=True)).result
+    assert len(done.rehearsals) == 8
+    for _, found in done.rehearsals:
+        assert found.safe
+        assert max(found.position_max) < 0.05
+
+
 def test_the_report_warns_in_bold(tmp_path: Path) -> None:
     outcome = run_stage(STAGE, Request((), out=tmp_path / "out"), QUICK)
     page = (outcome.folder / "report.html").read_text()
@@ -206,7 +301,10 @@ def test_held_postures_show_gravity(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("changes", "code"), [
     ({"purpose": "writing"}, "RRID-C02"), ({"keep_out": (1.0,)}, "RRID-C02"), ({"robot": "nobody"}, "RRID-C04"),
-    ({"criterion": "C"}, "RRID-C02"), ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),
+    ({"criterion": "C"}, "RRID-C02"), ({"periods": 0}, "RRID-C02"), ({"evaluations": 0}, "RRID-C02"),
+    ({"seconds": float("nan")}, "RRID-C02"), ({"seed": -1}, "RRID-C02"), ({"tip_speed": 0.0}, "RRID-C02"),
+    ({"noise": (1.0, -1.0, 1.0)}, "RRID-C02"), ({"torque_share": 1.5}, "RRID-C02"), ({"bounds": "nothing"}, "RRID-C02"),
+    ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),
 ])
 def test_wrong_usage_is_said(changes: dict[str, Any], code: str, tmp_path: Path) -> None:
     with pytest.raises((UsageError, InputRejected)) as told:

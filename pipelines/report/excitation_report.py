@@ -15,10 +15,10 @@ from pipelines.report.style import format_number, format_unit
 __all__ = ["excitation_report"]
 
 _UNCHECKED = "Self-collision is not checked, nor is collision with anything around the robot."
-_AIMS = {"default": "the smallest relative standard deviation with a bounded condition number",
-         "A": "the smallest relative standard deviation", "D": "the smallest confidence ellipsoid",
-         "E": "the best known worst direction",
-         "condition": "the smallest condition number", "frobenius": "the smallest Frobenius condition number"}
+_AIMS = {"default": "smallest relative std, condition bounded",
+         "A": "smallest relative std", "D": "smallest confidence ellipsoid",
+         "E": "best known worst direction",
+         "condition": "smallest condition number", "frobenius": "smallest Frobenius condition number"}
 _DRAWN_PLANS = 6
 _NEAR_BOUND = 1.5  # times: what is farther from the bound is no percentage of it
 _DEAR = 0.02  # share of the cost that is worth naming
@@ -80,7 +80,8 @@ def _safety(result: Result) -> Section:
     found = result.rehearsal
     if found is None:
         text.append(f"The rehearsal in simulation failed: {result.rehearsal_failed}." if result.rehearsal_failed else
-                    "It was not rehearsed in simulation, for no model of the arm is known." if not result.torque_checked else
+                    "It was not rehearsed in simulation, for no model of the arm is known."
+                    if not result.torque_checked or result.torque_bounded else
                     "It was not rehearsed in simulation.")
     else:
         fast = [f"{name} reaches {100 * v / limit:.3g} % of its speed limit" for name, v, limit in
@@ -142,7 +143,11 @@ def _limits(result: Result) -> Section:
                     "limit a little wider.")
     if not result.torque_checked:
         text.append("Torque limits were not checked: give a model, or describe the links.")
-    elif result.torque_share < 1.0:
+    if result.torque_bounded:
+        text.append("No model is known: torque limits hold for any parameters between the bounds given.")
+        if not result.friction_columns:
+            text.append("Friction is not counted in that torque.")
+    if result.torque_checked and result.torque_share < 1.0:
         text.append(f"Of every torque limit the plan uses {100 * result.torque_share:.0f} %; the rest is left to the controller.")
     return Section("Limits", tuple(text), (Table(("joint", "of", "peak", "limit", "unit", "used [%]", "cost [%]"), rows),))
 
@@ -206,11 +211,41 @@ def _plans_report(result: Result) -> Report:
     verdict = f"{len(result.plans)} experiments for {what} are planned, {result.duration:.3g} s altogether."
     rows = tuple((p.name, p.joint, p.seconds, p.speed_peak, p.acceleration_peak, p.words) for p in result.plans)
     table = Table(("experiment", "joint", "duration [s]", "speed, peak [rad/s]", "acceleration, peak [rad/s^2]", "what"), rows)
+    kept = Table(("experiment", "nearest limit", "joint", "peak", "limit", "unit", "used [%]"), tuple(
+        (p.name, n.quantity, n.joint, n.peak, n.limit, format_unit(n.unit), 100 * n.share)
+        for p in result.plans if (n := p.nearest) is not None))
+    words = "Position, speed, acceleration and tip are looked at sample by sample, half a step added"
+    words += ", torque with the excitation as well." if result.torque_checked else "; torque is not, for neither a model nor the " \
+        "links are known."
     moving = [p for p in result.plans if p.speed_peak > 0.0][:_DRAWN_PLANS]
-    sections = [Section("Before the robot moves", (), (), warning=_UNCHECKED), Section("Experiments", (), (table,))]
+    sections = [_plans_safety(result), Section("Experiments", (), (table,)), Section("Limits", (words,), (kept,))]
     if moving:
         sections.append(Section("Motions", (), (), tuple(_plan_figure(p, result) for p in moving)))
-    return Report("Planned experiments", verdict, "neutral", None, tuple(sections))
+    safe = not result.rehearsal_failed and all(found.safe for _, found in result.rehearsals)
+    return Report("Planned experiments", verdict, "neutral" if safe else "attention", None, tuple(sections))
+
+
+def _plans_safety(result: Result) -> Section:
+    """Of each plan the joint that is nearest to trouble in its rehearsal."""
+    if not result.rehearsals:
+        return Section("Before the robot moves", (f"The rehearsal in simulation failed: {result.rehearsal_failed}."
+                                                  if result.rehearsal_failed else "They were not rehearsed in simulation.",), (),
+                       warning=_UNCHECKED)
+    rows = []
+    for name, found in result.rehearsals:
+        full = [x / limit for x, limit in zip(found.torque_peak, found.torque_limit, strict=True)]
+        fast = [x / limit for x, limit in zip(found.speed_peak, found.speed_limit, strict=True)]
+        rows.append((name, found.seconds, max(found.position_rms), max(found.position_max), 100 * max(full), 100 * max(fast),
+                     100 * max(found.saturated)))
+    text = ["Each was rehearsed in simulation under PD control of 8 Hz a joint, without feed-forward; of all joints the worst is "
+            "listed. Another controller will follow otherwise."]
+    if result.purpose == "frf":
+        text.append("The excitation moves the arm away from its slow turn, as it is to.")
+    if result.rehearsal_failed:
+        text.append(f"The rest failed: {result.rehearsal_failed}.")
+    head = ("experiment", "rehearsed [s]", "away, rms [rad]", "away, most [rad]", "torque, of its limit [%]",
+            "speed, of its limit [%]", "saturated [%]")
+    return Section("Before the robot moves", tuple(text), (Table(head, tuple(rows)),), warning=_UNCHECKED)
 
 
 def _plan_figure(plan: DrawnPlan, result: Result) -> Figure:

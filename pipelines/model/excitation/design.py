@@ -140,11 +140,11 @@ def _within(task: Task, finish: DesignProblem, x: Array) -> tuple[Array, float]:
 def _peaks(task: Task, trajectory: Trajectory) -> tuple[Peak, ...]:
     """Of one period, and of the run-in and run-out where there are any."""
     series = trajectory.series
-    found = peaks(task.problem.limits, task.problem.chain, series.samples(good_size(round(series.period / GRID))), task.arm,
-                  periodic=True)
+    grid = series.samples(good_size(round(series.period / GRID)))
+    found = peaks(task.problem.limits, task.problem.chain, grid, task.torque, periodic=True)
     if trajectory.run_in == 0.0:
         return found
     t = np.arange(round(trajectory.run_in / GRID) + 1, dtype=np.float64) * GRID
-    ends = [peaks(task.problem.limits, task.problem.chain, trajectory.at(at), task.arm, periodic=False)
+    ends = [peaks(task.problem.limits, task.problem.chain, trajectory.at(at), task.torque, periodic=False)
             for at in (t, trajectory.duration - t[::-1])]
     return tuple(max(group, key=lambda peak: peak.share) for group in zip(found, *ends, strict=True))

@@ -7,13 +7,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipelines.errors import UsageError
 from pipelines.model.excitation.task import Task
+from pipelines.model.excitation.tip import tip_motion
 from pipelines.model.excitation.trajectory import quintic
+from pipelines.model.excitation.verify import Peak, peaks, worst
 from pipelines.model.rigid.body import Array
 
 __all__ = ["Plan", "frf_plans", "friction_plans", "hold_plans"]
@@ -30,6 +33,7 @@ _FRF_TORQUE = 0.1  # of the torque limit, rms of the excitation
 _FRF_PERIOD = 5.0  # [s]
 _FRF_BAND = (1.0, 0.4)  # [Hz] lowest line; highest, of the sample rate
 _POSTURES, _CANDIDATES, _DWELL = 8, 400, 2.0
+_SMALLER, _SMALLEST = 0.8, 0.05  # a plan that breaks a limit is made slower in such steps, down to such a share
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +49,50 @@ class Plan:
     v: Array | None = None  # (samples, joints) [rad/s^2] injected excitation
     period: float | None = None  # [s]
     words: str = ""
+    nearest: Peak | None = None  # the limit that it comes nearest to
 
 
 def friction_plans(task: Task) -> tuple[Plan, ...]:
-    """One experiment a joint; the others stay at home."""
+    """One experiment a joint; the others stay at home.
+
+    Raises:
+        UsageError: C08, a limit that even a slow one breaks: says which.
+    """
     home = _home(task)
-    return tuple(_friction(task, j, home) for j in range(task.robot.n_joints))
+
+    def slower(j: int) -> Callable[[float], Plan]:
+        return lambda share: _friction(task, j, home, share)
+
+    return tuple(_within(task, slower(j)) for j in range(task.robot.n_joints))
+
+
+def _within(task: Task, make: Callable[[float], Plan]) -> Plan:
+    """The fastest of the plans make(share) that keeps every limit."""
+    share, found = 1.0, Peak("", None, 0.0, 0.0, "", 0.0)
+    while share >= _SMALLEST:
+        plan = make(share)
+        nearest = _nearest(task, plan)
+        if nearest is None or nearest.share <= 1.0:
+            return replace(plan, nearest=nearest)
+        share, found = share * _SMALLER, nearest
+    of = "" if found.joint is None else f" of joint {found.joint}"
+    raise UsageError("C08", f"{plan.name} cannot keep the {found.quantity} limit{of}, {found.limit:.4g} {found.unit}",
+                     where="limits", remedy="start elsewhere (--home), or correct that limit")
+
+
+def _nearest(task: Task, plan: Plan) -> Peak | None:
+    """Of all limits; the torque is that of the excitation as well, which is held from sample to sample."""
+    limits, chain = task.problem.limits, task.problem.chain
+    found = list(peaks(limits, chain, plan.motion, task.torque, periodic=False))
+    if plan.v is not None and task.torque is not None:
+        excited = plan.motion.copy()
+        excited[2] += plan.v.T
+        low, high = task.torque(excited)
+        for j, limit in enumerate(limits.torque):
+            most = float(max(high[j].max(), -low[j].min()))
+            if np.isfinite(limit):
+                found.append(Peak("torque", j + 1, most, float(limit), "N m" if task.robot.revolute[j] else "N", most / limit))
+    return worst(tuple(found))
 
 
 def _home(task: Task) -> Array:
@@ -60,11 +102,11 @@ def _home(task: Task) -> Array:
     return task.home
 
 
-def _friction(task: Task, j: int, home: Array) -> Plan:
+def _friction(task: Task, j: int, home: Array, share: float) -> Plan:
     low, high = task.robot.joints[j].position
     room = _USED_RANGE * (high - low) if np.isfinite(high - low) else _FREE
     centre = 0.5 * (low + high) if np.isfinite(high - low) else home[j]
-    rate, top, place = _acceleration(task, j, home), _SHARE * float(task.speed[j]), float(home[j])
+    rate, top, place = share * _acceleration(task, j, home), share * _SHARE * float(task.speed[j]), float(home[j])
     parts: list[tuple[Array, float]] = []
     held: list[float] = []
     for speed in np.geomspace(0.01, 1.0, _LEVELS) * top:
@@ -140,28 +182,33 @@ def frf_plans(task: Task, seed: int) -> tuple[Plan, ...]:
     The slow turn keeps friction from sticking; the multisine has equal lines, so every frequency gets as much (Pintelon &
     Schoukens 2012, ch. 2).
     """
-    home, n = _home(task), task.robot.n_joints
-    plans = []
-    for j in range(n):
-        low, high = task.robot.joints[j].position
-        room = _USED_RANGE * (high - low) if np.isfinite(high - low) else 2.0 * np.pi
-        centre = 0.5 * (low + high) if np.isfinite(high - low) else float(home[j])
-        speed = min(_SLOW * float(task.speed[j]), room / (2.0 * _FRF_PERIOD))
-        rate = _acceleration(task, j, home)
-        ramp = max(_PEAK * speed / rate, 0.1)
-        hold = max(room / speed - ramp, 1.0)
-        start = centre - 0.5 * speed * (hold + ramp)
-        motion = _joined(task, _stroke(start, speed, ramp, hold))
-        whole = np.zeros((3, n, motion.shape[1]))
-        whole[0] = home[:, None]
-        whole[:, j] = motion
-        v = np.zeros((motion.shape[1], n))
-        v[:, j] = _multisine(motion.shape[1], task.sample_time, np.random.default_rng([seed, j])) * _strength(task, j, home)
-        t = np.arange(motion.shape[1], dtype=np.float64) * task.sample_time
-        plans.append(Plan(f"frf-{j + 1}", "frf", j + 1, home, t, whole, v, _FRF_PERIOD,
-                          f"{speed:.3g} rad/s there and back, lines from {_FRF_BAND[0]:g} to "
-                          f"{_FRF_BAND[1] / task.sample_time:g} Hz every {1.0 / _FRF_PERIOD:g} Hz"))
-    return tuple(plans)
+    home = _home(task)
+
+    def weaker(j: int) -> Callable[[float], Plan]:
+        return lambda share: _frf(task, j, home, seed, share)
+
+    return tuple(_within(task, weaker(j)) for j in range(task.robot.n_joints))
+
+
+def _frf(task: Task, j: int, home: Array, seed: int, share: float) -> Plan:
+    """Joint j's experiment, its turn and its excitation `share` as strong as they might be."""
+    low, high = task.robot.joints[j].position
+    room = _USED_RANGE * (high - low) if np.isfinite(high - low) else 2.0 * np.pi
+    centre = 0.5 * (low + high) if np.isfinite(high - low) else float(home[j])
+    speed = share * min(_SLOW * float(task.speed[j]), room / (2.0 * _FRF_PERIOD))
+    ramp = max(_PEAK * speed / (share * _acceleration(task, j, home)), 0.1)
+    hold = max(share * room / speed - ramp, 1.0)
+    motion = _joined(task, _stroke(centre - 0.5 * speed * (hold + ramp), speed, ramp, hold))
+    whole = np.zeros((3, task.robot.n_joints, motion.shape[1]))
+    whole[0] = home[:, None]
+    whole[:, j] = motion
+    v = np.zeros((motion.shape[1], task.robot.n_joints))
+    drawn = _multisine(motion.shape[1], task.sample_time, np.random.default_rng([seed, j]))
+    v[:, j] = share * _strength(task, j, home) * drawn
+    t = np.arange(motion.shape[1], dtype=np.float64) * task.sample_time
+    return Plan(f"frf-{j + 1}", "frf", j + 1, home, t, whole, v, _FRF_PERIOD,
+                f"{speed:.3g} rad/s there and back, lines from {_FRF_BAND[0]:g} to "
+                f"{_FRF_BAND[1] / task.sample_time:g} Hz every {1.0 / _FRF_PERIOD:g} Hz")
 
 
 def _strength(task: Task, j: int, home: Array) -> float:
@@ -191,8 +238,8 @@ def hold_plans(task: Task, seed: int) -> tuple[Plan, ...]:
     candidates = np.clip(candidates, bounds[:, 0] + 0.02, bounds[:, 1] - 0.02)
     rows, kept = _static_rows(task, candidates)
     if not kept.any():
-        raise UsageError("C08", "no posture can be held within the torque limits", where=task.robot.name,
-                         remedy="correct the torque limits or the model")
+        raise UsageError("C08", "no posture can be held within the limits of torque and tip", where=task.robot.name,
+                         remedy="correct these limits or the model")
     rows, candidates = rows[kept], candidates[kept]
     matrix = 1e-6 * np.eye(rows.shape[2])
     plans = []
@@ -205,7 +252,7 @@ def hold_plans(task: Task, seed: int) -> tuple[Plan, ...]:
         motion[0] = candidates[best][:, None]
         plans.append(Plan(f"hold-{k + 1}", "hold", None, candidates[best], t, motion,
                           words=", ".join(f"{value:.3f}" for value in candidates[best]) + " rad"))
-    return tuple(plans)
+    return tuple(replace(plan, nearest=_nearest(task, plan)) for plan in plans)
 
 
 def _static_rows(task: Task, q: Array) -> tuple[Array, np.ndarray]:
@@ -217,5 +264,10 @@ def _static_rows(task: Task, q: Array) -> tuple[Array, np.ndarray]:
     found = tuple(row.copy() for row in body.rows(still))
     for j, (own, row) in enumerate(zip(body.columns, found, strict=True)):
         rows[:, j, own] = row.T / task.problem.goal.noise[j]
-    tau = task.problem.torque(found, still[1])
-    return rows, np.asarray((np.abs(tau) < task.problem.limits.torque[:, None]).all(axis=0))
+    limits = task.problem.limits
+    low, high = task.problem.torque_range(still)
+    kept = (np.maximum(high, -low) < limits.torque[:, None]).all(axis=0)
+    if limits.tip_box is not None:
+        tip = tip_motion(task.problem.chain, still[0], still[1]).position
+        kept &= ((tip > limits.tip_box[:, :1]) & (tip < limits.tip_box[:, 1:])).all(axis=0)
+    return rows, np.asarray(kept)

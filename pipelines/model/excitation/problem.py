@@ -15,6 +15,7 @@ import numpy as np
 
 from pipelines.fit.design.barrier import barrier, cost_of_bounds
 from pipelines.fit.design.goal import Goal
+from pipelines.model.excitation.bounds import spread_of_torque
 from pipelines.model.excitation.columns import SHARPNESS, ArmColumns
 from pipelines.model.excitation.limits import Limit, Limits, middle_and_half
 from pipelines.model.excitation.space import MotionSpace
@@ -27,6 +28,10 @@ __all__ = ["ROOMY", "ArmProblem", "DesignProblem", "grams_of"]
 ROOMY = 0.7  # of the limits: where a start begins
 _INSIDE = 0.999  # of the limits: a motion that is drawn back keeps them
 _STEPS = 12  # of bisection
+
+
+def _sign(tau: Array) -> Array:
+    return np.where(tau < 0.0, -1.0, 1.0)
 
 
 def grams_of(columns: tuple[np.ndarray, ...], rows: tuple[Array, ...], count: int) -> Array:
@@ -47,6 +52,7 @@ class ArmProblem:
     beta: Array | None  # (all columns,) what is believed of the parameters: predicts torque
     goal: Goal
     drag: Array | None = None  # (joints, 2) Coulomb [N m] and viscous friction [N m s/rad] that no column stands for
+    spread: Array | None = None  # (all columns,) how far each parameter may lie from what is believed
 
     @cached_property
     def listed(self) -> tuple[Limit, ...]:
@@ -74,12 +80,34 @@ class ArmProblem:
         tau = np.stack([beta[own] @ row for own, row in zip(self.columns.columns, rows, strict=True)])
         return tau if self.drag is None else tau + self.drag[:, :1] * np.tanh(SHARPNESS * dq) + self.drag[:, 1:] * dq
 
+    def torque_range(self, motion: Array) -> tuple[Array, Array]:
+        """Lowest and highest τ (joints, samples) of a motion (3, joints, samples), whatever the parameters within their spread."""
+        rows = self.columns.rows(motion)
+        tau = self.torque(rows, motion[1])
+        wide = 0.0 if self.spread is None else spread_of_torque(self.columns, self.spread, rows)
+        return tau - wide, tau + wide
+
+    def _widest(self, rows: tuple[Array, ...], dq: Array) -> Array:
+        """τ (joints, samples), made larger by its spread."""
+        tau = self.torque(rows, dq)
+        return tau if self.spread is None else tau + _sign(tau) * spread_of_torque(self.columns, self.spread, rows)
+
+    def torque_adjoint(self, rows: tuple[Array, ...], dq: Array, bars: Array) -> tuple[Array, ...]:
+        """Derivatives by each row from those by the torque that is limited (joints, samples)."""
+        beta = self.beta if self.beta is not None else np.zeros(len(self.columns.names))
+        own = self.columns.columns
+        if self.spread is None:
+            return tuple(beta[k, None] * bar for k, bar in zip(own, bars, strict=True))
+        side = _sign(self.torque(rows, dq))
+        return tuple((beta[k, None] + s * self.spread[k, None] * np.sign(row)) * bar
+                     for k, row, s, bar in zip(own, rows, side, bars, strict=True))
+
     def signals(self, motion: Array, rows: tuple[Array, ...]) -> tuple[Array, TipMotion | None]:
         """What the limits are about, (limits, samples), in their order; of the tip's speed its square."""
         position, speed, acceleration, torque = self.watched
         parts = [motion[0, position], motion[1, speed], motion[2, acceleration]]
         if len(torque):
-            parts.append(self.torque(rows, motion[1])[torque])
+            parts.append(self._widest(rows, motion[1])[torque])
         tip = tip_motion(self.chain, motion[0], motion[1]) if self.tip_limited else None
         if tip is not None and self.limits.tip_speed is not None:
             parts.append((tip.velocity**2).sum(axis=0)[None])
@@ -130,12 +158,11 @@ class DesignProblem:
             return np.inf, x, np.inf
         value, on_grams, score = arm.goal.value(grams_of(arm.columns.columns, rows, len(arm.columns.names)), sharpness)
         by_motion, on_torque = arm.signals_adjoint(motion, tip, weight * walls[1])
-        bars = []
-        for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True)):
-            bar = (2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
-            if arm.beta is not None and len(arm.watched[3]):
-                bar += arm.beta[own, None] * on_torque[j]
-            bars.append(bar)
+        bars = [(2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
+                for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True))]
+        if len(arm.watched[3]):
+            for bar, more in zip(bars, arm.torque_adjoint(rows, motion[1], on_torque), strict=True):
+                bar += more
         by_motion += arm.columns.adjoint(motion, tuple(bars))
         return value + weight * walls[0], self.space.gradient(by_motion), score
 

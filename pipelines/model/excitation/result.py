@@ -13,6 +13,7 @@ from pipelines.model.excitation.others import Plan
 from pipelines.model.excitation.outcome import Compared, Course, ParameterStd
 from pipelines.model.excitation.rehearse import Rehearsal
 from pipelines.model.excitation.task import Task
+from pipelines.model.excitation.verify import Peak
 from pipelines.model.rigid.body import Array
 
 __all__ = ["CostOfLimit", "DrawnPlan", "Result"]
@@ -46,6 +47,7 @@ class DrawnPlan:
     q: Array  # [rad] (points, joints)
     speed_peak: float  # [rad/s]
     acceleration_peak: float  # [rad/s^2]
+    nearest: Peak | None = None  # the limit that it comes nearest to
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,7 @@ class Result:
     noise: tuple[float, ...] = ()  # [N m]
     friction_columns: bool = False
     torque_checked: bool = False
+    torque_bounded: bool = False  # by bounds on the parameters, for no model is known
     torque_share: float = 1.0
     after: tuple[str, ...] = ()
     first_mode: float | None = None  # [Hz]
@@ -91,6 +94,7 @@ class Result:
     top_hz: float = 0.0  # [Hz] of the highest harmonic
     rehearsal: Rehearsal | None = None
     rehearsal_failed: str = ""
+    rehearsals: tuple[tuple[str, Rehearsal], ...] = ()  # of plans, by name
     logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
     table: ControllerTable | None = field(default=None, metadata=NOT_STORED)
     coefficients: dict[str, object] | None = field(default=None, metadata=NOT_STORED)
@@ -105,14 +109,16 @@ class Result:
 
     @classmethod
     def of_plans(cls, task: Task, purpose: str, seed: int, sample_time: float, plans: tuple[Plan, ...],
-                 logs: tuple[tuple[str, ExperimentLog], ...]) -> Result:
+                 logs: tuple[tuple[str, ExperimentLog], ...], rehearsals: tuple[tuple[str, Rehearsal], ...] = (),
+                 failed: str = "") -> Result:
         drawn = tuple(_drawn(plan) for plan in plans)
         return cls(robot=task.robot.name, joints=tuple(joint.name for joint in task.robot.joints), purpose=purpose, seed=seed,
                    sample_time=sample_time, duration=sum(plan.seconds for plan in drawn), plans=drawn, logs=logs,
-                   home=None if task.home is None else tuple(map(float, task.home)), torque_checked=task.arm is not None)
+                   home=None if task.home is None else tuple(map(float, task.home)), torque_checked=task.torque is not None,
+                   torque_bounded=task.arm is None and task.torque is not None, rehearsals=rehearsals, rehearsal_failed=failed)
 
 
 def _drawn(plan: Plan) -> DrawnPlan:
     step = max(1, len(plan.t) // _POINTS)
     return DrawnPlan(plan.name, plan.joint, plan.words, float(plan.t[-1]), plan.t[::step], plan.motion[0].T[::step],
-                     float(np.abs(plan.motion[1]).max()), float(np.abs(plan.motion[2]).max()))
+                     float(np.abs(plan.motion[1]).max()), float(np.abs(plan.motion[2]).max()), plan.nearest)

@@ -44,6 +44,6 @@ def with_run_in(task: Task, trajectory: Trajectory) -> Trajectory:
 
 def _nearest(task: Task, one: Trajectory) -> Peak | None:
     t = np.arange(round(one.run_in / _STEP) + 1, dtype=np.float64) * _STEP
-    found = [peaks(task.problem.limits, task.problem.chain, one.at(at), task.arm, periodic=False)
+    found = [peaks(task.problem.limits, task.problem.chain, one.at(at), task.torque, periodic=False)
              for at in (t, one.duration - t[::-1])]
     return worst(tuple(peak for group in found for peak in group))

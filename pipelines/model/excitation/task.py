@@ -15,10 +15,12 @@ from pipelines.fit.design.criteria import CRITERIA
 from pipelines.fit.design.goal import Goal
 from pipelines.log.robot import RobotDescription
 from pipelines.model.arm import Arm
+from pipelines.model.excitation.bounds import ParameterBounds
 from pipelines.model.excitation.columns import ArmColumns, arm_columns
 from pipelines.model.excitation.limits import limits_of
 from pipelines.model.excitation.problem import ArmProblem
 from pipelines.model.excitation.space import Harmonics, plan_harmonics
+from pipelines.model.excitation.verify import TorqueRange, torque_of
 from pipelines.model.rigid import rrr
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
@@ -72,13 +74,22 @@ class Task:
     sample_time: float
     periods: int
 
+    @property
+    def torque(self) -> TorqueRange | None:
+        """What predicts torque: the model, or bounds on the parameters; None where neither is known."""
+        if self.arm is not None:
+            return torque_of(self.arm)
+        return None if self.problem.beta is None else self.problem.torque_range
 
-def plan_task(robot: RobotDescription, arm: Arm | None, wishes: Wishes, earlier: Array | None = None) -> Task:
+
+def plan_task(robot: RobotDescription, arm: Arm | None, wishes: Wishes, earlier: Array | None = None,
+              bounds: ParameterBounds | None = None) -> Task:
     """Decide what was left open.
 
     Args:
         arm: the model of `robot`, or None where neither a model nor links are known.
         earlier: information of earlier logs (joints, columns, columns), as rowsᵀ rows summed over their samples.
+        bounds: of the parameters, where no model is known: they limit the torque.
 
     Raises:
         UsageError: C02, a value that does not fit; C08, a limit that no motion at all could keep, or is missing.
@@ -91,10 +102,12 @@ def plan_task(robot: RobotDescription, arm: Arm | None, wishes: Wishes, earlier:
     limits = limits_of(robot, torque_share=wishes.torque_share, tip_speed=wishes.tip_speed, tip_box=box)
     harmonics = _harmonics(wishes, robot.n_joints, _TOP_HZ if direct else _GEARED_TOP_HZ)
     samples = round(harmonics.period / wishes.sample_time) * wishes.periods
-    goal = _goal(wishes, robot, columns, arm, earlier, samples)
-    beta = None if arm is None else _beta(columns, arm, robot)
+    beta = _beta(columns, arm, robot) if arm is not None else bounds.middle if bounds is not None else None
+    typical = bounds.largest if arm is None and bounds is not None else beta
+    goal = _goal(wishes, robot, columns, typical, earlier, samples)
     drag = None if arm is None or friction else np.array([_modelled(arm, j, k.velocity) for j, k in enumerate(robot.joints)])
-    problem = ArmProblem(columns, serial_chain(robot), limits, beta, goal, drag)
+    spread = bounds.half if arm is None and bounds is not None else None
+    problem = ArmProblem(columns, serial_chain(robot), limits, beta, goal, drag, spread)
     speed = _speed(robot)
     home = home_of(robot, wishes.home) if wishes.rest or wishes.home is not None else None
     low, high = _ranges(robot)
@@ -174,7 +187,7 @@ def _speed(robot: RobotDescription) -> Array:
     return speed
 
 
-def _goal(wishes: Wishes, robot: RobotDescription, columns: ArmColumns, arm: Arm | None, earlier: Array | None,
+def _goal(wishes: Wishes, robot: RobotDescription, columns: ArmColumns, beta: Array | None, earlier: Array | None,
           samples: int) -> Goal:
     names = columns.names
     if wishes.symmetric and not set(_SYMMETRIC) <= set(names):
@@ -190,7 +203,7 @@ def _goal(wishes: Wishes, robot: RobotDescription, columns: ArmColumns, arm: Arm
         raise UsageError("C08", f"no motion of this arm has a condition number below {np.sqrt(1.5):.5f}", where="--cond-max",
                          remedy="allow more; 3 is a good ceiling")
     kept = np.array([k for k, name in enumerate(names) if not (wishes.symmetric and name in _SYMMETRIC)], dtype=np.intp)
-    sizes = _sizes(columns, None if arm is None else _beta(columns, arm, robot))
+    sizes = _sizes(columns, beta)
     noise = _noise(wishes, robot)
     shared = None if earlier is None else earlier / samples
     return Goal(criterion, kept, kept, kept, noise, sizes, samples, ceiling, shared)

@@ -7,6 +7,7 @@ step to its neighbour is added, which on a grid of 0.1 ms exceeds what can lie b
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,10 @@ from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.geometry import SerialChain
 from pipelines.signal import fourier
 
-__all__ = ["GRID", "Peak", "exceeded", "peaks", "worst"]
+__all__ = ["GRID", "Peak", "TorqueRange", "exceeded", "peaks", "torque_of", "worst"]
 
 GRID = 1e-4  # [s]
+TorqueRange = Callable[[Array], tuple[Array, Array]]  # lowest and highest τ (joints, samples) of a motion
 _KINDS = ("position", "speed", "acceleration")
 
 
@@ -37,10 +39,10 @@ class Peak:
     cost: float = 0.0  # share of what all limits together cost the design
 
 
-def peaks(limits: Limits, chain: SerialChain, motion: Array, arm: Arm | None, *, periodic: bool) -> tuple[Peak, ...]:
+def peaks(limits: Limits, chain: SerialChain, motion: Array, torque: TorqueRange | None, *, periodic: bool) -> tuple[Peak, ...]:
     """Of motion (3, joints, samples) on a grid of `GRID`; a periodic motion's samples do not hold its first one twice."""
-    listed = limits.listed(arm is not None)
-    tau = _torque(arm, motion) if arm is not None and any(one.quantity == "torque" for one in listed) else None
+    listed = limits.listed(torque is not None)
+    tau = torque(motion) if torque is not None and any(one.quantity == "torque" for one in listed) else None
     tip = tip_motion(chain, motion[0], motion[1]) if any(one.joint is None for one in listed) else None
     found = []
     for one in listed:
@@ -48,7 +50,7 @@ def peaks(limits: Limits, chain: SerialChain, motion: Array, arm: Arm | None, *,
             signal = motion[_KINDS.index(one.quantity), one.joint - 1]
             low, high = (float(x) for x in fourier.periodic_peak(signal)) if periodic else _between(signal)
         elif one.quantity == "torque" and tau is not None and one.joint is not None:
-            low, high = _between(tau[one.joint - 1])
+            low, high = _between(tau[0][one.joint - 1])[0], _between(tau[1][one.joint - 1])[1]
         elif tip is not None and one.quantity == "tip speed":
             low, high = 0.0, _between(np.linalg.norm(tip.velocity, axis=0))[1]
         elif tip is not None:
@@ -59,9 +61,14 @@ def peaks(limits: Limits, chain: SerialChain, motion: Array, arm: Arm | None, *,
     return tuple(found)
 
 
-def _torque(arm: Arm, motion: Array) -> Array:
-    samples = motion.shape[2]
-    return arm.torque(Motion(GRID * np.arange(samples, dtype=np.float64), motion[0].T, motion[1].T, motion[2].T)).T
+def torque_of(arm: Arm) -> TorqueRange:
+    """The torque of a model on a grid of `GRID`: lowest and highest are one."""
+    def torque(motion: Array) -> tuple[Array, Array]:
+        t = GRID * np.arange(motion.shape[2], dtype=np.float64)
+        tau = arm.torque(Motion(t, motion[0].T, motion[1].T, motion[2].T)).T
+        return tau, tau
+
+    return torque
 
 
 def _between(signal: Array) -> tuple[float, float]:
