@@ -58,6 +58,7 @@ class Settings:
     method: str = "varpro"  # how its numbers are found in the end: varpro, output-error or ekf
     window: float = 0.02  # [s] of the equations
     order: int = Reconstruction.order  # of the smoother that motion begins with
+    together: bool = True  # where no joint was driven alone: friction with the base parameters, from logs in which all move
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
@@ -73,13 +74,14 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     logs = [log for log in measured if log.experiment in ("friction", "hold")]
     identify = [log for log in logs if log.role == "identify" and log.experiment == "friction"]
     together = [log for log in measured if log.role == "identify" and log.experiment in ("excitation", "free")]
-    if not identify and together:
+    if not identify and together and settings.together:
         return _together(together, [log for log in measured if log.role == "validate" and log.experiment in ("excitation", "free")],
                          settings, law)
     if not identify:
         kinds = ", ".join(sorted({f"{o.log.experiment} ({o.log.role})" for o in inputs.logs})) or "none"
         raise NothingMatched("C06", f"no friction log of role identify; there are: {kinds}", where=inputs.label,
-                             remedy="drive each joint alone, the others held, and record it as experiment 'friction'")
+                             remedy="drive each joint alone, the others held, and record it as experiment 'friction'" + (
+                                 "; fit-friction by itself also takes logs in which all move" if together else ""))
     _of_one_robot(logs, inputs.label)
     used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
     seen, said = _examined(used, Reconstruction(order=settings.order))
@@ -237,4 +239,6 @@ def _onward(result: Result, inputs: Inputs) -> Inputs:
 
 STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report, read_logs, write,
               lambda result, check: int(check and any(found.gate for found in result.checks)),
-              lambda result: result.checks, _onward)
+              lambda result: result.checks, _onward,
+              # estimate-bps fits Coulomb and viscous friction itself: half a minute of choosing laws would not be handed on
+              Settings(together=False))

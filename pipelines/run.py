@@ -79,7 +79,7 @@ def _stages(inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
     for module in STEPS:
         stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
         try:
-            result = stage.compute(inputs, settings.stages.get(stage.name) or stage.settings())
+            result = stage.compute(inputs, settings.stages.get(stage.name) or stage.in_run or stage.settings())
         except (NothingMatched, InputRejected) as problem:
             steps.append(_without(stage, problem))
             continue

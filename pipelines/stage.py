@@ -93,6 +93,7 @@ class Stage(Generic[S, R]):
     exit_code: Callable[[R, bool], int] = lambda result, check: 0  # (result, --check)
     checks: Callable[[R], tuple[Check, ...]] = lambda result: ()  # what compute found or mended
     onward: Callable[[R, Inputs], Inputs] = lambda result, inputs: inputs  # what `run` hands to the stages after it
+    in_run: S | None = None  # settings within `run`, where they are others than by default
 
 
 @dataclass(frozen=True)

@@ -249,3 +249,12 @@ def test_friction_is_handed_on(samples: Path) -> None:
     part = Inputs(opened[:2], label="logs")
     assert fit_friction.STAGE.onward(fit_friction.compute(part, QUICK), part).material is None
     assert all(isinstance(joint, JointResult) for joint in result.joints)
+
+
+def test_run_leaves_joints_that_never_moved_alone_to_the_estimate(samples: Path) -> None:
+    """Laws chosen together with the base parameters would not be handed on: `run` passes over, and says who takes such logs."""
+    inputs = Inputs((open_log(samples / "rrr-closed-form/excitation-1.h5"),), label="logs")
+    assert isinstance(fit_friction.STAGE.in_run, Settings)
+    with pytest.raises(NothingMatched) as refused:
+        fit_friction.compute(inputs, fit_friction.STAGE.in_run)
+    assert "fit-friction by itself" in refused.value.remedy

@@ -65,15 +65,14 @@ def _runs_of(log: LogEquations, j: int) -> list[_Run]:
 
 
 @dataclass(frozen=True, eq=False)
-class RowEquations:
-    """One joint's rows of several logs."""
+class _Row:
+    """What is made once of one joint's rows, however many of them are looked at."""
 
     logs: tuple[LogEquations, ...]  # with the rigid body's columns
     joint: int  # from 0
-    every: int = 1
 
     @cached_property
-    def _blocks(self) -> tuple[Array, Array]:
+    def blocks(self) -> tuple[Array, Array]:
         """Columns of the rigid body that act on this row, and torque."""
         fixed, y = [], []
         for log in self.logs:
@@ -82,17 +81,29 @@ class RowEquations:
                 y.append(np.array(block.y[self.joint]))
         return np.vstack(fixed), np.concatenate(y)
 
+    @cached_property
+    def runs(self) -> tuple[_Run, ...]:
+        return tuple(run for log in self.logs for run in _runs_of(log, self.joint))
+
+
+@dataclass(frozen=True, eq=False)
+class RowEquations:
+    """One joint's rows of several logs."""
+
+    row: _Row
+    every: int = 1
+
     @property
     def y(self) -> Array:
-        return self._blocks[1][::self.every]
+        return self.row.blocks[1][::self.every]
 
     @property
     def fixed(self) -> Array:
-        return self._blocks[0][::self.every]
+        return self.row.blocks[0][::self.every]
 
     @property
     def width(self) -> int:
-        return int(self._blocks[0].shape[1])
+        return int(self.row.blocks[0].shape[1])
 
     @property
     def postures(self) -> tuple[tuple[float, ...], ...]:
@@ -100,20 +111,16 @@ class RowEquations:
 
     @cached_property
     def nodes(self) -> Motion:
-        longest = max(self.logs, key=lambda log: len(log.found.motion.t))
-        return _alone(longest.found.motion, self.joint)
+        longest = max(self.row.logs, key=lambda log: len(log.found.motion.t))
+        return _alone(longest.found.motion, self.row.joint)
 
     def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]:
         del beta  # laws that ask for the load are not tried here
-        return (OneJoint.of(self.logs[0].columns.body.robot, self.joint + 1),)
-
-    @cached_property
-    def _runs(self) -> tuple[_Run, ...]:
-        return tuple(run for log in self.logs for run in _runs_of(log, self.joint))
+        return (OneJoint.of(self.row.logs[0].columns.body.robot, self.row.joint + 1),)
 
     def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array:
         """The law's columns (rows, amplitudes), centred, filtered and thinned out as the body's were."""
-        return np.vstack([run.conditioned(law.columns(run.motion, arms[0], theta)) for run in self._runs])[::self.every]
+        return np.vstack([run.conditioned(law.columns(run.motion, arms[0], theta)) for run in self.row.runs])[::self.every]
 
     def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable:
         lower, upper = law.bounds
@@ -145,7 +152,7 @@ def fit_several(identify: Motions, validate: Motions, recipe: Recipe, law: Law |
     recipe = with_cutoff(recipe, identify, columns)
     rows, others = (tuple(equations_of(part, recipe, columns)) if part else () for part in (identify, validate))
     laws = (law,) if law is not None else tuple(one for one in LADDER if one.pointwise and not one.sees_load)
-    ladders = tuple(climb(Judge(RowEquations(rows, j), RowEquations(others, j) if others else None), laws)
+    ladders = tuple(climb(Judge(RowEquations(_Row(rows, j)), RowEquations(_Row(others, j)) if others else None), laws)
                     for j in range(robot.n_joints))
     placed = [replace(effect, joint=j + 1) for j, ladder in enumerate(ladders)
               for effect in ladder.chosen.fit.law.shaped(ladder.chosen.fit.theta)]
