@@ -273,11 +273,11 @@ def write(result: Result, folder: Path, request: Request) -> None:
         write_controller_table(folder / "controller.csv", result.table)
     if result.coefficients is not None:
         text = json_text(result.coefficients)
-        write_file(folder / "coefficients.json", lambda draft: _text(draft, text))
 
+        def fill(draft: Path) -> None:
+            draft.write_text(text, encoding="utf-8")
 
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+        write_file(folder / "coefficients.json", fill)
 
 
 def _checks(result: Result) -> tuple[Check, ...]:

@@ -15,7 +15,7 @@ from pipelines.report.style import format_number, format_unit
 __all__ = ["excitation_report"]
 
 _UNCHECKED = "Self-collision is not checked, nor is collision with anything around the robot."
-_AIMS = {"default": "smallest relative std, condition bounded",
+_AIMS = {
          "A": "smallest relative std", "D": "smallest confidence ellipsoid",
          "E": "best known worst direction",
          "condition": "smallest condition number", "frobenius": "smallest Frobenius condition number"}
@@ -58,7 +58,7 @@ def _key_figures(result: Result) -> Table:
     start = "at rest at home" if result.home is not None and not result.run_in else (
         f"run-in and run-out of {result.run_in:.3g} s" if result.run_in else "at rest")
     rows: list[tuple[str, str | float | int | None]] = [
-        ("aim", _AIMS.get(result.criterion, result.criterion)), ("condition number of Φ", result.condition_number)]
+        ("aim", _aim(result)), ("condition number of Φ", result.condition_number)]
     if result.lower_bound is not None:
         rows.append(("no motion of this arm can be below", result.lower_bound))
     if result.torque_checked:
@@ -73,6 +73,11 @@ def _key_figures(result: Result) -> Table:
     if result.first_mode is not None:
         rows.append((f"first mode known; no harmonic above 1/{result.mode_factor:g} of it [Hz]", result.first_mode))
     return Table(("what", "figure"), tuple(rows))
+
+
+def _aim(result: Result) -> str:
+    aim = _AIMS["A" if result.criterion == "default" else result.criterion]
+    return aim if result.ceiling is None else f"{aim}, condition number {result.ceiling:g} at most"
 
 
 def _safety(result: Result) -> Section:

@@ -23,7 +23,8 @@ class Budget:
         """One of both may be None; `tell` is called about every second with the evaluations so far.
 
         Args:
-            reserve: of the seconds, what so many evaluations take is left for what comes after the search.
+            reserve: of the seconds, what so many evaluations take is left for what comes after the search; half of them at
+                most, for the first evaluations take longer than those to come.
         """
         self.seconds, self.limit, self.reserve = seconds, evaluations, reserve
         self.done = 0
@@ -46,7 +47,8 @@ class Budget:
         if self.limit is not None:
             spent = self.done >= self.limit
         else:
-            spent = self.seconds is not None and elapsed + self.reserve * elapsed / max(self.done, 1) >= self.seconds
+            left = min(self.reserve * elapsed / max(self.done, 1), 0.5 * (self.seconds or 0.0))
+            spent = self.seconds is not None and elapsed + left >= self.seconds
         if spent and (self.limit is not None or self.done > 0):  # one at least: else there is nothing to answer with
             raise SpentError
         self.done += 1

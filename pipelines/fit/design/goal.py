@@ -27,12 +27,12 @@ from pipelines.fit.design.criteria import (
     spectrum,
 )
 
-__all__ = ["Figures", "Goal"]
+__all__ = ["FAR", "Figures", "Goal"]
 
 Array = npt.NDArray[np.float64]
 
 _STEEP = 10.0  # of the penalty, far above the ceiling: it outweighs what A or D could gain
-_FAR = 1e3  # a design above the ceiling is worse than any below it
+FAR = 1e6  # a design above the ceiling is worse than any below it: its figure is this and the logarithm of its condition number
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Goal:
         if self.ceiling is not None:
             value, on_plain = self._below(plain, sharpness, value, on_plain)
             if plain.condition > self.ceiling:
-                score = _FAR + math.log(plain.condition)
+                score = FAR + math.log(plain.condition)
         bar[:, self.plain[:, None], self.plain] += on_plain
         return value, bar, score
 

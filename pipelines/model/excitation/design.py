@@ -12,6 +12,7 @@ import numpy as np
 
 from pipelines.errors import Interrupted, UsageError
 from pipelines.fit.design.budget import Budget
+from pipelines.fit.design.goal import FAR
 from pipelines.fit.design.search import Best, Round, polish, search
 from pipelines.model.excitation.problem import DesignProblem
 from pipelines.model.excitation.run_in import with_run_in
@@ -30,7 +31,6 @@ _FIFTH = 5  # of the harmonics in the coarse problem
 _FINISHING = (Round(600, 1e-4, 30), Round(2000, 2e-5, 50), Round(4000, 5e-6, 60))
 _FINISH_EVALUATIONS = 200
 _SHRINKINGS = 60
-_FAR = 100.0  # a score beyond: the design is not what was asked for
 
 
 @dataclass(frozen=True)
@@ -97,14 +97,14 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
     cost = tuple(float(c) for c in finish.cost(finish.sized(x, 0.9999, 1.0)))
     return Design(trajectory, budget.done, best.evaluation, interrupted,
                   tuple(replace(peak, cost=share) for peak, share in zip(found, cost, strict=True)), factor, cost,
-                  best.score < _FAR)
+                  task.problem.goal.ceiling is None or best.score < FAR)
 
 
 def _progress(task: Task, done: int, best: Best) -> str:
     if not np.isfinite(best.score):
         return f"evaluation {done}: first starts"
-    if best.score > _FAR:
-        return f"evaluation {done}: condition number {np.exp(best.score - 1e3):.3f} so far"
+    if task.problem.goal.ceiling is not None and best.score > FAR:
+        return f"evaluation {done}: condition number {np.exp(best.score - FAR):.3f} so far"
     figure = {"condition": f"condition number {best.score:.4f}"}.get(
         task.problem.goal.criterion, f"{task.problem.goal.criterion} criterion {best.score:.4f}")
     return f"evaluation {done}: best {figure}, found at {best.evaluation}"

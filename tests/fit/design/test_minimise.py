@@ -62,3 +62,18 @@ def test_a_budget_counts_evaluations_alone() -> None:
     timed.spend()
     with pytest.raises(SpentError):
         timed.spend()
+
+
+def test_slow_first_evaluations_do_not_end_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Setting up takes 0.5 s, each evaluation 1 ms, and 400 of them are kept for the end: of 10 s 9 remain to search."""
+    clock = iter([0.0, *(0.5 + 0.008 * k for k in range(10_000))])
+    monkeypatch.setattr("pipelines.fit.design.budget.time.process_time", lambda: next(clock))
+    budget = Budget(10.0, None, reserve=400.0)
+
+    def search() -> None:
+        while True:
+            budget.spend()
+
+    with pytest.raises(SpentError):
+        search()
+    assert 8_500 <= budget.done <= 9_500
