@@ -116,7 +116,7 @@ def test_the_derived_log_holds_the_friction(outcome: Outcome[Result]) -> None:
     assert relative(friction[:, 2], TRUTHS["three_sigmoid"].curve(log["dq_hat"][:, 2])) < 0.01
 
 
-@pytest.mark.parametrize("method", ["varpro", "output-error", "ekf"])
+@pytest.mark.parametrize("method", ["varpro", pytest.param("output-error", marks=pytest.mark.slow), "ekf"])
 def test_three_methods(method: str) -> None:
     """Each gives inertia to 1 % and the curve to 1.2 % on a log of its own."""
     law = None if method != "ekf" else "three_sigmoid"
