@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from pipelines.errors import UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.excitation.columns import ArmColumns
 from pipelines.model.motion import Reconstruction, reconstruct
@@ -33,7 +35,18 @@ def information_of(logs: Iterable[ExperimentLog], columns: ArmColumns) -> Array:
 
 
 def first_mode(results: Iterable[Mapping[str, Any]]) -> float | None:
-    """The lowest frequency [Hz] of a mode in results of `frf`; None where none was found."""
-    found = [mode["frequency"]["value"] for result in results for response in result.get("responses", ())
-             for mode in response.get("modes", ()) if (mode.get("frequency") or {}).get("value")]
+    """The lowest frequency [Hz] of a mode, resonance or antiresonance, in results of `frf`; None where none was found.
+
+    Raises:
+        UsageError: C02, a result that does not hold what `frf` writes.
+    """
+    try:
+        values = [mode["frequency"]["value"] for result in results for response in result["responses"]
+                  for mode in response["modes"]]
+        found = [float(value) for value in values if value is not None]
+    except (KeyError, TypeError, ValueError):
+        found = [math.nan]
+    if not all(0.0 < value < math.inf for value in found):
+        raise UsageError("C02", "a result of frf does not say the frequencies of its modes", where="--after",
+                         remedy="run frf again, or leave its result out")
     return min(found, default=None)

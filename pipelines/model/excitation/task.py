@@ -160,6 +160,9 @@ def _harmonics(wishes: Wishes, joints: int, top_hz: float) -> Harmonics:
               else tuple(max(_FEWEST, int(top / f + 1e-9)) for f in frequency))
     if wishes.top_hz is not None:
         counts = tuple(min(int(n), int(wishes.top_hz / f + 1e-9)) for n, f in zip(counts, frequency, strict=True))
+        if min(counts) < _FEWEST:
+            raise UsageError("C08", f"the first mode leaves {wishes.top_hz:.3g} Hz at most, a joint has fewer than {_FEWEST} "
+                             "harmonics below", where="--after", remedy="give a lower --frequency, or a smaller mode_factor")
     return plan_harmonics(frequency, tuple(int(n) for n in counts), wishes.keep_out)
 
 
