@@ -77,7 +77,7 @@ def _key_figures(result: Result) -> Table:
 
 def _aim(result: Result) -> str:
     aim = _AIMS["A" if result.criterion == "default" else result.criterion]
-    return aim if result.ceiling is None else f"{aim}, condition number {result.ceiling:g} at most"
+    return aim if result.ceiling is None else f"{aim}, condition ≤ {result.ceiling:g}"
 
 
 def _safety(result: Result) -> Section:

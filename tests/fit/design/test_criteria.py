@@ -30,7 +30,7 @@ CRITERIA: dict[str, tuple[Criterion, Callable[[np.ndarray], complex]]] = {
 
 def _matrix(seed: int) -> np.ndarray:
     a = np.random.default_rng(seed).normal(size=(9, 6)) * np.array([1.0, 2.0, 0.3, 1.0, 4.0, 0.8])
-    return a.T @ a
+    return np.asarray(a.T @ a)
 
 
 @pytest.mark.parametrize("name", CRITERIA)
