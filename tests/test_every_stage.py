@@ -6,6 +6,7 @@ import ast
 import dataclasses
 import inspect
 import json
+import shutil
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from pipelines.log.results import decode, encode, read_series
 from pipelines.log.table import write_csv
 from pipelines.report.report import Report
 from pipelines.stage import Request, Stage, run_stage
-from rrrid_cli.main import STAGES
+from rrrid_cli.commands import STAGES
 from tests.controlled import controlled_log
 from tests.log.recording.good import RECIPE, good, text, write
 from tests.log.recording.good import run as run_import
@@ -26,6 +27,10 @@ from tests.repairs import REPAIRS, Repair
 
 REPO = Path(__file__).resolve().parents[1]
 MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if path.stem not in ("__init__", "stage", "errors")]
+# The sample logs a stage is run on here: few of every kind it reads. Any other stage takes them all.
+_FEW = ("excitation-1", "excitation-2", "hold-1")
+LOGS = {"inspect": _FEW, "reconstruct": ("excitation-1", "hold-1"), "estimate_bps": _FEW, "fit_friction": ("friction-3",),
+        "run": ("excitation-1", "excitation-2", "friction-3")}
 FORBIDDEN = {"open", "print", "read_text", "write_text", "read_bytes", "write_bytes", "open_log", "write_log", "savefig"}
 
 
@@ -46,6 +51,11 @@ def _recording(folder: Path, samples: Path) -> Path:
 def _run(module: str, tmp_path: Path, samples: Path) -> tuple[Any, Any]:
     stage = _stage(module)
     settings, paths = stage.settings(), (samples / "rrr-closed-form",)
+    if module in LOGS:
+        (tmp_path / "few").mkdir(exist_ok=True)
+        paths = (tmp_path / "few",)
+        for name in LOGS[module]:
+            shutil.copy(samples / f"rrr-closed-form/{name}.h5", tmp_path / "few")
     if module == "import_log":
         recipe = _recording(tmp_path / "data", samples)
         settings, paths = dataclasses.replace(settings, recipe=str(recipe), source=recipe.parent), ()

@@ -35,7 +35,7 @@ DOORS = {
 NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy alone
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.
 BY_NAME = {"pipelines.run", "pipelines.batch", "pipelines.model.effects", "pipelines.bench.faults",
-           "rrrid_cli.settings", "rrrid_cli.main"}
+           "rrrid_cli.settings", "rrrid_cli.commands"}
 HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
 
 

@@ -21,7 +21,7 @@ from pipelines.model.motion import Reconstruction
 from pipelines.model.motion import reconstruct as motion_of
 from pipelines.signal.chain import held_input, transition
 from pipelines.stage import Outcome, Request, run_stage
-from rrrid_cli.main import app
+from rrrid_cli.commands import app
 from tests.fault_table import FAULTS
 from tests.faulty import good_path
 from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest, rows, with_signal

@@ -18,9 +18,8 @@ from pipelines.stage import Outcome, Request, read_logs, run_stage
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Outcome[run.Result]:
-    """`rrrid run` on the sample logs."""
-    out = tmp_path_factory.mktemp("run") / "out"
-    return run_stage(run.STAGE, Request((samples / "rrr-closed-form",), out=out), run.Settings())
+    """`rrrid run` on the sample logs; every joint was driven alone in one of them."""
+    return run_stage(run.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path_factory.mktemp("run") / "out"), run.Settings())
 
 
 def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result]) -> None:
@@ -37,7 +36,7 @@ def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result
 def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
     """estimate-bps inside `run`, on derived logs, is estimate-bps on the recordings with the friction that fit-friction found."""
     settings = estimate_bps.Settings(model=str(whole.folder / "fit-friction/model.json"))
-    alone = run_stage(estimate_bps.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path / "out"), settings)
+    alone = run_stage(estimate_bps.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path / "out", no_report=True), settings)
     inside = json.loads((whole.folder / "result.json").read_text())["stages"][3]["result"]
     assert inside["parameters"] == alone.json["parameters"]
     assert inside["relative_error"] == alone.json["relative_error"]
@@ -49,7 +48,7 @@ def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path:
     for number in (1, 2):
         (tmp_path / "logs").mkdir(exist_ok=True)
         shutil.copy(samples / f"rrr-closed-form/friction-{number}.h5", tmp_path / "logs")
-    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", check=True), run.Settings())
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", check=True, no_report=True), run.Settings())
     last = outcome.result.stages[-1]
     assert (last.name, last.exit, last.result, outcome.exit_code) == ("estimate-bps", 5, None, 0)
     assert "no excitation or free log" in last.report.verdict
@@ -61,12 +60,12 @@ def test_a_bad_log_costs_itself_alone(samples: Path, tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     for name in ("excitation-1", "excitation-2"):
         shutil.copy(samples / f"rrr-closed-form/{name}.h5", tmp_path / "logs")
-    good = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "good"), run.Settings())
+    good = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "good", no_report=True), run.Settings())
     (tmp_path / "logs/cut.h5").write_bytes((tmp_path / "logs/excitation-1.h5").read_bytes()[:9000])
     log = open_log(tmp_path / "logs/excitation-1.h5").log
     still = {**log.signals, "t": Signal(np.zeros(log.n_samples), "s", "time")}
     write_log(tmp_path / "logs/still.h5", replace(log, name="still", signals=still))
-    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out"), run.Settings())
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), run.Settings())
     assert outcome.exit_code == 3
     assert {c.code for c in outcome.checks if c.level == "reject"} == {"RRID-F02", "RRID-T02"}
     assert outcome.json["stages"][3]["result"]["parameters"] == good.json["stages"][3]["result"]["parameters"]

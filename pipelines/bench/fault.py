@@ -128,7 +128,8 @@ class Case:
             UsageError: C02, there is only one joint.
         """
         if self.machine.n < 2:
-            raise UsageError("C02", "two joints share this fault, and the machine has one")
+            raise UsageError("C02", "two joints share this fault, and the machine has one",
+                             remedy="choose a fault of one joint, or a machine of two")
         return self.index if self.index else 2
 
     def phase(self) -> float:

@@ -184,8 +184,8 @@ def _clock(e: Evidence) -> Sequence[Check | NotTested]:
     if found is None:
         return e.subject.cannot_tell("T06", "no torque follows its motion closely enough to time it", signal="tau")
     if found.joints < 2:
-        return e.subject.cannot_tell("T06", "one joint's torque alone is understood, and what its friction does at a reversal looks "
-                                     "like an offset of the clocks", signal="tau")
+        return e.subject.cannot_tell("T06", "one joint's torque alone is understood, and what its friction does at a reversal "
+                                     "looks like an offset of the clocks", signal="tau")
     ms = 1e3 * e.motion.sample_time
     words = (f"torque lies {abs(found.samples):.2f} ± {found.bound:.2f} samples ({abs(found.samples) * ms:.3g} ms) "
              f"{'behind' if found.samples > 0 else 'ahead of'} the motion")
