@@ -5,9 +5,9 @@
 Both take position and torque of one joint, 20 s at 1 kHz, friction of three sigmoids, and give inertia, gravity and friction
 (ten numbers). Theirs is the paper's filter: filterpy's ExtendedKalmanFilter over q, dq and the ten, one pass, started 15 % off
 the truth and told the true noise of torque and encoder; its model and derivatives are plain scalar arithmetic, faster than
-arrays of one. Ours is told neither: it tunes a smoother on 8 s, makes the equations, scans for starts and solves them; refined
-smooths again about what was fitted, once or twice. Errors are of the friction curve over the driven speeds, rms over its rms,
-medians over the seeds.
+arrays of one. Ours is one call, `fit_driven_alone`, and is told neither, nor a start: only the step of the encoder. It tunes a
+smoother, fits roughly, refines the motion about that once (by default) or twice, fits again and gives the covariance. Errors are
+of the friction curve over the driven speeds, rms over its rms, medians over the seeds.
 """
 
 from __future__ import annotations
@@ -19,43 +19,23 @@ import statistics
 
 import numpy as np
 
+from pipelines.model.friction.driven_alone import fit_driven_alone
 from pipelines.model.friction.ekf import joint_step
-from pipelines.model.friction.equations import LawEquations
-from pipelines.model.friction.fit_law import fit_law
 from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.refine import refined
-from pipelines.model.friction.weak_form import Stretch
 from pipelines.signal.kalman import ExtendedTextbook
-from pipelines.signal.observer import design
-from pipelines.signal.smoother import smooth
-from pipelines.signal.tuning import tune_jerk, tune_smoother
 from tests.model.friction.one_joint import ENCODER, INERTIA, JOINT, SINE, STEP, TRUTHS, driven_speeds, recorded, relative
 
-NAMES = ("plain", "refined", "refined twice")
-TUNED = 8192  # samples that the smoother is tuned on
-ROWS = 240  # of the first fit, which is only where refining begins
+ROUNDS = {"one call": 1, "refined twice": 2}
 STATES = np.array([0.0, 0.0, 1.0 / INERTIA, SINE, 0.4, 1.2, -0.4, 120.0, 60.0, 12.0, 0.12, 0.35])
 STD = np.array([ENCODER, 0.01, 2.0, 0.4, 0.3, 0.4, 0.2, 30.0, 20.0, 5.0, 0.05, 0.2])
 
 
 def ours(y: np.ndarray, tau: np.ndarray, rounds: int) -> LawFit:
-    resolution, middle = np.array([ENCODER]), slice(len(y) // 2 - TUNED // 2, len(y) // 2 + TUNED // 2)
-    causal = tune_jerk(y[middle, None], STEP, resolution, 3)
-    jerk = np.minimum(tune_smoother(y[middle, None], STEP, resolution, 3).jerk_std, causal.jerk_std)
-    states = smooth(y[:, None], design(STEP, jerk, causal.noise_variance, 3)).states[..., 0]
-    spoilt = np.zeros(len(y), dtype=bool)
-    spoilt[:50] = spoilt[-50:] = True
-    stretch = Stretch("log", np.arange(len(y)) * STEP, y, tau, states[0], states[1], spoilt, True, 20, True, ())
     joint, law = OneJoint.of(recorded("three_sigmoid", 0).robot, JOINT), law_named("three_sigmoid")
     assert law is not None
-    first = LawEquations.of((stretch,), joint)
-    fit = fit_law(first.thinned(ROWS) if rounds else first, law)
-    for _ in range(rounds):
-        stretch = refined(stretch, fit, ENCODER)
-        fit = fit_law(LawEquations.of((stretch,), joint), law, [fit.theta])
-    return fit
+    return fit_driven_alone(np.arange(len(y), dtype=np.float64) * STEP, y, tau, joint, law, ENCODER, rounds=rounds)
 
 
 def theirs(y: np.ndarray, tau: np.ndarray) -> np.ndarray:
@@ -72,12 +52,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()
-    errors: dict[str, list[float]] = {name: [] for name in (*NAMES, "theirs")}
+    errors: dict[str, list[float]] = {name: [] for name in (*ROUNDS, "theirs")}
     for seed in range(arguments.seeds):
         log = recorded("three_sigmoid", seed)
         y, tau, speed = log.q[:, JOINT - 1], log.tau[:, JOINT - 1], driven_speeds(log)
         truth = TRUTHS["three_sigmoid"].curve(speed)
-        for rounds, name in enumerate(NAMES):
+        for name, rounds in ROUNDS.items():
             errors[name].append(relative(ours(y, tau, rounds).curve(speed), truth))
         x = theirs(y, tau)
         errors["theirs"].append(relative(np.tanh(np.outer(speed, x[7:10])) @ x[4:7] + x[10] * speed, truth))
@@ -85,7 +65,7 @@ def main() -> None:
     print(HEADER)
     log = recorded("three_sigmoid", 0)
     y, tau = log.q[:, JOINT - 1].copy(), log.tau[:, JOINT - 1].copy()
-    for rounds, name in enumerate(NAMES):
+    for name, rounds in ROUNDS.items():
         print(row(f"20 s, {name}", race(lambda rounds=rounds: ours(y, tau, rounds), lambda: theirs(y, tau), arguments.repeats),
                   median[name], median["theirs"]), flush=True)
 

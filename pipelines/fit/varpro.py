@@ -38,13 +38,16 @@ class Separable:
     build: Callable[[Array], Array]
     lower: Array  # (p,)
     upper: Array
+    slopes: Callable[[Array, Array], Array] | None = None  # of θ and β (k,): (m, p) (∂A/∂θ_i) β; None: by differences
 
     def columns(self, theta: Array) -> Array:
         return np.hstack([self.fixed, self.build(theta)])
 
     def of_rows(self, rows: npt.NDArray[np.intp]) -> Separable:
         """Some of its rows."""
-        return Separable(self.y[rows], self.fixed[rows], lambda theta: self.build(theta)[rows], self.lower, self.upper)
+        slopes = self.slopes
+        some = None if slopes is None else lambda theta, own: slopes(theta, own)[rows]
+        return Separable(self.y[rows], self.fixed[rows], lambda theta: self.build(theta)[rows], self.lower, self.upper, some)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,22 +110,23 @@ def scan(y: Array, fixed: Array, own: Array) -> Array:
     return np.asarray(y @ y - np.square(project).sum(axis=1))
 
 
-def fit_separable(problem: Separable, starts: Iterable[Array], lags: int | None = None) -> SeparableFit:
+def fit_separable(problem: Separable, starts: Iterable[Array], lags: int | None = None, most: int = _MOST) -> SeparableFit:
     """The best of the local optima that `starts` lead to.
 
     Args:
         lags: rows over which noise may remember itself; by default Newey and West's rule.
+        most: steps of each search.
     """
-    found = min((search(problem, start) for start in starts), key=lambda pair: pair[1].rss)
+    found = min((search(problem, start, most) for start in starts), key=lambda pair: pair[1].rss)
     return _with_covariance(problem, *found, lags)
 
 
-def search(problem: Separable, start: Array) -> tuple[Array, Linear]:
-    """Levenberg-Marquardt over θ from one start, within the bounds."""
+def search(problem: Separable, start: Array, most: int = _MOST) -> tuple[Array, Linear]:
+    """Levenberg-Marquardt over θ from one start, within the bounds; `most` steps."""
     theta = np.clip(start, problem.lower, problem.upper)
     now = linear_part(problem.columns(theta), problem.y)
     damping = _DAMPING
-    for _ in range(_MOST if theta.size else 0):
+    for _ in range(most if theta.size else 0):
         slope = _slopes(problem, theta, now)
         slope = now.beside(slope)
         normal, downhill = slope.T @ slope, slope.T @ now.residual
@@ -133,6 +137,8 @@ def search(problem: Separable, start: Array) -> tuple[Array, Linear]:
         gain = 0.0
         while damping < 1e8:
             shift = np.linalg.solve(normal + damping * weight, downhill)
+            if downhill @ shift < _GAIN * now.rss:  # twice what the step would gain were the problem linear
+                return theta, now
             there = np.clip(theta + np.clip(shift, -1.0, 1.0), problem.lower, problem.upper)
             other = linear_part(problem.columns(there), problem.y)
             if other.rss <= now.rss:
@@ -146,8 +152,10 @@ def search(problem: Separable, start: Array) -> tuple[Array, Linear]:
 
 
 def _slopes(problem: Separable, theta: Array, now: Linear) -> Array:
-    """(m, p) (∂A/∂θ_i) β by forward differences, backward ones at an upper bound."""
+    """(m, p) (∂A/∂θ_i) β: as the problem gives them, or by forward differences, backward ones at an upper bound."""
     own = now.beta[problem.fixed.shape[1]:]
+    if problem.slopes is not None:
+        return problem.slopes(theta, own)
     here = now.columns[:, problem.fixed.shape[1]:] @ own
     slopes = np.empty((len(problem.y), len(theta)))
     for i in range(len(theta)):

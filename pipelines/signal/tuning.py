@@ -183,7 +183,7 @@ def tune_smoother(y: Array, sample_time: float, resolution: Array | float, order
         taper = np.sin(np.pi * (np.arange(len(d)) + 0.5) / len(d)) ** 2
         power = np.abs(np.fft.rfft(d * taper)) ** 2 / (taper**2).sum()
         w = 4.0 * np.sin(np.pi * np.fft.rfftfreq(len(d))[1:]) ** 2  # at zero frequency the smoother leaves nothing
-        passed, weight = stationary(order, np.ones(1)).numerator(w) / w**order, power[1:] / w**order
+        passed, weight = _unit(order).numerator(w) / w**order, power[1:] / w**order
         grid = np.geomspace(min((8.0 * 37.0 / len(values)) ** order, 1e-2), 1e4, 30)
         for _ in range(3):
             left = np.multiply.outer(grid**2, passed)
@@ -275,6 +275,12 @@ class _Bank:
         found = y @ self.inside[which]
         found += drive @ self.free[which]
         return np.asarray(found).reshape(len(entry), -1)
+
+
+@lru_cache(maxsize=len(ORDERS))
+def _unit(order: int) -> Stationary:
+    """The filter of tracking index 1: for what depends on the order alone."""
+    return stationary(order, np.ones(1))
 
 
 @lru_cache(maxsize=16)

@@ -153,6 +153,13 @@ class Effect(ABC):
         """One at every joint, or the one of the whole arm."""
         return tuple(cls(joint=k + 1) for k in range(n_joints)) if cls.scope == "joint" else (cls(),)
 
+    def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
+        """Of its torque on its own joint, by the logarithm of each non-linear number, in order: (samples, numbers) [N m].
+
+        None where nobody wrote it down: then it is found by differences.
+        """
+        return None
+
     def at(self, values: Values) -> Self:
         """Itself with the non-linear numbers out of `values`."""
         shape: dict[str, Any] = {q.name: values[q.name] for q in self.parameters if q.shape}
@@ -200,11 +207,11 @@ class Effect(ABC):
         return np.asarray(signal[..., self._index])
 
     def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
-        """`columns`, each (samples,), as (samples, joints, columns): they act on its own joint only."""
-        rows = np.zeros((len(columns[0]), arm.n_joints, len(columns)))
+        """`columns`, each (samples,), as (samples, joints, columns): they act on its own joint only. Samples lie side by side."""
+        rows = np.zeros((arm.n_joints, len(columns), len(columns[0])))
         for k, column in enumerate(columns):
-            rows[:, self._index, k] = column
-        return rows
+            rows[self._index, k] = column
+        return rows.transpose(2, 0, 1)
 
     @property
     def _index(self) -> int:

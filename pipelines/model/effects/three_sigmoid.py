@@ -48,6 +48,16 @@ class ThreeSigmoid(Effect):
         v = self.own(motion.dq)
         return self.on_own_row(arm, np.tanh(self.w1 * v), np.tanh(self.w2 * v), np.tanh(self.w3 * v), v)
 
+    def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array:
+        """∂τ/∂ln w_k = f_k w_k v (1 - tanh²(w_k v))."""
+        reach = np.multiply.outer([self.w1, self.w2, self.w3], self.own(motion.dq))  # (3, samples)
+        bend = np.tanh(reach)
+        np.square(bend, out=bend)
+        np.subtract(1.0, bend, out=bend)
+        bend *= reach
+        bend *= amplitudes[:3, None]
+        return bend.T
+
     def speed_curve(self, values: Values) -> SpeedCurve:
         return SpeedCurve(viscous=values["b"], heights=tuple(values[f"f{k}"] for k in (1, 2, 3)),
                           sharpnesses=tuple(values[f"w{k}"] for k in (1, 2, 3)))

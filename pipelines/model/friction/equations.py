@@ -134,7 +134,17 @@ class LawEquations:
 
     def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable:
         lower, upper = law.bounds
-        return Separable(self.y, self.fixed, lambda theta: self.build(law, arms, theta), lower, upper)
+        slopes = (lambda theta, own: self.slopes(law, theta, own)) if law.pointwise and law.sloped else None
+        return Separable(self.y, self.fixed, lambda theta: self.build(law, arms, theta), lower, upper, slopes)
+
+    def slopes(self, law: Law, theta: Array, amplitudes: Array) -> Array:
+        """Of the law's mean torque in every row by θ: (rows, numbers of θ). Of laws that are `pointwise` and `sloped`."""
+        parts = []
+        for few in self.few:
+            bend = law.slopes(few.nodes, theta, amplitudes)
+            assert bend is not None
+            parts.append(few.means(bend))
+        return np.vstack(parts)
 
     def predicted(self, fit: LawFit) -> Predicted:
         """What `fit`, of these postures or of others, says of these rows; one it does not know takes the nearest's numbers."""

@@ -13,12 +13,19 @@ from pipelines.model.friction.laws import Law, law_named
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.rigid.body import Array
 
-__all__ = ["fit_law", "takes_power"]
+__all__ = ["fit_law", "roughly", "takes_power"]
 
 _SCANNED = 120  # rows that a scan for starts looks at
 _STARTS = 4
 _AT_ONCE = 64  # starts: memory
 _OTHERS = 8
+_ROUGH = 240  # rows of a rough fit
+_GLANCED = 80  # rows that its starts are ranked by
+_SPARSE = 3  # of the starts it looks at every third
+_TRIED = 2  # of those it tries the best two,
+_FIRST = 2  # each for two steps,
+_FURTHER = 5  # and goes on with the better one
+_ROUNDED = 1e-12  # of θ: less is what exp and log make of it
 _CARRIED = 3  # rounds in which a law that depends on the load sees the load of the fit before
 
 
@@ -37,10 +44,20 @@ def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = Non
         found = fit_separable(equations.problem(law, arms), begin)
         if not takes_power(equations, law, arms[0], found):
             found = _other(equations, law, arms, starts, found)
-        if not np.array_equal(named := law.canonical(found.theta), found.theta):
+        if np.abs((named := law.canonical(found.theta)) - found.theta).max(initial=0.0) > _ROUNDED:
             found = fit_separable(equations.problem(law, arms), [named])
         begin, arms = [found.theta], equations.arms(found.beta)
     return LawFit(law, arms[0], equations.postures, found, equations.width)
+
+
+def roughly(equations: Equations, law: Law) -> LawFit:
+    """A fit of few rows and few steps: good enough for a motion to be refined about it, which is then fitted in earnest."""
+    few, arms = equations.thinned(_ROUGH), equations.arms()
+    problem = few.problem(law, arms)
+    starts = list(law.starts(equations.nodes, arms[0]))[::_SPARSE]
+    tried = (search(problem, theta, _FIRST) for theta in _ranked(equations.thinned(_GLANCED), law, arms, starts)[:_TRIED])
+    theta, _ = min(tried, key=lambda end: end[1].rss)
+    return LawFit(law, arms[0], equations.postures, fit_separable(problem, [theta], 0, _FURTHER), equations.width)
 
 
 def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableFit) -> bool:

@@ -115,7 +115,28 @@ class Law:
 
     def columns(self, motion: Motion, arm: ArmModel, theta: Array) -> Array:
         """(samples, amplitudes) on the joint's own row."""
-        return np.hstack([effect.columns(motion, arm)[:, 0] for effect in self.shaped(theta)])
+        parts = [effect.columns(motion, arm)[:, 0] for effect in self.shaped(theta)]
+        return np.hstack(parts) if len(parts) > 1 else parts[0]
+
+    def slopes(self, motion: Motion, theta: Array, amplitudes: Array) -> Array | None:
+        """∂τ/∂θ (samples, numbers of θ) on the joint's own row; None where an effect does not say it."""
+        total, first = np.zeros((len(motion.dq), len(self.places))), 0
+        for k, effect in enumerate(self.shaped(theta)):
+            count = sum(not q.shape for q in effect.parameters)
+            own = [i for i, place in enumerate(self.places) if k in place.effects]
+            if own:
+                part = effect.shape_slopes(motion, amplitudes[first:first + count])
+                if part is None:
+                    return None
+                total[:, own] += part
+            first += count
+        return total
+
+    @cached_property
+    def sloped(self) -> bool:
+        """Whether every effect with non-linear numbers says its slopes."""
+        motion, _ = _trial()
+        return self.slopes(motion, np.mean(self.bounds, axis=0), np.ones(self.amplitudes)) is not None
 
     def starts(self, motion: Motion, arm: ArmModel, sharpness: float | None = None) -> Iterator[Array]:
         """θ over the grids that the effects themselves offer; the shared width near `sharpness` where that is known."""

@@ -61,7 +61,7 @@ class OneJoint:
 
 def gravity_columns(q: Array, revolute: bool) -> Array:
     """(samples, 2) sin q, cos q; of a prismatic joint (samples, 1) ones."""
-    return np.stack([np.sin(q), np.cos(q)], axis=-1) if revolute else np.ones((len(q), 1))
+    return np.stack([np.sin(q), np.cos(q)]).T if revolute else np.ones((len(q), 1))
 
 
 def gravity_names(revolute: bool) -> tuple[str, ...]:

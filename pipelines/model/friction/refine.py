@@ -38,7 +38,7 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float) -> Stretch:
     deviation = (stretch.measured - q)[:, None]
     if not np.isfinite(deviation[~stretch.spoilt]).all():
         return stretch
-    step = float(np.median(np.diff(stretch.t)))
+    step = float(stretch.t[-1] - stretch.t[0]) / (len(stretch.t) - 1)
     # Torque noise, were it white from sample to sample: what the law misses makes it look larger, and is let through, not lost.
     jerk = np.array([max(fit.found.rms, _LEAST * float(np.abs(stretch.torque).max())) * np.sqrt(stretch.window) / fit.inertia])
     found = smooth(deviation, design(step, jerk, _noise(deviation[:, 0], jerk, step, resolution), _ORDER)).states[:, :, 0]
@@ -58,7 +58,10 @@ def reference_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
     nodes = stretch.nodes
     load = gravity_columns(nodes.q[:, 0], stretch.revolute) @ np.array(arm.gravity)
     load = load + fit.law.columns(nodes, arm, fit.theta) @ fit.amplitudes
-    dq = (stretch.impulse - stretch.accumulated(load) - stretch.swayed @ coupling) / arm.inertia
+    momentum = stretch.impulse - stretch.accumulated(load)
+    if stretch.beside:
+        momentum = momentum - stretch.swayed @ coupling
+    dq = momentum / arm.inertia
     step = np.diff(stretch.t)
     q = np.concatenate([[0.0], np.cumsum(0.5 * step * (dq[1:] + dq[:-1]))])
     shift = np.nanmedian(stretch.measured[:50] - q[:50]) if np.isfinite(stretch.measured[:50]).any() else 0.0

@@ -38,6 +38,8 @@ def sway_columns(t: Array, q: Array, dq: Array, sways: Sequence[Sway], revolute:
     Args:
         t, q, dq: (samples,) time, position and speed of the driven joint.
     """
+    if not sways:
+        return np.zeros((len(t), 0))
     rate = 1.0 / np.diff(t)
     middle = 0.5 * (q[1:] + q[:-1])
     turn = [np.sin(middle), np.cos(middle)]
@@ -50,4 +52,4 @@ def sway_columns(t: Array, q: Array, dq: Array, sways: Sequence[Sway], revolute:
         else:
             found.append(np.diff(sway.lean * dq) * rate)
         found += [lean * part for part in turn] if revolute else [lean]
-    return np.vstack([np.stack(found, axis=1), np.zeros((1, len(found)))]) if found else np.zeros((len(t), 0))
+    return np.vstack([np.stack(found, axis=1), np.zeros((1, len(found)))])

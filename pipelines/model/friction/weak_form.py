@@ -135,29 +135,32 @@ class Stretch:
     def ends(self) -> Array:
         """Times between the nodes [s] (nodes + 1,): fine where friction may change its sign, coarse where speed hardly changes."""
         v, t = self.dq, self.t
-        nearest = np.where(v[1:] * v[:-1] <= 0.0, 0.0, np.minimum(np.abs(v[1:]), np.abs(v[:-1])))
-        little = _LITTLE * float(np.abs(v).max())
-        fine = (nearest < _NEAR * np.abs(np.diff(v))) & (np.abs(np.diff(v)) > little)
+        fast, change = np.abs(v), np.abs(np.diff(v))
+        nearest = np.minimum(fast[1:], fast[:-1])
+        nearest[v[1:] * v[:-1] <= 0.0] = 0.0
+        little = _LITTLE * float(fast.max())
+        fine = (nearest < _NEAR * change) & (change > little)
         parts = np.where(fine, _PARTS, 1)
         size = self._group
         if size > 1:
             whole = len(fine) // size * size
-            group = np.abs(np.stack([v[k:whole + k:size] for k in range(size + 1)]))
-            slowest = group.min(axis=0)
-            alone = nearest[:whole].reshape(-1, size).min(axis=1) > 0.0
-            still = group.max(axis=0) < little
-            steady = np.repeat(still | (alone & (slowest > _STEADY * (group.max(axis=0) - slowest))), size)
-            inside = np.arange(whole) % size > 0
-            parts[:whole][steady & inside] = 0  # the node before reaches over it
+            group = np.stack([v[k:whole + k:size] for k in range(size + 1)])
+            low, high = group.min(axis=0), group.max(axis=0)
+            alone = (low > 0.0) | (high < 0.0)  # all of one sign
+            slowest, fastest = np.minimum(np.abs(low), np.abs(high)), np.maximum(np.abs(low), np.abs(high))
+            steady = (fastest < little) | (alone & (slowest > _STEADY * (fastest - slowest)))
+            parts[:whole].reshape(-1, size)[steady, 1:] = 0  # the node before reaches over them
         at = np.repeat(np.arange(len(parts)), parts)
-        first = np.concatenate([[0], np.cumsum(parts)[:-1]])
-        share = (np.arange(len(at)) - first[at]) / parts[at]
-        return np.append(t[at] + share * np.diff(t)[at], t[-1])
+        ends = np.append(t[at], t[-1])
+        inner = np.flatnonzero(fine[at])
+        step = np.arange(len(inner)) % _PARTS / _PARTS
+        ends[inner] += step * (t[at[inner] + 1] - t[at[inner]])
+        return ends
 
     @property
     def _group(self) -> int:
         """Samples that one node may stand for: a divisor of the window."""
-        most = max(1, min(_MOST, int(_COARSEST / float(np.median(np.diff(self.t))) + 1e-9)))
+        most = max(1, min(_MOST, int(_COARSEST * (len(self.t) - 1) / float(self.t[-1] - self.t[0]) + 1e-9)))
         return max(size for size in range(1, most + 1) if self.window % size == 0)
 
     @cached_property
