@@ -32,6 +32,7 @@ _SHORTEST = 4  # samples of a window
 _ENDS = 0.05  # [s] at either end, where no later or earlier sample helps the smoother
 _ORDER = 3
 _FEWEST = 10  # windows
+_FREEDOM = 2.0  # a rough fit draws the motion towards its own errors: twice the noise halves the pull
 
 
 def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, resolution: float, window: float = 0.02,
@@ -60,7 +61,7 @@ def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, 
     fine = Stretch("log", t, q, tau, np.interp(t, coarse.t, coarse.q), np.interp(t, coarse.t, coarse.dq),
                    _spoilt(t, q, tau), held, size, joint.revolute, ())
     for _ in range(rounds):
-        fine = refined(fine, fit, resolution)
+        fine = refined(fine, fit, resolution, _FREEDOM)
         fit = fit_law(LawEquations.of((fine,), joint), law, [fit.theta])
     return fit
 

@@ -26,11 +26,12 @@ _ORDER = 2
 _LEAST = 1e-6  # of the torque: its noise, where a fit leaves none
 
 
-def refined(stretch: Stretch, fit: LawFit, resolution: float) -> Stretch:
+def refined(stretch: Stretch, fit: LawFit, resolution: float, freedom: float = 1.0) -> Stretch:
     """`stretch` with its motion smoothed about the one that `fit` implies; itself where that cannot be done.
 
     Args:
         resolution: step of the encoder [rad].
+        freedom: times the torque noise that the fit shows: above one the motion is held less to what a rough fit implies.
     """
     if fit.inertia <= 0.0:
         return stretch
@@ -40,7 +41,8 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float) -> Stretch:
         return stretch
     step = float(stretch.t[-1] - stretch.t[0]) / (len(stretch.t) - 1)
     # Torque noise, were it white from sample to sample: what the law misses makes it look larger, and is let through, not lost.
-    jerk = np.array([max(fit.found.rms, _LEAST * float(np.abs(stretch.torque).max())) * np.sqrt(stretch.window) / fit.inertia])
+    noise = freedom * max(fit.found.rms, _LEAST * float(np.abs(stretch.torque).max()))
+    jerk = np.array([noise * np.sqrt(stretch.window) / fit.inertia])
     found = smooth(deviation, design(step, jerk, _noise(deviation[:, 0], jerk, step, resolution), _ORDER)).states[:, :, 0]
     return stretch.moved(q + found[0], dq + found[1])
 
