@@ -13,13 +13,12 @@ from pathlib import Path
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.fit.identifiability import hard_to_see
-from pipelines.log.atomic import write_file
 from pipelines.log.canonical import digest_of
 from pipelines.log.derive import derive, recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
-from pipelines.log.model_file import Source, model_text, read_model
+from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.log.results import encode
 from pipelines.log.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
@@ -225,13 +224,9 @@ def _checks(result: Result) -> tuple[Check, ...]:
 
 def write(result: Result, folder: Path, request: Request) -> None:
     """model.json, and every log with the model's torque and the residual."""
-    write_file(folder / "model.json", lambda draft: _text(draft, model_text(result.model)))
+    write_model(folder / "model.json", result.model)
     for name, log in result.derived:
         write_log(folder / f"logs/{name}.{request.format}", log)
-
-
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def report(result: Result) -> Report:

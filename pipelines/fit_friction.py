@@ -15,13 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
-from pipelines.log.atomic import write_file
 from pipelines.log.canonical import digest_of
 from pipelines.log.derive import derive, recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
-from pipelines.log.model_file import Source, model_text
+from pipelines.log.model_file import Source, write_model
 from pipelines.log.results import encode
 from pipelines.log.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
@@ -216,13 +215,9 @@ def _with_friction(pair: Seen, friction: Array, settings: Settings) -> tuple[str
 
 def write(result: Result, folder: Path, request: Request) -> None:
     """model.json, and every log with the torque of friction."""
-    write_file(folder / "model.json", lambda draft: _text(draft, model_text(result.model)))
+    write_model(folder / "model.json", result.model)
     for name, log in result.derived:
         write_log(folder / f"logs/{name}.{request.format}", log)
-
-
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def report(result: Result) -> Report:

@@ -18,13 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NoReturn
 
 from pipelines.errors import InputRejected, did_you_mean
+from pipelines.log.atomic import write_file
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
     from pydantic_core import ErrorDetails
 
 __all__ = ["FORMAT", "FORMAT_VERSION", "ModelFile", "Source", "StoredEffect", "StoredParameter", "StoredValue",
-           "Validity", "model_schema", "model_text", "parse_model", "read_model"]
+           "Validity", "model_schema", "model_text", "parse_model", "read_model", "write_model"]
 
 FORMAT: Final = "rrrid-model"
 FORMAT_VERSION: Final = 1
@@ -227,6 +228,16 @@ def _keys() -> set[str]:
 def model_text(model: ModelFile) -> str:
     """The canonical JSON text: keys sorted, floats by their shortest exact form, null for what is not finite."""
     return json.dumps(_plain(model), sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_model(path: Path, model: ModelFile) -> None:
+    """Write `model` to `path`, whole or not at all."""
+    text = model_text(model)
+    write_file(path, lambda draft: _put(draft, text))
+
+
+def _put(draft: Path, text: str) -> None:
+    draft.write_text(text, encoding="utf-8")
 
 
 def _plain(value: object) -> object:

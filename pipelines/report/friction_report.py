@@ -147,10 +147,11 @@ def _ladder_words(joint: JointResult) -> tuple[str, ...]:
 
 
 def _ladder(joint: JointResult) -> Table:
-    rows, tones = [], []
+    rows = []
+    tones: list[Tone] = []
     for rung in joint.ladder:
         verdict = "chosen" if rung.chosen else rung.reason or ("not worse" if rung.alike else "worse")
         rows.append((_plain(rung.law), rung.size, 1e3 * rung.identify_rms, 1e3 * rung.validate_rms, verdict))
         tones.append("good" if rung.chosen else "neutral")
     return Table(("law", "numbers", "left, fitted [mN m]", "left, held out [mN m]", ""), tuple(rows),
-                 "Root mean square of what is left of mean torques over windows.", tuple(tones))  # type: ignore[arg-type]
+                 "Root mean square of what is left of mean torques over windows.", tuple(tones))
