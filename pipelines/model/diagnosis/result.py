@@ -1,0 +1,247 @@
+"""The result of a diagnosis: everything found, nothing drawn.
+
+Names and nesting are those of `rrrid diagnose --json`. Arrays are per joint where nothing else is said; torque in N m, angles
+in rad (of prismatic joints N and m).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pipelines.log.experiment import Array
+from pipelines.log.results import NOT_STORED
+from pipelines.model.arm import Arm
+
+__all__ = ["BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof", "Rejected",
+           "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TorqueGain", "Trial", "Value", "Verdict"]
+
+Verdict = Literal["cause", "nothing-wrong", "unknown"]
+
+
+@dataclass(frozen=True)
+class Value:
+    """One number of a finding."""
+
+    value: float
+    std: float | None  # None: nobody knows
+    unit: str
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another cause that explains nearly as much of the same."""
+
+    cause: str
+    joint: int | None
+    similarity: float  # cosine of the angle between what the two explain, after the model was refitted beside each
+
+
+@dataclass(frozen=True)
+class TorqueGain:
+    """Root mean square of the torque residual on held-out equations."""
+
+    before: Array  # [N m]
+    after: Array
+    ci95: Array  # (joints, 2) [N m] in which `after` - `before` lies with 95 %: blocks of time drawn again
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """A root mean square over the held-out logs, without and with the finding."""
+
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How much better the model is with a finding than with those before it, on what was held out."""
+
+    validate_torque_rms: TorqueGain
+    simulated_position_rms: BeforeAfter | None  # [rad]; None where nothing could be simulated
+    simulation: Literal["closed-loop", "windowed", "none"]
+    tip_error_rms: BeforeAfter | None  # [m] one number each
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The figure that proves a finding: the residual before and after, beside what the cause predicts.
+
+    Of the joint that shows most of it, over the signal that the cause depends on, in bins of equal count; and a stretch of time.
+    """
+
+    joint: int  # 1-based, whose residual is shown
+    against: str  # "time" | "position" | "speed" | "load" | "travel since reversal" | "speed of joint 2" …
+    unit: str
+    x: Array  # (bins,) middle of each
+    before: Array  # (bins,) [N m] mean residual without the finding
+    after: Array  # with it
+    predicted: Array  # what the finding predicts of `before`
+    spread: Array  # (bins,) [N m] standard error of `before`
+    t: Array  # (samples,) [s] a stretch of time where it shows most
+    before_in_time: Array
+    after_in_time: Array
+    predicted_in_time: Array
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An accepted cause."""
+
+    cause: str
+    joint: int | None
+    title: str
+    parameters: dict[str, Value]
+    explained: float  # share of the residual above the floor that it explains
+    visibility: float  # part of its columns that the refitted model cannot absorb
+    rivals: tuple[Rival, ...]
+    experiment: str | None  # what to record to tell the rivals apart
+    gain: Gain
+    origin: Literal["residual", "base parameters", "frequency responses", "reversals"]
+    torque_rms: float  # [N m] of its torque on its own joint, or of the largest joint
+    of_rated: float  # the same as a share of the rated torque; NaN where the description gives none
+    proof: Proof | None
+
+
+@dataclass(frozen=True)
+class Standing:
+    """An effect that the reference logs show as well, at the same strength."""
+
+    cause: str
+    joint: int | None
+    parameters: dict[str, Value]
+    explained: float
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A hypothesis that came close and was not accepted."""
+
+    cause: str
+    joint: int | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """The smallest amplitude that would have been found on these logs with 95 %."""
+
+    cause: str
+    joint: int | None
+    parameter: str  # whose value it is
+    smallest: Value
+
+
+@dataclass(frozen=True)
+class NotTestable:
+    """A cause of which these logs cannot tell."""
+
+    cause: str
+    joint: int | None
+    reason: str  # "absorbed by p3, p5, p9, p13; needs a reference log"
+    record: str  # what to record instead
+
+
+@dataclass(frozen=True)
+class ResidualRms:
+    """[N m] of the nominal model, before any extension."""
+
+    identify: Array
+    validate: Array
+    floor: Array
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One line of the ledger: a hypothesis with what it would have brought."""
+
+    step: int  # from 1: the search for the first, second … finding
+    cause: str
+    joint: int | None
+    gain: float  # share of the squared weighted residual that it takes away, held out
+    threshold: float  # that it had to exceed
+    visibility: float
+    exact_gain: float  # the same after the exact refit; NaN where it was not refitted
+    accepted: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """What a cause has to exceed before it is believed, and where that comes from."""
+
+    cause: str
+    joint: int | None
+    gain: float  # share of the squared weighted residual
+    origin: str  # "10 replicas of the twin" | "reference logs" | "blocks"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The residual against one signal of its joint, in bins of equal count."""
+
+    joint: int
+    against: str
+    unit: str
+    x: Array  # (bins,)
+    mean: Array  # [N m]
+    spread: Array  # [N m] standard deviation within the bin
+    explained: float  # share of the residual's power that the means hold
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Of one joint's residual: over time's frequency or over the orders of its angle."""
+
+    joint: int
+    over: Literal["frequency", "order"]
+    unit: str  # "Hz" | "1/rev"
+    x: Array  # (bins,)
+    amplitude: Array  # [N m] of each line or bin
+    floor: Array | None  # the same of the twin or the reference logs
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The picture of what is wrong, before any name."""
+
+    log: str  # name of the log that is shown
+    t: Array  # [s] (points,)
+    measured: Array  # [N m] (points, joints) after the low-pass
+    predicted: Array
+    residual: Array
+    simulated_t: Array | None  # [s] (points,)
+    simulated_position_error: Array | None  # [rad] (points, joints) simulated minus measured
+    curves: tuple[Curve, ...]
+    spectra: tuple[Spectrum, ...]
+    above_floor: Array  # (joints,) share of the residual's power that is above the floor
+    band: Array  # (joints, 2) [Hz] in which most of that lies
+    correlation: Array  # (joints, joints) of the residual of one joint with the torque of another
+    torques: Array  # (joints, joints) each measured torque on every joint's modelled torque: near the identity
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What the simulation gets wrong, and why."""
+
+    verdict: Verdict
+    summary: str  # one sentence a technician understands
+    findings: tuple[Finding, ...]  # strongest first
+    standing: tuple[Standing, ...]
+    rejected: tuple[Rejected, ...]
+    detectable: tuple[Detectable, ...]
+    not_testable: tuple[NotTestable, ...]
+    residual_rms: ResidualRms
+    question: Literal["what is wrong", "what has changed"]
+    held_out: Literal["logs", "blocks"]
+    floor_origin: str  # "twin" | "reference logs" | "repetition" | "blocks"
+    reason: str  # why "unknown"; empty otherwise
+    after_rms: ResidualRms  # the same with all findings and standing effects
+    ledger: tuple[Trial, ...]
+    thresholds: tuple[Threshold, ...]
+    evidence: tuple[Evidence, ...]
+    replicas: int  # of the twin; 0 without
+    noise: Array  # [N m] of the drives, as the twin has it; NaN without
+    nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding
+    extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects
