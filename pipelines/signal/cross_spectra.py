@@ -1,0 +1,147 @@
+"""Spectra and cross spectra of signals measured together, averaged over overlapping segments, and the responses they give.
+
+    spectra = cross_spectra((x,), rate, segment)        x (samples, channels); every segment of every channel is transformed once
+    spectra.density[:, 0, 1]                            Φ_01, as scipy.signal.csd(x[:, 0], x[:, 1])
+    spectra.responses(0, (1, 2))                        H₁ from channel 0 to channels 1 and 2, with covariance and coherence
+
+Welch 1967, IEEE Trans. Audio 15, p. 70; Bendat, Piersol 2010, Random Data, ch. 6 and 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.signal.frequency_response import Array, Complex, FrequencyResponse, Responses
+
+__all__ = ["CrossSpectra", "cross_spectra", "welch_responses"]
+
+_CACHE = 1 << 16  # numbers that are worked on at a time, so that they stay near the processor
+_HANN_OVERLAP = 1.0 / 18.0  # twice the squared correlation of neighbouring segments that overlap by half: 2 (1/6)²
+_HANN_BINS = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # neighbouring bins of Hann's window correlate by 2/3 and 1/6; their squares
+_HANN_WIDTH = 1.5  # equivalent noise bandwidth in bins
+
+
+@dataclass(frozen=True, eq=False)
+class CrossSpectra:
+    """One-sided densities of every pair of channels."""
+
+    frequency: Array  # [Hz] (bins,)
+    density: Complex  # Φ_ab = E conj(X_a) X_b [unit_a unit_b / Hz] (bins, channels, channels)
+    segments: int
+
+    @property
+    def averages(self) -> float:
+        """Independent segments that would average as well; those that overlap by half correlate a little."""
+        return self.segments / (1.0 + _HANN_OVERLAP * (self.segments - 1) / self.segments)
+
+    def coherence(self, a: int, b: int) -> Array:
+        """Γ² = |Φ_ab|² / (Φ_aa Φ_bb), eq. (28), (bins,); 0 where a channel is still.
+
+        Raises:
+            InputRejected: T08, one segment alone: it is 1 whatever the signals are.
+        """
+        if self.segments < 2:
+            raise _too_short("one segment alone says nothing of coherence or variance")
+        power = self.density[:, a, a].real * self.density[:, b, b].real
+        found = np.abs(self.density[:, a, b]) ** 2 / np.where(power > 0.0, power, 1.0)
+        return np.where(power > 0.0, np.minimum(found, 1.0), 0.0)
+
+    def responses(self, source: int, outputs: Sequence[int]) -> Responses:
+        """H₁ = Φ_xz / Φ_xx from channel `source` to each of `outputs`, at every frequency above 0.
+
+        The covariance is that of the noise of the outputs, Φ_zz - Φ_zx Φ_xz / Φ_xx, which takes one degree of freedom, over
+        averages and power of the source. Leakage is not in it: the same at every segment, it hides in the response.
+
+        Raises:
+            InputRejected: T08, fewer than two segments; D09, a source without power at some frequency.
+        """
+        z = list(outputs)
+        coherence = np.stack([self.coherence(source, k) for k in z], axis=1)[1:]
+        power, cross = self.density[1:, source, source].real, self.density[1:, source, z]
+        if not (power > 0.0).all():
+            raise InputRejected("D09", f"the excitation has no power at {self.frequency[1:][power <= 0.0][0]:.4g} Hz",
+                                remedy="excite every frequency that is asked for")
+        response = cross / power[:, None]
+        own = np.swapaxes(self.density[1:][:, z][:, :, z], 1, 2)  # E Z Zᴴ
+        noise = own - response[:, :, None] * np.conj(response)[:, None, :] * power[:, None, None]
+        n = self.averages
+        return Responses(self.frequency[1:], response, noise / ((n - 1.0) * power)[:, None, None], coherence, "welch",
+                         _HANN_WIDTH * float(self.frequency[1]), n, _HANN_BINS)
+
+    def second_estimate(self, source: int, output: int) -> FrequencyResponse:
+        """H₂ = Φ_zz / Φ_zx: unbiased where the noise is in the source instead. Variance as that of H₁, over the coherence."""
+        first = self.responses(source, (output,)).of(0)
+        coherence = np.where(first.coherence > 0.0, first.coherence, np.nan)
+        return FrequencyResponse(first.frequency, first.response / coherence, first.variance / coherence**2, first.coherence,
+                                 "welch", first.resolution, first.averages, first.correlated)
+
+
+def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> CrossSpectra:
+    """Averaged over half overlapping segments of `segment` samples under Hann's window, the mean of each taken off.
+
+    Args:
+        stretches: of one experiment or several, each (samples, channels); what is shorter than a segment is left out.
+        rate: samples a second [Hz]; the bins lie rate/segment apart.
+
+    Raises:
+        InputRejected: T08, no stretch holds a segment; D01, missing samples.
+    """
+    channels = _checked(stretches, segment)
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(segment) / segment)
+    total = np.zeros((channels, channels, segment // 2 + 1), dtype=np.complex128)
+    segments = 0
+    for stretch in stretches:
+        if len(stretch) < segment:
+            continue
+        rows = np.ascontiguousarray(np.asarray(stretch, dtype=np.float64).T)
+        pieces = np.lib.stride_tricks.sliding_window_view(rows, segment, axis=1)[:, ::segment - segment // 2]
+        at_once = max(1, _CACHE // (channels * segment))
+        for first in range(0, pieces.shape[1], at_once):
+            _add(total, pieces[:, first:first + at_once], window)
+        segments += pieces.shape[1]
+    total *= 2.0 / (segments * rate * (window**2).sum())
+    total[..., 0] *= 0.5
+    if segment % 2 == 0:
+        total[..., -1] *= 0.5
+    frequency = np.asarray(np.fft.rfftfreq(segment, 1.0 / rate), dtype=np.float64)
+    return CrossSpectra(frequency, np.moveaxis(total, -1, 0), segments)
+
+
+def _add(total: Complex, pieces: Array, window: Array) -> None:
+    """Add conj(X_a) X_b of every segment of `pieces` (channels, segments, samples)."""
+    x = np.fft.rfft((pieces - pieces.mean(axis=-1, keepdims=True)) * window, axis=-1)
+    real, imaginary = x.real, x.imag
+    for a in range(len(x)):
+        own = np.einsum("sf,sf->f", real[a], real[a]) + np.einsum("sf,sf->f", imaginary[a], imaginary[a])
+        total[a, a] += own
+        for b in range(a + 1, len(x)):
+            cross = np.einsum("sf,sf->f", np.conj(x[a]), x[b])
+            total[a, b] += cross
+            total[b, a] += np.conj(cross)
+
+
+def welch_responses(stretches: Sequence[Array], rate: float, segment: int, source: int = 0,
+                    outputs: Sequence[int] = (1, 2)) -> Responses:
+    """From channel `source` to `outputs`, see `cross_spectra` and `CrossSpectra.responses`."""
+    return cross_spectra(stretches, rate, segment).responses(source, outputs)
+
+
+def _checked(stretches: Sequence[Array], segment: int) -> int:
+    """How many channels every stretch has."""
+    if segment < 4:
+        raise UsageError("C02", f"segments of {segment} samples", remedy="give at least four")
+    longest = max((len(x) for x in stretches), default=0)
+    if longest < segment:
+        raise _too_short(f"the longest stretch has {longest} samples, one segment {segment}")
+    if not all(np.isfinite(x).all() for x in stretches):
+        raise InputRejected("D01", "missing samples in a signal whose spectrum is asked for", remedy="cut the log at its gaps")
+    (channels,) = {x.shape[1] for x in stretches}
+    return channels
+
+
+def _too_short(why: str) -> InputRejected:
+    return InputRejected("T08", why, remedy="record longer, or ask for a coarser resolution")

@@ -1,0 +1,133 @@
+"""A frequency response with its variance and coherence, and the three ways to one from signals inside a loop.
+
+    an excitation v enters a loop; an input r and an output q of the plant are measured
+
+    several = welch_responses(stretches, rate, ...)          v → (r, q), by averaged segments    cross_spectra.py
+    several = local_polynomial(stretches, rate, ...)         v → (r, q), leakage taken out       local_polynomial.py
+    several = multisine_responses(realisations, ...).noise   v → (r, q), periodic v              multisine_response.py
+    plant   = closed_loop(several, output=1, input=0)        P = G_vq / G_vr = Φ_vq / Φ_vr, without the controller
+    plant   = indirect(several.of(0), controller)            P = (1 - S) / (C S), S = G_vr, eq. (29)
+    plant   = welch_responses of r → q, `.of(0)`             direct: biased where a disturbance goes round the loop
+
+Equations (28), (29): Kostić et al. 2004. Variances: Pintelon, Schoukens 2012, System Identification, ch. 2 and 7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import UsageError
+
+__all__ = ["Array", "Complex", "FrequencyResponse", "Responses", "bands_below", "closed_loop", "indirect"]
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """One response, input → output."""
+
+    frequency: Array  # [Hz] (bins,)
+    response: Complex  # [unit of output / unit of input] (bins,)
+    variance: Array  # E|Ĝ - G|², real and imaginary part together (bins,)
+    coherence: Array  # 0 … 1 (bins,); for a quotient the lower of its two
+    method: str  # "welch", "local polynomial", "multisine"
+    resolution: float  # [Hz] width of what one estimate looks at
+    averages: float  # independent averages in one estimate
+    correlated: float  # neighbouring bins that together carry one independent estimate, at least 1
+
+    def within(self, low: float, high: float) -> FrequencyResponse:
+        """The bins with low ≤ frequency ≤ high [Hz]."""
+        return self.where((self.frequency >= low) & (self.frequency <= high))
+
+    def where(self, kept: npt.NDArray[np.bool_]) -> FrequencyResponse:
+        """The bins that are `kept` (bins,)."""
+        return FrequencyResponse(self.frequency[kept], self.response[kept], self.variance[kept], self.coherence[kept], self.method,
+                                 self.resolution, self.averages, self.correlated)
+
+    def times(self, factor: Complex) -> FrequencyResponse:
+        """Response times a `factor` (bins,) that is exactly known, as (jω)² of a second derivative or 1/(jω)."""
+        return FrequencyResponse(self.frequency, self.response * factor, self.variance * np.abs(factor) ** 2, self.coherence,
+                                 self.method, self.resolution, self.averages, self.correlated)
+
+    def magnitude_band(self, confidence: float = 0.95) -> tuple[Array, Array]:
+        """Lowest and highest magnitude (bins,) in the disc that holds the true response with this probability.
+
+        |Ĝ - G|² / variance is exponentially distributed: the radius is √(-ln(1 - confidence) variance). ibid., eq. (2-40).
+        """
+        radius = self._radius(confidence)
+        return np.maximum(np.abs(self.response) - radius, 0.0), np.abs(self.response) + radius
+
+    def phase_radius(self, confidence: float = 0.95) -> Array:
+        """Half the angle [rad] (bins,) under which that disc is seen from the origin; π where it holds the origin."""
+        size = np.abs(self.response)
+        share = self._radius(confidence) / np.where(size > 0.0, size, 1.0)
+        return np.where((share < 1.0) & (size > 0.0), np.arcsin(np.minimum(share, 1.0)), np.pi)
+
+    def _radius(self, confidence: float) -> Array:
+        if not 0.0 < confidence < 1.0:
+            raise UsageError("C02", f"a confidence of {confidence:g}", remedy="give one between 0 and 1")
+        return np.asarray(np.sqrt(-np.log1p(-confidence) * self.variance))
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """From one excitation to several outputs measured together, whose errors are correlated."""
+
+    frequency: Array  # [Hz] (bins,)
+    response: Complex  # (bins, outputs)
+    covariance: Complex  # E (Ĝ - G)(Ĝ - G)ᴴ (bins, outputs, outputs)
+    coherence: Array  # of the excitation with each output (bins, outputs)
+    method: str
+    resolution: float  # [Hz]
+    averages: float
+    correlated: float
+
+    def of(self, output: int) -> FrequencyResponse:
+        """That to one output."""
+        return FrequencyResponse(self.frequency, self.response[:, output], self.covariance[:, output, output].real,
+                                 self.coherence[:, output], self.method, self.resolution, self.averages, self.correlated)
+
+
+def closed_loop(responses: Responses, output: int = 1, input: int = 0) -> FrequencyResponse:
+    """P = G_v,output / G_v,input (bins,): no knowledge of the controller, no bias by what else drives the loop.
+
+    P̂ - P ≈ (δ_out - P δ_in) / G_in; ibid., eq. (2-73). Where G_in is zero the response is NaN and its coherence 0.
+    """
+    g_out, g_in = responses.response[:, output], responses.response[:, input]
+    there = g_in != 0.0
+    safe = np.where(there, g_in, 1.0)
+    plant = np.where(there, g_out / safe, np.nan)
+    c = responses.covariance
+    spread = c[:, output, output].real + np.abs(plant) ** 2 * c[:, input, input].real \
+        - 2.0 * (np.conj(plant) * c[:, output, input]).real
+    lower = np.minimum(responses.coherence[:, output], responses.coherence[:, input])
+    return FrequencyResponse(responses.frequency, plant, np.maximum(spread, 0.0) / np.abs(safe) ** 2,
+                             np.where(there, lower, 0.0), responses.method, responses.resolution, responses.averages,
+                             responses.correlated)
+
+
+def indirect(sensitivity: FrequencyResponse, controller: Complex) -> FrequencyResponse:
+    """P = (1 - S) / (C S), eq. (29), with the controller's own response C (bins,) at the same frequencies.
+
+    C is that of the sampled controller: with the continuous one the error is 8.8 % at 28 Hz, 25 % at 80 Hz (1 kHz, kp = 400,
+    kd = 28). |∂P/∂S| = 1 / |C S²|.
+    """
+    s = sensitivity.response
+    there = (s != 0.0) & (controller != 0.0)
+    safe = np.where(there, controller * s, 1.0)
+    plant = np.where(there, (1.0 - s) / safe, np.nan)
+    variance = sensitivity.variance / np.abs(safe * np.where(there, s, 1.0)) ** 2
+    return FrequencyResponse(sensitivity.frequency, plant, variance, np.where(there, sensitivity.coherence, 0.0),
+                             sensitivity.method, sensitivity.resolution, sensitivity.averages, sensitivity.correlated)
+
+
+def bands_below(frequency: Array, coherence: Array, limit: float = 0.7) -> tuple[tuple[float, float], ...]:
+    """Stretches [Hz] of neighbouring bins where the coherence is under the limit, or unknown: (from, to) of each."""
+    low = np.concatenate([[False], ~(coherence >= limit), [False]])
+    edges = np.flatnonzero(low[1:] != low[:-1])
+    return tuple((float(frequency[a]), float(frequency[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True))
