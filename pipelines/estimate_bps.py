@@ -163,7 +163,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
-        model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),
+        arm=arm, model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),
                            notes=(f"fitted by rrrid estimate-bps, motion by {settings.method}",)),
         derived=tuple(_derived(log, motion, parts, settings) for log, motion, parts in torques))
 
@@ -235,4 +235,5 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("estimate-bps", "Estimate the base parameter set", Settings, compute, report, read, write,
-              lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks)
+              lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks,
+              lambda result, inputs: replace(inputs, material=result.arm))

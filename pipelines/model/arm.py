@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,7 @@ from pipelines.log.model_file import ModelFile, Source, StoredEffect, StoredPara
 from pipelines.log.robot import RobotDescription, format_robot, parse_robot
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import ArmModel, Effect
-from pipelines.model.parameter import Origin, Parameter
+from pipelines.model.parameter import Origin, Parameter, Uncertainty
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
 
@@ -75,6 +75,8 @@ class Arm:
     base: tuple[Parameter, ...]  # in the order of body.parameters
     friction: tuple[Acting, ...] = ()
     effects: tuple[Acting, ...] = ()  # in the order they were accepted: each acts around those before it
+    # of a fit, by the names of `parameters`; no model file holds it
+    uncertainty: Uncertainty | None = field(default=None, compare=False, repr=False)
 
     @property
     def robot(self) -> RobotDescription:
@@ -104,7 +106,7 @@ class Arm:
         """The same arm with another rigid body; its base parameters then are assumed."""
         base = tuple(Parameter(known.name, float(value), None, known.unit, origin="assumed")
                      for known, value in zip(body.parameters, p, strict=True))
-        return replace(self, body=body, base=base)
+        return replace(self, body=body, base=base, uncertainty=None)
 
     def extended(self, *more: Acting) -> Arm:
         return replace(self, effects=(*self.effects, *more))

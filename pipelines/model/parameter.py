@@ -6,7 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Origin", "Parameter"]
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Origin", "Parameter", "Uncertainty"]
 
 Origin = Literal["fitted", "known", "assumed"]
 
@@ -38,3 +41,11 @@ class Parameter:
             return f"{self.value:.6g}{unit}"
         digits = max(0, 1 - math.floor(math.log10(self.std)))
         return f"{self.value:.{digits}f} ± {self.std:.{digits}f}{unit}"
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """How the errors of several numbers go together: what one has too much, another has too little."""
+
+    names: tuple[str, ...]
+    covariance: npt.NDArray[np.float64]  # (k, k); not finite where a number is not determined

@@ -13,7 +13,7 @@ from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.regression import Columns
-from pipelines.model.parameter import Parameter
+from pipelines.model.parameter import Parameter, Uncertainty
 from pipelines.model.rigid.body import Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
 
@@ -98,5 +98,6 @@ def fitted_arm(found: Estimate, name: str, friction: Sequence[Acting] = ()) -> A
         known_std = {q.name: s for q, s in zip(amplitudes, std[part], strict=True) if s is not None}
         acting = Acting.of(law, law.values(beta[part]), known_std, revolute=law.joint is None or turning[law.joint - 1])
         (laws if law.friction else effects).append(acting)
-    return Arm(name, body, tuple(base), tuple(laws), tuple(effects))
+    together = Uncertainty(tuple(column.name for column in columns.names), found.robust.covariance)
+    return Arm(name, body, tuple(base), tuple(laws), tuple(effects), together)
 

@@ -8,6 +8,7 @@ from pipelines.errors import Check
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
+from pipelines.model.arm import Arm
 from pipelines.model.estimation.balance import Balance
 from pipelines.model.estimation.checks import Consistent
 from pipelines.model.estimation.compare import Compared
@@ -47,5 +48,6 @@ class Result:
     convergence_std: Array
     courses: tuple[Course, ...]
     doctor: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False, kw_only=True)  # of the logs, but "ok"
+    arm: Arm = field(metadata=NOT_STORED, repr=False)  # the model with the covariance of its numbers
     model: ModelFile = field(metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)
