@@ -139,8 +139,10 @@ def _checked(stretches: Sequence[Array], segment: int) -> int:
         raise _too_short(f"the longest stretch has {longest} samples, one segment {segment}")
     if not all(np.isfinite(x).all() for x in stretches):
         raise InputRejected("D01", "missing samples in a signal whose spectrum is asked for", remedy="cut the log at its gaps")
-    (channels,) = {x.shape[1] for x in stretches}
-    return channels
+    counts = {int(x.shape[1]) for x in stretches}
+    if len(counts) != 1:
+        raise UsageError("C02", f"stretches of {sorted(counts)} channels", remedy="give all the same channels")
+    return counts.pop()
 
 
 def _too_short(why: str) -> InputRejected:
