@@ -1,0 +1,181 @@
+"""What is hidden in each case of the campaign, before anything is recorded: plain data, the same for the same seed.
+
+    campaign(seed)                     every family, shuffled, so that any part of it is a fair sample
+    campaign(seed, ("single",))        one family
+
+A case is known by `SealedCase.key`, a digest of all that is in it: no name of a folder tells a cause.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from pipelines.bench.faults import fault_names, find_fault
+
+__all__ = ["COMPLIANT", "EASY", "FAMILIES", "OUTSIDE", "STRENGTHS", "Hidden", "SealedCase", "campaign"]
+
+STRENGTHS = (1.0, 0.3, 0.1)  # times the figures of causes.md
+MACHINES = 6
+JOINTS = (1, 2, 3)
+COMPLIANT = ("joint_elasticity", "base_resonance", "backlash", "torque_saturation")  # a row of their own in the table
+OUTSIDE = tuple(name for name in fault_names() if not find_fault(name).known)
+EASY = tuple(name for name in fault_names() if find_fault(name).known and name not in (*COMPLIANT, "payload"))
+_ABSORBED = {"rotor_inertia": (1, 2)}  # joints of the RRR arm at which a base parameter takes it in (causes.md)
+_SESSIONS = ("mixed", "periodic", "friction", "long")
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One cause in one place."""
+
+    cause: str  # name of a fault of the bench
+    joint: int | None  # 1-based; None: of the whole arm
+    strength: float  # times the figure of causes.md
+    seed: int  # of its phases and directions
+
+
+@dataclass(frozen=True)
+class SealedCase:
+    """One session with one robot, and what ails it."""
+
+    family: str
+    hidden: tuple[Hidden, ...]  # what the logs show and the reference logs, if any, do not
+    machine: int  # seed of the machine
+    seed: int  # of motions, noise and gains
+    session: str = "mixed"  # which experiments: see sessions.py
+    standing: tuple[Hidden, ...] = ()  # what the reference logs show as well
+    reference: bool = False  # with logs from when all but `standing` was in order
+    frf: bool = False  # with frequency responses and reversals of every joint
+    amplifier: float = 1.0  # times the amplifier's noise
+    held: bool = True  # the log says that torque was held over each sample, as it was
+    once: bool = False  # what is hidden happens in one of the logs only
+
+    @property
+    def key(self) -> str:
+        """Ten hexadecimal digits."""
+        return hashlib.blake2b(repr(asdict(self)).encode(), digest_size=5).hexdigest()
+
+
+def campaign(seed: int = 0, families: Iterable[str] = (), short: bool = False) -> tuple[SealedCase, ...]:
+    """All cases of these families (none: all), shuffled.
+
+    Args:
+        short: three logs of six seconds in each, instead of 52 s.
+
+    Raises:
+        KeyError: there is no such family.
+    """
+    cases = [case for name in families or FAMILIES for case in FAMILIES[name](seed)]
+    order = np.random.default_rng([90, seed]).permutation(len(cases))
+    shuffled = tuple(cases[place] for place in order)
+    return tuple(replace(case, session="short") for case in shuffled) if short else shuffled
+
+
+def single(seed: int) -> Iterator[SealedCase]:
+    """Every cause that torque and position tell, at every joint and strength."""
+    for place, (strength, (cause, joint)) in enumerate(product(STRENGTHS, _places(EASY))):
+        yield _case("single", seed, place, [(cause, joint, strength)], reference=place % 4 == 3)
+
+
+def compliance(seed: int) -> Iterator[SealedCase]:
+    """The four that torque and position alone do not tell apart."""
+    for place, (strength, (cause, joint)) in enumerate(product(STRENGTHS, _places(COMPLIANT))):
+        yield _case("compliance", seed, place, [(cause, joint, strength)], frf=True)
+
+
+def healthy(seed: int, count: int = 100) -> Iterator[SealedCase]:
+    """Nothing but the nuisances that every machine has."""
+    for place in range(count):
+        yield _case("healthy", seed, place, [], reference=place % 4 == 3)
+
+
+def outside(seed: int) -> Iterator[SealedCase]:
+    """Causes that no candidate describes, at full strength and at half of it."""
+    for place, (strength, name, turn) in enumerate(product((1.0, 0.5), OUTSIDE, range(2))):
+        joint = None if find_fault(name).scope == "arm" else JOINTS[(place + turn) % 3]
+        yield _case("outside", seed, place, [(name, joint, strength)])
+
+
+def invisible(seed: int) -> Iterator[SealedCase]:
+    """What base parameters absorb within one session: a payload, a rotor, one scale of all torques."""
+    for place, strength in enumerate((*STRENGTHS, *STRENGTHS)):
+        yield _case("invisible", seed, 4 * place, [("payload", None, strength)])
+        for joint in _ABSORBED["rotor_inertia"]:
+            yield _case("invisible", seed, 4 * place + joint, [("rotor_inertia", joint, strength)])
+        yield _case("invisible", seed, 4 * place + 3, [("torque_gain", joint, strength) for joint in JOINTS])
+
+
+def payload(seed: int) -> Iterator[SealedCase]:
+    """A payload since the reference logs."""
+    for place, strength in enumerate(STRENGTHS * 4):
+        yield _case("payload", seed, place, [("payload", None, strength)], reference=True)
+
+
+def pairs(seed: int, count: int = 60) -> Iterator[SealedCase]:
+    """Two causes, at full and 0.3 strength."""
+    rng = np.random.default_rng([91, seed])
+    places = _places(EASY)
+    for place in range(count):
+        first, second = rng.choice(len(places), 2, replace=False)
+        while places[first][0] == places[second][0]:
+            second = rng.integers(len(places))
+        strengths = rng.choice(STRENGTHS[:2], 2)
+        hidden = [(*places[which], float(strength)) for which, strength in zip((first, second), strengths, strict=True)]
+        yield _case("pairs", seed, place, hidden)
+
+
+def noise(seed: int) -> Iterator[SealedCase]:
+    """Every cause at one joint, at full and 0.3 strength, with ten times the amplifier's noise."""
+    for place, (strength, cause) in enumerate(product(STRENGTHS[:2], EASY)):
+        joints = [joint for name, joint in _places(EASY) if name == cause]
+        yield _case("noise", seed, place, [(cause, joints[place % len(joints)], strength)], amplifier=10.0)
+
+
+def standing(seed: int) -> Iterator[SealedCase]:
+    """A cause that was there from the first day, with reference logs: nothing has changed."""
+    for place, cause in enumerate(EASY):
+        joints = [joint for name, joint in _places(EASY) if name == cause]
+        there = (Hidden(cause, joints[place % len(joints)], STRENGTHS[place % 2], 1000 * seed + place),)
+        yield replace(_case("standing", seed, place, [], reference=True), standing=there)
+
+
+def zero(seed: int) -> Iterator[SealedCase]:
+    """Causes of no strength."""
+    for place, cause in enumerate(EASY[::2]):
+        joints = [joint for name, joint in _places(EASY) if name == cause]
+        yield _case("zero", seed, place, [(cause, joints[place % len(joints)], 1e-6)])
+
+
+def uncentred(seed: int, count: int = 12) -> Iterator[SealedCase]:
+    """Healthy arms whose logs claim that torque was sampled: it then is not centred, and shows as a delay."""
+    for place in range(count):
+        yield replace(_case("uncentred", seed, place, []), held=False)
+
+
+FAMILIES: dict[str, Callable[[int], Iterable[SealedCase]]] = {
+    each.__name__: each for each in (single, compliance, healthy, outside, invisible, payload, pairs, noise, standing, zero,
+                                     uncentred)}
+
+
+def _places(causes: Iterable[str]) -> list[tuple[str, int | None]]:
+    """Each cause at each joint where it can be seen; three times where it belongs to the whole arm."""
+    found: list[tuple[str, int | None]] = []
+    for cause in causes:
+        whole = find_fault(cause).scope == "arm"
+        seen = [joint for joint in JOINTS if joint not in _ABSORBED.get(cause, ())]
+        found += [(cause, None if whole else seen[turn % len(seen)]) for turn in range(len(JOINTS))]
+    return found
+
+
+def _case(family: str, seed: int, place: int, hidden: Iterable[tuple[str, int | None, float]], **others: object) -> SealedCase:
+    rng = np.random.default_rng([92, seed, place, *family.encode()])
+    causes = tuple(Hidden(cause, joint, strength, 1000 * seed + place) for cause, joint, strength in hidden)
+    once = place % 2 == 0 and "contact" in [one.cause for one in causes]
+    case = SealedCase(family, causes, 100 * seed + (place + place // MACHINES) % MACHINES, 1000 * seed + place,
+                      _SESSIONS[int(rng.integers(len(_SESSIONS)))], once=once)
+    return replace(case, **others)  # type: ignore[arg-type]

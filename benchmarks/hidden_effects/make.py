@@ -1,0 +1,90 @@
+"""Record cases: their logs in one folder, their answers in another. What is there already is not made again.
+
+    OUT/logs/<key>/<log>.h5       a folder of logs of one robot
+    OUT/answers/<key>.json        what is hidden in them; no log names it
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.hidden_effects.cases import SealedCase
+from benchmarks.hidden_effects.sessions import Session, record_case
+from pipelines.bench.session import answer
+from pipelines.log.atomic import write_file
+from pipelines.log.files import write_log
+
+__all__ = ["Sealed", "answers_in", "make_case", "make_cases"]
+
+_VERDICTS = {"healthy": "nothing-wrong", "standing": "nothing-wrong", "zero": "nothing-wrong", "outside": "unknown",
+             "invisible": "not-testable", "uncentred": "flagged"}
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """The answer of one case."""
+
+    key: str
+    family: str
+    verdict: str  # what a diagnosis should say: "cause", "nothing-wrong", "unknown"; "not-testable", "flagged" (anything)
+    findings: tuple[dict[str, Any], ...]  # cause, joint, parameters of each true cause; of "not-testable" what it must name
+    standing: tuple[dict[str, Any], ...]
+    case: dict[str, Any]  # the SealedCase, whose strength, session and so on the table is split by
+
+    @property
+    def strength(self) -> float | None:
+        """Of the only cause, or the weakest of several."""
+        return min((float(one["strength"]) for one in self.case["hidden"]), default=None)
+
+
+def make_cases(cases: Iterable[SealedCase], out: Path) -> Iterator[tuple[SealedCase, float]]:
+    """Record each case into `out`; yields it with the CPU seconds it took, nothing for one that was there."""
+    for case in cases:
+        begun = time.process_time()
+        if make_case(case, out):
+            yield case, time.process_time() - begun
+
+
+def make_case(case: SealedCase, out: Path) -> bool:
+    """Record one case, unless it is there; True where it was recorded."""
+    folder, sheet = out / "logs" / case.key, out / "answers" / f"{case.key}.json"
+    if folder.is_dir() and sheet.is_file():
+        return False
+    session = record_case(case)
+    draft = out / "draft" / case.key
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir(parents=True)
+    for log in session.logs:
+        write_log(draft / f"{log.name}.h5", log)
+    for place in (folder.parent, sheet.parent):
+        place.mkdir(parents=True, exist_ok=True)
+    sealed = _sealed(case, session)
+    write_file(sheet, lambda path: _write(path, json.dumps(asdict(sealed), indent=1) + "\n"))
+    shutil.rmtree(folder, ignore_errors=True)
+    draft.rename(folder)
+    return True
+
+
+def _sealed(case: SealedCase, session: Session) -> Sealed:
+    verdict = _VERDICTS.get(case.family, "cause")
+    findings = answer(session.hidden) if verdict != "nothing-wrong" else []
+    return Sealed(case.key, case.family, verdict, tuple(findings), tuple(answer(session.standing)), asdict(case))
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def answers_in(out: Path) -> list[Sealed]:
+    """Every answer in `out`, by key."""
+    found = []
+    for sheet in sorted((out / "answers").glob("*.json")):
+        values = json.loads(sheet.read_text(encoding="utf-8"))
+        found.append(Sealed(**values | {name: tuple(values[name]) for name in ("findings", "standing")}))
+    return found
