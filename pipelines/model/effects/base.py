@@ -14,7 +14,21 @@ its fields. The *linear* numbers, its amplitudes, stay outside, for they are wha
     torque = columns(motion, arm) @ amplitudes      to first order; exactly for most
 
 Torque is a load: measured torque = torque of the model + torques of the effects. Everything is computed from the motion
-and the *predicted* torque, never from measured torque, whose noise would bias it.
+and the *predicted* torque, never from measured torque, whose noise would bias it. One exception: what a drive kept back above
+its limit only the commanded torque tells, which travels with the motion as `Motion.tau`.
+
+What a search over effects asks, so that it need not know any of them:
+
+    shapes, promising    a grid of non-linear numbers; the few of them that a residual speaks for, where the grid is large
+    full                 the form a finding is refitted with: more harmonics, a cubic term. `shapes` are the screening form
+    free                 the non-linear numbers that an exact refit may move; the others are discrete, or follow from these
+    fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
+    possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
+    per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
+    reported             the parameters as causes.md names them
+
+The columns of an effect need not be independent of each other, nor all seen, on every arm: solve with a rank threshold. Each
+motion handed in is one log from its first sample (time in a log counts from motion.t[0]), complete but for gaps.
 """
 
 from __future__ import annotations
@@ -55,6 +69,10 @@ class ArmModel(Protocol):
         """Predicted torque (samples, joints) [N m]."""
         ...
 
+    def friction_torque(self, motion: Motion) -> Array:
+        """The part of it (samples, joints) [N m] that the friction laws make."""
+        ...
+
     def with_body(self, body: RigidBody, p: Array) -> ArmModel:
         """The same arm with another rigid body: new geometry, gravity or load."""
         ...
@@ -73,6 +91,8 @@ class Quantity:
     high: float
     meaning: str
     shape: bool = False  # non-linear: a field of the effect, scanned by `shapes`; otherwise an amplitude
+    discrete: bool = False  # a shape that is a whole number, such as another joint: chosen, never moved a little
+    derived: bool = False  # follows from the other parameters
 
     def unit_at(self, revolute: bool) -> str:
         """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m."""
@@ -102,7 +122,8 @@ class Hooks:
     replica keeps, zero or `start` at the start; `rate` moves them in continuous time, `update` once per control sample
     (a delay line): after `sensor` was asked, before the command acts. A command is the torque as it reaches this effect:
     of several the last one meets it first. The motion handed in is the true one with ddq
-    zero: what multiplies acceleration goes to `inertia` or `arm`.
+    zero: what multiplies acceleration goes to `inertia` or `arm`. Where a sensor is in error, `settled` says where the arm
+truly is at rest when it reads its first position, so that the run does not begin with a jump.
     """
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
@@ -111,9 +132,11 @@ class Hooks:
     inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)
     arm: ArmModel | None = None  # the arm as it truly is
     states: int = 0
+    settled: Callable[[Motion, Array], Array] | None = None  # motion as measured at the first sample and its torque -> true q
     start: Callable[[Motion, Array], Array] | None = None  # motion and torque at the first sample -> states
     rate: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> d(states)/dt
     update: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> next states
+    record: Callable[[Array, Array], Array] | None = None  # t (samples,), command (samples, joints) -> torque as the log has it
 
 
 @dataclass(frozen=True)
@@ -133,6 +156,8 @@ class Effect(ABC):
     twins: ClassVar[tuple[str, ...]] = ()  # effects it can be mistaken for
     absorbed_by: ClassVar[tuple[str, ...]] = ()  # base parameters that hide it
     needs: ClassVar[tuple[str, ...]] = ()  # what beyond position and torque it takes to see it: "reference log"
+    fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
+    per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
 
     def __post_init__(self) -> None:
@@ -147,6 +172,27 @@ class Effect(ABC):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Itself with every combination of non-linear numbers worth trying on this motion."""
         yield self
+
+    def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
+        """Those of its shapes that may explain `residual` (samples, joints) [N m] over `motion`, at most a few tens."""
+        yield from self.shapes(motion, arm)
+
+    def full(self) -> Self:
+        """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
+        return self
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the non-linear numbers that may be moved continuously."""
+        return tuple(q.name for q in self.parameters if q.shape and not q.discrete and not q.derived)
+
+    def possible(self, values: Values) -> bool:
+        """Whether every parameter lies in its range."""
+        return all(q.low <= values[q.name] <= q.high for q in self.parameters)
+
+    def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
+        """The parameters of a finding, named as in causes.md; whole numbers are integers."""
+        return {q.name: int(values[q.name]) if q.discrete else values[q.name] for q in self.parameters}
 
     @classmethod
     def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
@@ -202,6 +248,10 @@ class Effect(ABC):
         """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
         return None
 
+    def predicted(self, motion: Motion, arm: ArmModel) -> Array:
+        """`arm.torque(motion)`, kept from one effect and shape to the next; not to be written to."""
+        return _predicted(arm, motion)
+
     def own(self, signal: Array) -> Array:
         """Column of its own joint, (samples,)."""
         return np.asarray(signal[..., self._index])
@@ -218,3 +268,19 @@ class Effect(ABC):
         if self.joint is None:
             raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
         return self.joint - 1
+
+
+_KEPT: list[tuple[ArmModel, Motion, Array]] = []  # the last few, newest first; compared by identity, for a motion is its arrays
+_KEEP = 6
+
+
+def _predicted(arm: ArmModel, motion: Motion) -> Array:
+    for place, (other, same, torque) in enumerate(_KEPT):
+        if other is arm and same is motion:
+            _KEPT.insert(0, _KEPT.pop(place))
+            return torque
+    torque = arm.torque(motion)
+    torque.flags.writeable = False
+    _KEPT.insert(0, (arm, motion, torque))
+    del _KEPT[_KEEP:]
+    return torque

@@ -23,6 +23,7 @@ class Motion:
     q: Array  # [rad] (samples, joints), in the log's zero: offsets of the description are not yet added
     dq: Array  # [rad/s] (samples, joints)
     ddq: Array  # [rad/s^2] (samples, joints)
+    tau: Array | None = None  # [N m] (samples, joints) as logged, held from each sample to the next; None: not known
 
 
 @dataclass(frozen=True)
