@@ -31,7 +31,7 @@ class Experiment:
     q_ref: Array  # [rad] (N, n)
     dq_ref: Array  # [rad/s] (N, n)
     ddq_ref: Array  # [rad/s^2] (N, n)
-    q0: Array  # [rad] (n,) true position at the first sample
+    q0: Array  # [rad] (n,) position at the first sample, as an encoder without steps reads it
     dq0: Array  # [rad/s] (n,)
     tau0: Array  # [N m] (n,) what a controller with delay has commanded before the first sample
     resolution: Array  # [rad] (n,) of the encoders; 0 where they do not quantise

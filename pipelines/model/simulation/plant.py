@@ -10,7 +10,7 @@ Effects enter through their hooks, in the order in which they act; what is frict
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -61,7 +61,7 @@ class Plant:
             own = acting.effect.simulate(rigid if friction else acting_on, acting.values)
             acting_on = acting_on if own.arm is None else own.arm
             added = added if own.inertia is None else added + own.inertia
-            if any((own.load, own.actuator, own.sensor, own.states)):
+            if any((own.load, own.actuator, own.sensor, own.settled, own.states)):
                 hooks.append(own)
         parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
         return cls(acting_on.body, parameters, added, stacked(curves, arm.n_joints), tuple(hooks), arm.nominal.torque)
@@ -157,6 +157,14 @@ class MovingPlant:
         for hook, own in reversed(self._hooked):
             yield hook, own, torque
             torque = hook.actuator(torque, motion, states[:, own]) if hook.actuator else torque
+
+    def settled(self, t: Array, q: Array, dq: Array) -> Array:
+        """Where the arm truly is (joints, replicas) when its encoders first read q (joints, replicas)."""
+        motion = self.motion(t, q, dq)
+        for hook, _ in reversed(self._hooked):
+            if hook.settled:
+                motion = replace(motion, q=hook.settled(motion, self.plant.needed(motion)))
+        return motion.q.T
 
     def at_start(self, t: Array, q: Array, dq: Array) -> Array:
         """The states (replicas, states) before the first sample."""

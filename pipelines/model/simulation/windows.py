@@ -32,7 +32,7 @@ _CANDIDATES = (1, 2, 4, 8, 16, 32, 64)
 class Windows:
     """Simulated motion over the windows, one behind the other; NaN in samples that no window covers."""
 
-    q: Array  # [rad] (samples, joints)
+    q: Array  # [rad] (samples, joints) as the encoders would see it
     dq: Array  # [rad/s]
     first: Indices  # sample at which each window starts
     length: int  # samples
@@ -97,10 +97,12 @@ def _follow(plant: Plant, motion: Motion, tau: Array, sample_time: float, first:
     n = tau.shape[1]
     state = np.ascontiguousarray(np.concatenate([motion.q[first], motion.dq[first]], axis=1).T)
     t = motion.t[first].copy()
+    state[:n] = moving.settled(t, state[:n], state[n:])
     states = moving.at_start(t, state[:n], state[n:])
     out = np.empty((length, 2 * n, len(first)))
     for k in range(length):
         out[k] = state
+        out[k, :n] = moving.measured(state[:n], states)
         command = np.ascontiguousarray(tau[first + k].T)
         if moving.n_states:
             states = moving.updated(t, state[:n], state[n:], states, command)
