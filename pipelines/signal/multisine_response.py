@@ -93,11 +93,12 @@ def multisine_responses(realisations: Sequence[Array], rate: float, period: int,
     if not excited:
         raise InputRejected("T07", "no realisation", remedy="give at least one record")
     if any(not np.array_equal(k, excited[0]) for k in excited[1:]):
-        raise UsageError("C02", "realisations that excite different lines", remedy="analyse those of one amplitude spectrum together")
+        raise UsageError("C02", "realisations that excite different lines",
+                         remedy="analyse those of one amplitude spectrum together")
     lines, m = excited[0], len(found)
     each = np.stack([one.mean[lines, 1:] / one.mean[lines, :1] for one in found])
     noise = np.stack([one.noise[lines, 1:, 1:] / (np.abs(one.mean[lines, 0]) ** 2)[:, None, None] for one in found])
-    response, frequency = each.mean(axis=0), lines * (rate / period)
+    response, frequency = each.mean(axis=0), np.asarray(lines * (rate / period), dtype=np.float64)
     total = None
     if m > 1:
         rest = each - response
@@ -128,7 +129,8 @@ def _lines(x: Array, period: int, order: int) -> _Lines:
     offsets = _offsets(periods, order)
     if offsets[-1] + 1 >= len(transform) // 2:
         raise InputRejected("T08", f"{len(x)} samples hold too few bins between the lines", remedy="record more periods")
-    mean, noise = np.zeros((len(harmonics) + 1, x.shape[1]), np.complex128), np.zeros((len(harmonics) + 1, *2 * x.shape[1:]), np.complex128)
+    size, channels = len(harmonics) + 1, x.shape[1]
+    mean, noise = np.zeros((size, channels), np.complex128), np.zeros((size, channels, channels), np.complex128)
     middle = harmonics * periods
     inner = (middle + offsets[0] >= 0) & (middle + offsets[-1] < len(transform))
     for chosen, around in ((inner, offsets), (~inner & (harmonics < len(harmonics) // 2), _one_sided(offsets, periods)),
