@@ -125,11 +125,14 @@ def _combination(leading: int, row: Array) -> str:
 
 
 class BaseArm:
-    """Any serial arm in its base parameters: the general counterpart of the closed form."""
+    """Any serial arm in its base parameters: the general counterpart of the closed form.
 
-    def __init__(self, robot: RobotDescription) -> None:
+    `chain` stands in for that of the description, for an arm that is not as described.
+    """
+
+    def __init__(self, robot: RobotDescription, chain: SerialChain | None = None) -> None:
         self.robot = robot
-        self.chain = serial_chain(robot)
+        self.chain = chain or serial_chain(robot)
         self.base = base_set(self.chain, np.random.default_rng(_SEED))
         self.parameters = self.base.parameters
 

@@ -1,0 +1,149 @@
+"""The same arm with other gravity, another length, or a body at its tip, and what becomes of its base parameters.
+
+    tilted = with_gravity(body, gravity)
+    p = carry_over(body, tilted) @ p            the same links, as far as torque tells them
+    p = p + tip_parameters(body) @ [m, mx, my, mz, Ixx, …]        of a body held at the tip
+
+Which links lie behind base parameters is not known. Those taken have zero where torque tells nothing; what another choice would
+change lies in the span of the other body's regressor, so that a fit of its base parameters makes up for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.model.rigid.base import BaseArm
+from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.model.rigid.chain import regressor
+from pipelines.model.rigid.choose import rigid_body
+from pipelines.model.rigid.geometry import Placement, SerialChain, serial_chain
+from pipelines.model.rigid.kinematics import jacobian
+
+__all__ = ["carry_over", "chain_of", "gravity_regressor", "standard_of", "tip_jacobian", "tip_parameters", "with_gravity",
+           "with_longer_link"]
+
+_STATES = 40
+_MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx yy zz xy xz yz
+
+
+def chain_of(body: RigidBody) -> SerialChain:
+    return body.chain if isinstance(body, BaseArm) else serial_chain(body.robot)
+
+
+def _standard_to_base(body: RigidBody) -> Array:
+    """B (parameters, 10 · joints): base parameters p = B φ of standard parameters φ."""
+    if isinstance(body, BaseArm):
+        return body.base.combine
+    chain, rng = chain_of(body), np.random.default_rng(7)
+    n = chain.n_joints
+    q, dq, ddq = rng.uniform(-3.0, 3.0, (_STATES, n)), rng.normal(size=(_STATES, n)), rng.normal(size=(_STATES, n))
+    ours, all_ten = body.regressor(q, dq, ddq), regressor(chain, q, dq, ddq)
+    found = np.linalg.lstsq(ours.reshape(_STATES * n, -1), all_ten.reshape(_STATES * n, -1), rcond=None)[0]
+    found[np.abs(found) < 1e-12] = 0.0
+    return np.asarray(found)
+
+
+def _links_behind(body: RigidBody) -> Array:
+    """(10 · joints, parameters): standard parameters that have the torques of p; what is not in the general base set is zero."""
+    if isinstance(body, BaseArm):
+        return np.eye(10 * body.chain.n_joints)[:, list(body.base.chosen)]
+    general = BaseArm(body.robot)
+    chosen = _standard_to_base(body)[:, list(general.base.chosen)]
+    return np.asarray(np.eye(10 * general.chain.n_joints)[:, list(general.base.chosen)] @ np.linalg.inv(chosen))
+
+
+def standard_of(body: RigidBody, p: Array) -> Array:
+    """Standard parameters (10 · joints,) with the torques of p."""
+    return np.asarray(_links_behind(body) @ p)
+
+
+def with_gravity(body: RigidBody, gravity: Array) -> RigidBody:
+    """The same arm under `gravity` (3,) [m/s^2]."""
+    x, y, z = gravity.tolist()
+    robot = replace(body.robot, gravity=(x, y, z))
+    if isinstance(body, BaseArm):
+        return BaseArm(robot, replace(body.chain, gravity=np.array(gravity)))
+    return rigid_body(robot)
+
+
+def with_longer_link(body: RigidBody, link: int, by: float) -> RigidBody:
+    """The same arm, all beyond link `link` (1-based) `by` [m] further along it: along x of its frame, of a URDF towards the
+    next joint. The link's own body keeps its place on its axis.
+
+    Raises:
+        ValueError: nothing is beyond that link.
+    """
+    if not 1 <= link < body.robot.n_joints:
+        raise ValueError(f"link {link} has no joint beyond it")
+    if body.robot.convention == "urdf":
+        chain = chain_of(body)
+        step = chain.before[link].position
+        length = float(np.linalg.norm(step))
+        along = step / length if length else np.array([1.0, 0.0, 0.0])
+        moved = Placement(chain.before[link].rotation, step + by * along)
+        return BaseArm(body.robot, replace(chain, before=(*chain.before[:link], moved, *chain.before[link + 1:])))
+    place = link - 1 if body.robot.convention == "dh" else link  # whose a it is
+    joints = list(body.robot.joints)
+    joints[place] = replace(joints[place], a=joints[place].a + by)
+    return rigid_body(replace(body.robot, joints=tuple(joints)))
+
+
+def carry_over(body: RigidBody, other: RigidBody) -> Array:
+    """(parameters of other, parameters of body): base parameters of the same links in the other arm."""
+    return np.asarray(_standard_to_base(other) @ _shifted(chain_of(body), chain_of(other)) @ _links_behind(body))
+
+
+def _shifted(chain: SerialChain, other: SerialChain) -> Array:
+    """(10 · joints, 10 · joints): parameters of the same bodies, at the same places on their axes, in the other's link frames."""
+    n = chain.n_joints
+    out = np.zeros((10 * n, 10 * n))
+    for i, (one, two) in enumerate(zip(chain.after, other.after, strict=True)):
+        own = slice(10 * i, 10 * i + 10)
+        out[own, own] = _moved(one.rotation.T @ (one.position - two.position))
+    return out
+
+
+def _moved(by: Array) -> Array:
+    """(10, 10): parameters of a body about a point from which its old origin is `by` (3,) [m].
+
+        h' = h + m r,   P' = P + h rᵀ + r hᵀ + m r rᵀ,   P = ∫ x xᵀ dm
+    """
+    out = np.zeros((10, 10))
+    for k in range(10):
+        unit = np.zeros(10)
+        unit[k] = 1.0
+        m, h, second = unit[0], unit[1:4], _second_moments(unit[4:])
+        second = second + np.outer(h, by) + np.outer(by, h) + m * np.outer(by, by)
+        out[:, k] = (m, *(h + m * by), *_inertia(second))
+    return out
+
+
+def _second_moments(inertia: Array) -> Array:
+    """P (3, 3) = ∫ x xᵀ dm of Ixx Iyy Izz Ixy Ixz Iyz, products with positive sign: P = ½ tr(I) 1 - I on the diagonal."""
+    xx, yy, zz, xy, xz, yz = inertia
+    half = 0.5 * (xx + yy + zz)
+    return np.array([[half - xx, xy, xz], [xy, half - yy, yz], [xz, yz, half - zz]])
+
+
+def _inertia(second: Array) -> Array:
+    trace = np.trace(second)
+    return np.array([(trace if i == j else 0.0) + (-1.0 if i == j else 1.0) * second[i, j] for i, j in _MOMENTS])
+
+
+def tip_parameters(body: RigidBody) -> Array:
+    """(parameters, 10): what each standard parameter of a body at the tip, in axes of the last frame, adds to p."""
+    chain = chain_of(body)
+    return np.asarray(_standard_to_base(body)[:, -10:] @ _moved(chain.tip))
+
+
+def gravity_regressor(body: RigidBody, q: Array, direction: Array) -> Array:
+    """(samples, joints, 10 · joints): torque at rest of each standard parameter in the field `direction` (3,) [m/s^2]."""
+    still = np.zeros_like(q)
+    return regressor(replace(chain_of(body), gravity=direction), q, still, still)
+
+
+def tip_jacobian(body: RigidBody, q: Array) -> Array:
+    """J (samples, 3, joints) of the tip's velocity in the base frame."""
+    return np.asarray(jacobian(chain_of(body), q)[:, :3])

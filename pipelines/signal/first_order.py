@@ -1,0 +1,75 @@
+"""A first-order lag, T dy/dt = x - y, exact for what x does between the samples.
+
+    lagging(x, t, T)        x goes straight from sample to sample
+    held_mean(u, h, T)      u is held over each sample; y is averaged over it
+    rate_of_change(x, t)    dx/dt by differences, not across gaps
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.signal.blocks import scan
+
+__all__ = ["held_mean", "lagging", "rate_of_change"]
+
+Array = npt.NDArray[np.float64]
+
+_GAP = 1.5  # sample times
+
+
+def lagging(x: Array, t: Array, time_constant: float) -> Array:
+    """y (samples,) of x (samples,), settled at the start and behind every gap of t [s].
+
+        y_{k+1} = a y_k + (m - a) x_k + (1 - m) x_{k+1},   a = exp(-h/T),   m = (1 - a) T/h
+    """
+    if time_constant <= 0.0 or len(x) < 2:
+        return np.array(x, dtype=np.float64)
+    y = np.empty(len(x))
+    for part, h in _stretches(t):
+        own = x[part]
+        a, m = _decay(h, time_constant)
+        y[part] = _recursion(a, own[0], (m - a) * own[:-1] + (1.0 - m) * own[1:])
+    return y
+
+
+def held_mean(u: Array, h: float, time_constant: float) -> Array:
+    """Mean of y over each sample of h [s] in which u (samples, …) is held; y starts at zero."""
+    if time_constant <= 0.0:
+        return np.array(u, dtype=np.float64)
+    a, m = _decay(h, time_constant)
+    flat = u.reshape(len(u), -1)
+    before = np.stack([_recursion(a, 0.0, (1.0 - a) * column[:-1]) for column in flat.T], axis=1).reshape(u.shape)
+    return np.asarray(u + m * (before - u))
+
+
+def rate_of_change(x: Array, t: Array) -> Array:
+    """dx/dt (samples,) by central differences, one-sided at the ends and on either side of a gap."""
+    out = np.zeros(len(x))
+    for part, _ in _stretches(t):
+        if part.stop - part.start > 1:
+            out[part] = np.gradient(x[part], t[part])
+    return out
+
+
+def _decay(h: float, time_constant: float) -> tuple[float, float]:
+    """exp(-h/T), and its mean over the step."""
+    ratio = h / time_constant
+    return float(np.exp(-ratio)), float(-np.expm1(-ratio) / ratio)
+
+
+def _recursion(a: float, start: float, drive: Array) -> Array:
+    """y_0 = start, y_{k+1} = a y_k + drive_k."""
+    return scan(np.full((1, 1, 1), a), np.concatenate([[start], drive])[None, :, None])[0, :, 0]
+
+
+def _stretches(t: Array) -> Iterator[tuple[slice, float]]:
+    """Parts of t (samples,) without a gap, and the time of a sample [s]."""
+    steps = np.diff(t)
+    h = float(np.median(steps))
+    ends = [0, *(np.flatnonzero((steps > _GAP * h) | (steps <= 0.0)) + 1).tolist(), len(t)]
+    return ((slice(a, b), h) for a, b in pairwise(ends))
