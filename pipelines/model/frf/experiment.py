@@ -1,0 +1,193 @@
+"""One "frf" log as signals for spectra: v, the plant's input, the deviation from the reference, torque; reversal left out.
+
+    turned = turned_joint(log)
+    turned.stretches[0].signals        (samples, 4): v, u, q - q_ref, τ of the joint
+
+Kostić et al. 2004, Section IV.D. The joint turns slowly, so that friction does not stick, and at constant speed, so that the
+mean of its friction is a constant that no spectrum shows. Where it starts, reverses and stops, friction jumps: those samples
+are left out, and so are the first after them, until the loop has settled. The reference itself is subtracted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected
+from pipelines.log.doctor.segments import Usable, usable
+from pipelines.log.experiment import Array, Controller, ExperimentLog
+from pipelines.log.limits import LARGEST_JITTER, percent
+
+__all__ = ["INPUT", "POSITION", "TORQUE", "Stretch", "Turned", "V", "excitation_period", "turned_joint"]
+
+V, INPUT, POSITION, TORQUE = range(4)  # channels of a stretch
+
+_PLATEAU = 0.02  # of the largest speed: what counts as constant
+_WANDERING = 0.2  # the same, where the speed is only reconstructed
+_SMOOTH = 0.5  # [s] over which it is
+_SETTLE = 0.5  # [s] after the speed has become constant
+_SHORTEST = 1.0  # [s] a stretch is worth
+_STILL = 1e-3  # [rad/s] a slower joint does not turn
+_SAME = 1e-9  # of the largest v: two periods are equal
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Samples at constant speed, without a gap."""
+
+    start: int  # of the log
+    stop: int
+    direction: int  # 1, -1; 0 where the joint does not turn
+    signals: Array  # (samples, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """The experiment of one log."""
+
+    name: str
+    joint: int  # 1-based
+    posture: Array  # (n,) [rad]; the joint's own angle is where it began
+    sample_time: float  # [s]
+    quantity: str  # "r" [rad/s^2] under computed torque, "tau" [N m] under PD: the input of the plant
+    controller: Controller | None
+    speed: float  # [rad/s] at which it turned; 0: it did not
+    period: int | None  # [samples] of v; None: it does not repeat
+    stretches: tuple[Stretch, ...]
+    whole: Array  # (samples, 4) the log with its reversal
+    left_out: float  # share of the samples
+    mean_input: tuple[float | None, float | None]  # of the input, forwards and backwards: what friction and load leave
+
+    @property
+    def rate(self) -> float:
+        return 1.0 / self.sample_time
+
+    @property
+    def friction_left(self) -> float | None:
+        """Half of what the mean input differs between the directions: friction that nothing compensated."""
+        forwards, backwards = self.mean_input
+        return None if forwards is None or backwards is None else 0.5 * (forwards - backwards)
+
+    def settings(self) -> tuple[object, ...]:
+        """What two logs must share to be averaged, but for their posture."""
+        c = self.controller
+        gains = () if c is None or c.kp is None or c.kd is None else (float(c.kp[self.joint - 1]), float(c.kd[self.joint - 1]))
+        model = "" if c is None or c.model is None else c.model
+        return self.joint, self.quantity, self.sample_time, gains, c.delay if c else None, c.velocity if c else None, model
+
+
+def turned_joint(log: ExperimentLog) -> Turned:
+    """The excited joint's signals at constant speed.
+
+    Raises:
+        InputRejected: S01, a signal or attribute is missing; T05, uneven sampling; D09, v does not excite; T08, nothing of it
+            lasts at constant speed.
+    """
+    joint, quantity = _described(log)
+    good = usable(log)
+    if good.time.jitter > LARGEST_JITTER:
+        raise InputRejected("T05", f"the sampling interval varies by {percent(good.time.jitter)} rms: a spectrum needs even "
+                            "sampling", where=log.source or log.name, remedy="sample by a timer and record again")
+    mended, j = good.log, joint - 1
+    v = mended["v"][:, j]
+    if not np.isfinite(v).any() or float(np.nanstd(v)) <= 0.0:
+        raise InputRejected("D09", f"v does not excite joint {joint}", where=log.source or log.name,
+                            remedy="inject a multisine or noise at that joint (design-excitation --for frf plans it)")
+    reference = mended["q_ref"][:, j] if "q_ref" in mended else _straight(mended.q[:, j])
+    signals = np.column_stack([v, mended[quantity][:, j], mended.q[:, j] - reference, mended.tau[:, j]])
+    speed = mended["dq_ref"][:, j] if "dq_ref" in mended else _speed(mended.q[:, j], log.sample_time)
+    width = _PLATEAU if "dq_ref" in mended else _WANDERING
+    stretches = tuple(_stretches(good, signals, speed, width, log.sample_time))
+    if not stretches:
+        raise InputRejected("T08", f"joint {joint} never turns at constant speed for {_SETTLE + _SHORTEST:g} s",
+                            where=log.source or log.name,
+                            remedy="let it turn slowly there and back, 20 s each way or more")
+    top = float(np.nanmax(np.abs(speed)))
+    kept = sum(s.stop - s.start for s in stretches)
+    posture = log.posture if log.posture is not None else np.asarray(np.nanmedian(mended.q, axis=0))
+    return Turned(log.name, joint, posture, log.sample_time, quantity, log.controller, top if top > _STILL else 0.0,
+                  excitation_period(v, log.period, log.sample_time), stretches, signals, 1.0 - kept / log.n_samples,
+                  (_mean(stretches, 1), _mean(stretches, -1)))
+
+
+def _described(log: ExperimentLog) -> tuple[int, str]:
+    """The joint, and which signal is the input of its plant."""
+    where = log.source or log.name
+    if log.joint is None:
+        raise InputRejected("S01", "the log does not say which joint was excited", where=where, remedy="set attribute joint")
+    if "v" not in log:
+        raise InputRejected("S01", "an frf log without its excitation v", where=where, remedy="record v")
+    law = log.controller.law if log.controller is not None else "unknown"
+    if law.startswith("pd"):
+        return log.joint, "tau"
+    if "r" not in log:
+        raise InputRejected("S01", f"an frf log under '{law}' without r, the input of the plant", where=where,
+                            remedy="record r, eq. (25)-(27); under PD say so in /controller, torque is the input then")
+    return log.joint, "r"
+
+
+def _straight(q: Array) -> Array:
+    """The slow part of a position: without a reference, what the excitation cannot have done."""
+    width = max(3, len(q) // 50)
+    known = np.where(np.isfinite(q), q, np.nanmean(q))
+    padded = np.concatenate([np.full(width, known[0]), known, np.full(width, known[-1])])
+    total = np.cumsum(padded)
+    middle = (total[2 * width:] - total[:-2 * width]) / (2.0 * width)
+    return np.asarray(middle)
+
+
+def _speed(q: Array, sample_time: float) -> Array:
+    """Central differences over half a second."""
+    half = max(1, round(0.5 * _SMOOTH / sample_time))
+    index = np.arange(len(q))
+    high, low = np.minimum(index + half, len(q) - 1), np.maximum(index - half, 0)
+    return np.asarray((q[high] - q[low]) / ((high - low) * sample_time))
+
+
+def _stretches(good: Usable, signals: Array, speed: Array, width: float, sample_time: float) -> list[Stretch]:
+    top = float(np.nanmax(np.abs(speed)))
+    if top > _STILL:
+        directions: npt.NDArray[np.int8] = np.where(np.abs(np.abs(speed) - top) <= width * top, np.sign(speed), 2).astype(np.int8)
+    else:
+        directions = np.zeros(len(speed), dtype=np.int8)
+    inside = np.zeros(len(speed), dtype=bool)
+    for run in good.runs:
+        inside[run] = True
+    inside &= np.isfinite(signals).all(axis=1)
+    directions[~inside] = 2
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(directions)) + 1, [len(speed)]])
+    settle, shortest = round(_SETTLE / sample_time), round(_SHORTEST / sample_time)
+    return [Stretch(int(a) + settle, int(b), int(directions[a]), signals[a + settle:b])
+            for a, b in pairwise(edges) if directions[a] != 2 and b - a >= settle + shortest]
+
+
+def excitation_period(v: Array, declared: float | None, sample_time: float) -> int | None:
+    """Samples after which v (samples,) repeats itself exactly; None where it does not within half of the log.
+
+    The declared period is believed where v keeps it; else the peak of the autocorrelation is tried.
+    """
+    if declared is not None:
+        samples = round(declared / sample_time)
+        if 2 <= samples <= len(v) // 2 and abs(samples * sample_time - declared) < 1e-6 * declared and _repeats(v, samples):
+            return samples
+    known = np.where(np.isfinite(v), v, 0.0)
+    size = 1 << (2 * len(v) - 1).bit_length()
+    spectrum = np.fft.rfft(known - known.mean(), size)
+    correlation = np.fft.irfft(np.abs(spectrum) ** 2, size)[:len(v) // 2 + 1]
+    overlap = (len(v) - np.arange(len(correlation))) / len(v)
+    candidates = np.flatnonzero(correlation > 0.9 * overlap * correlation[0])
+    return next((int(k) for k in candidates if k >= 2 and _repeats(v, int(k))), None)
+
+
+def _repeats(v: Array, period: int) -> bool:
+    difference = np.abs(v[period:] - v[:-period])
+    known = difference[np.isfinite(difference)]
+    return bool(known.size and known.max() <= _SAME * np.nanmax(np.abs(v)))
+
+
+def _mean(stretches: tuple[Stretch, ...], direction: int) -> float | None:
+    own = [s.signals[:, INPUT] for s in stretches if s.direction == direction]
+    return float(np.mean(np.concatenate(own))) if own else None
