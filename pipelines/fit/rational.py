@@ -1,0 +1,120 @@
+"""A rational function through a frequency response: modes, plateaus and delay, each with its deviation.
+
+    H(s) = g s⁻ⁱ e^(-s delay) hold(s) · Π (1 + b s + a s²) [zeros] / Π (1 + b s + a s²) [poles]
+
+    found = fit_rational(frequency, response, variance, integrators=2, hold=1e-3, correlated=response.correlated)
+    found.modes()                       resonances and antiresonances inside the band, by frequency
+    found.low, found.high               g below all modes, and what is left of it above them, g Π a_zeros / Π a_poles
+    found.delay                         [s], beside the hold
+
+Products of sections, with s in units of the middle of the band, keep the fit well conditioned at any order, and every section is
+a mode: ω = 1/√a, ζ = b / (2√a). Maximum likelihood: the sum of |Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System
+Identification, §9.11); the number of sections is that of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Array", "Complex", "Known", "Mode", "Rational"]
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+_CANCELS = 2.0  # standard deviations within which a resonance and an antiresonance are the same
+
+
+@dataclass(frozen=True)
+class Known:
+    """A value and its standard deviation."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One lightly or heavily damped pair of poles or zeros."""
+
+    kind: Literal["resonance", "antiresonance"]
+    frequency: Known  # undamped [Hz]
+    damping: Known  # ratio [1]
+    distinct: bool  # False where one of the other kind takes it away within two standard deviations
+
+
+@dataclass(frozen=True, eq=False)
+class Rational:
+    """A fitted function. `parameters`: log |g|, delay · unit, then b, a of each zero section, then b, a of each pole section."""
+
+    parameters: Array  # (2 + 2 zeros + 2 poles,), s in `unit`
+    covariance: Array  # of them; zero rows for what was held
+    sign: float  # of g
+    zeros: int  # sections
+    poles: int
+    integrators: int
+    hold: float  # [s]; 0 for none
+    unit: float  # [rad/s] of s
+    band: tuple[float, float]  # [Hz] of the fit
+    misfit: float  # mean of |Ĝ - H|² / variance, over degrees of freedom: 1 where the model is right and the variance too
+    description: float  # length of the description, to compare numbers of sections on the same data
+
+    def response(self, frequency: Array) -> Complex:
+        """H at these frequencies [Hz]."""
+        from pipelines.fit.rational_search import evaluate
+
+        return evaluate(self, frequency)
+
+    @property
+    def low(self) -> Known:
+        """g: the plateau below all modes, of H sⁱ."""
+        value = self.sign * float(np.exp(self.parameters[0]))
+        return Known(value, abs(value) * float(np.sqrt(self.covariance[0, 0])))
+
+    @property
+    def high(self) -> Known:
+        """g Π a_zeros / Π a_poles: the plateau above all modes, where there are as many zeros as poles; else (0, 0)."""
+        if self.zeros != self.poles:
+            return Known(0.0, 0.0)
+        a = self.parameters[3::2]
+        sign = np.repeat([1.0, -1.0], [self.zeros, self.poles])
+        value = self.low.value * float(np.prod(a**sign))
+        gradient = np.zeros(len(self.parameters))
+        gradient[0], gradient[3::2] = 1.0, sign / a
+        return Known(value, abs(value) * float(np.sqrt(gradient @ self.covariance @ gradient)))
+
+    @property
+    def delay(self) -> Known:
+        """[s], beside that of the hold."""
+        return Known(float(self.parameters[1] / self.unit), float(np.sqrt(self.covariance[1, 1]) / self.unit))
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Complex pairs whose frequency lies in the band of the fit."""
+        found = [self._mode(k) for k in range(self.zeros + self.poles)]
+        inside = [m for m in found if m is not None and self.band[0] <= m.frequency.value <= self.band[1]]
+        marked = [Mode(m.kind, m.frequency, m.damping, not any(_same(m, o) for o in inside if o.kind != m.kind)) for m in inside]
+        return tuple(sorted(marked, key=lambda m: m.frequency.value))
+
+    def _mode(self, section: int) -> Mode | None:
+        """ω = 1/√a, ζ = b/(2√a); δω/ω = -δa/(2a), δζ/ζ = δb/b - δa/(2a). None for two real roots."""
+        at = slice(2 + 2 * section, 4 + 2 * section)
+        b, a = self.parameters[at]
+        if a <= 0.0 or b * b >= 4.0 * a:
+            return None
+        c, root = self.covariance[at, at], np.sqrt(a)
+        hertz, damping = self.unit / root / (2.0 * np.pi), b / (2.0 * root)
+        gradient = np.array([1.0 / (2.0 * root), -damping / (2.0 * a)])
+        kind: Literal["resonance", "antiresonance"] = "antiresonance" if section < self.zeros else "resonance"
+        return Mode(kind, Known(float(hertz), float(hertz * np.sqrt(c[1, 1]) / (2.0 * a))),
+                    Known(float(damping), float(np.sqrt(gradient @ c @ gradient))), True)
+
+
+def _same(m: Mode, other: Mode) -> bool:
+    """Whether frequency and damping of both agree within two standard deviations of the difference."""
+    def near(x: Known, y: Known) -> bool:
+        return abs(x.value - y.value) <= _CANCELS * float(np.hypot(x.std, y.std))
+
+    return near(m.frequency, other.frequency) and near(m.damping, other.damping)

@@ -1,0 +1,224 @@
+"""Fit a rational function to a frequency response: sections are added where they tell most, as long as they pay.
+
+    found = fit_rational(frequency, response, variance, integrators=2, hold=1e-3)
+
+From a bare gain and delay on, every step tries one more pair of poles at many frequencies and dampings, with the best numerator
+for each, which is linear in its coefficients, as in vector fitting (Gustavsen, Semlyen 1999, IEEE Trans. Power Delivery 14,
+p. 1052); the best few are refined by Gauss-Newton steps on all parameters (Levenberg 1944, Marquardt 1963).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.errors import InputRejected
+from pipelines.fit.rational import Array, Complex, Rational
+
+__all__ = ["evaluate", "fit_rational"]
+
+_DAMPINGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # tried for a new pair of poles
+_FREQUENCIES = 150  # tried for it
+_REFINED = 3  # of the trials
+_STEPS = 60  # of Gauss and Newton at most
+_STOP = 1e-7  # relative decrease of the sum of squares below which they end
+_PATIENCE = 2  # sections more that do not pay before the search ends
+_EXACT = 1e-12  # of the square of the response: a variance below this is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class _Data:
+    """What is fitted, and what is the same for every order."""
+
+    s: Complex  # in `unit` (bins,)
+    target: Complex  # response over the known part s⁻ⁱ hold(s) (bins,)
+    weight: Array  # 1 / std of one of its two parts (bins,)
+    unit: float  # [rad/s]
+    with_delay: bool
+    sign: float
+    independent: float  # bins that count
+
+
+def fit_rational(frequency: Array, response: Complex, variance: Array, *, integrators: int = 0, hold: float = 0.0,
+                 most: int = 6, fewest: int = 0, with_delay: bool = True, correlated: float = 1.0,
+                 floor: float = 1e-3) -> Rational:
+    """The rational function of the shortest description.
+
+    Args:
+        frequency: [Hz] (bins,), above 0.
+        response: (bins,).
+        variance: of it, E|Ĝ - G|² (bins,); bins with none, or without a finite response, are left out.
+        integrators: i, poles at s = 0 that are known to be there.
+        hold: [s] time that the input is held between samples: its response (1 - e^(-s hold)) / (s hold) is known; 0 for none.
+        most, fewest: sections of the denominator.
+        with_delay: find one, positive or negative; else it is 0.
+        correlated: neighbouring bins that carry one independent estimate.
+        floor: relative deviation that every bin has at least, for what the model leaves out.
+
+    Raises:
+        InputRejected: T08, fewer bins than three times the parameters of one section; D09, not one bin with a finite variance.
+    """
+    frequency, data = _prepare(frequency, response, variance, integrators, hold, with_delay, correlated, floor)
+    shell = Rational(np.zeros(2), np.zeros((2, 2)), data.sign, 0, 0, integrators, hold, data.unit,
+                     (float(frequency[0]), float(frequency[-1])), np.inf, np.inf)
+    current = _refine(data, replace(shell, parameters=np.array([_log_gain(data), 0.0])), correlated)
+    best, waited = (current if fewest == 0 else shell), 0
+    for order in range(1, most + 1):
+        if 2 + 4 * order > data.independent:
+            break
+        square, fewer = _grow(data, current, True, correlated), _grow(data, current, False, correlated)
+        current = square
+        if order < fewest:
+            continue
+        better = min((square, fewer, best), key=lambda one: one.description)
+        waited = 0 if better is not best else waited + 1
+        best = better
+        if waited >= _PATIENCE:
+            break
+    return best
+
+
+def evaluate(model: Rational, frequency: Array) -> Complex:
+    """H at these frequencies [Hz]."""
+    s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
+    value, _ = _value(model.parameters, np.asarray(s / model.unit), model.zeros, model.sign)
+    return np.asarray(value * _known(s, model.integrators, model.hold))
+
+
+def _known(s: Complex, integrators: int, hold: float) -> Complex:
+    held = -np.expm1(-s * hold) / (s * hold) if hold > 0.0 else np.ones_like(s)
+    return np.asarray(held / s**integrators)
+
+
+def _prepare(frequency: Array, response: Complex, variance: Array, integrators: int, hold: float, with_delay: bool,
+             correlated: float, floor: float) -> tuple[Array, _Data]:
+    good = np.isfinite(response) & np.isfinite(variance) & (frequency > 0.0) & (response != 0.0)
+    if not good.any():
+        raise InputRejected("D09", "no frequency at which the response is known",
+                            remedy="excite the frequencies that are asked for")
+    frequency = frequency[good]
+    s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
+    if len(frequency) < 18:
+        raise InputRejected("T08", f"{len(frequency)} frequencies are too few for a mode",
+                            remedy="record longer, or ask for a finer resolution or a wider band")
+    known = _known(s, integrators, hold)
+    target = response[good] / known
+    spread = variance[good] / np.abs(known) ** 2 + (floor**2 + _EXACT) * np.abs(target) ** 2
+    unit = float(2.0 * np.pi * np.sqrt(frequency[0] * frequency[-1]))
+    lowest = target[:max(3, len(target) // 20)]
+    sign = 1.0 if (lowest.real / np.abs(lowest)).sum() >= 0.0 else -1.0
+    return frequency, _Data(s / unit, target, np.sqrt(2.0 / spread), unit, with_delay, sign, len(frequency) / correlated)
+
+
+def _log_gain(data: _Data) -> float:
+    return float(np.median(np.log(np.abs(data.target))))
+
+
+def _value(parameters: Array, s: Complex, zeros: int, sign: float) -> tuple[Complex, Complex]:
+    """Π of everything that is fitted, and the sections 1 + b s + a s² (sections, bins)."""
+    sections = 1.0 + parameters[2::2, None] * s + parameters[3::2, None] * s**2
+    value = sign * np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0) / np.prod(sections[zeros:], axis=0)
+    return np.asarray(value), np.asarray(sections)
+
+
+def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Array, Array]:
+    """Weighted residual and its Jacobian, real above imaginary. ∂H/∂b = ± H s / section, ∂H/∂a = ± H s² / section."""
+    value, sections = _value(parameters, data.s, zeros, data.sign)
+    sign = np.where(np.arange(len(sections)) < zeros, 1.0, -1.0)[:, None]
+    slope = np.empty((len(parameters), len(data.s)), dtype=np.complex128)
+    slope[0], slope[1] = value, -data.s * value if data.with_delay else 0.0
+    slope[2::2] = sign * value * data.s / sections
+    slope[3::2] = slope[2::2] * data.s
+    rest, slope = (value - data.target) * data.weight, slope * data.weight
+    return np.concatenate([rest.real, rest.imag]), np.concatenate([slope.real, slope.imag], axis=1).T
+
+
+def _refine(data: _Data, start: Rational, correlated: float) -> Rational:
+    """The nearest smallest sum of squares, with covariance and description length."""
+    p, damping = start.parameters, 1e-3
+    with np.errstate(all="ignore"):
+        rest, slope = _residual(data, p, start.zeros)
+        cost = float(rest @ rest)
+        for _ in range(_STEPS):
+            normal, gradient = slope.T @ slope, slope.T @ rest
+            scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+            matrix = normal / scale / scale[:, None]
+            before = cost
+            while damping < 1e8:
+                step = np.linalg.solve(matrix + damping * np.eye(len(p)), gradient / scale) / scale
+                tried, its_slope = _residual(data, p - step, start.zeros)
+                its_cost = float(tried @ tried)
+                if its_cost < cost:
+                    p, rest, slope, cost, damping = p - step, tried, its_slope, its_cost, max(damping / 10.0, 1e-12)
+                    break
+                damping *= 4.0
+            if not before - cost > _STOP * before:
+                break
+    return _judged(data, replace(start, parameters=p), cost, slope, correlated)
+
+
+def _judged(data: _Data, model: Rational, cost: float, slope: Array, correlated: float) -> Rational:
+    """Covariance (JᵀJ)⁻¹, wider where bins are correlated or the model does not fit; description 2 log-likelihood + k log n."""
+    free = np.ones(len(model.parameters), dtype=bool)
+    free[1] = data.with_delay
+    degrees = max(2.0 * len(data.s) - float(free.sum()), 1.0)
+    misfit = cost / degrees
+    normal = slope[:, free].T @ slope[:, free]
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse = np.linalg.pinv(normal / scale / scale[:, None], rcond=1e-14, hermitian=True) / scale / scale[:, None]
+    covariance = np.zeros((len(free), len(free)))
+    covariance[np.ix_(free, free)] = inverse * correlated * max(misfit, 1.0)
+    description = cost / correlated + float(free.sum()) * np.log(2.0 * data.independent)
+    return replace(model, covariance=covariance, misfit=misfit, description=float(description))
+
+
+def _grow(data: _Data, model: Rational, with_zeros: bool, correlated: float) -> Rational:
+    """One more pair of poles, and one of zeros or none: the best of the trials, refined."""
+    value, _ = _value(model.parameters, data.s, model.zeros, data.sign)
+    weight, ratio = (data.weight * np.abs(value)) ** 2, data.target / value
+    frequencies = np.abs(data.s[::max(1, len(data.s) // _FREQUENCIES)])
+    a = np.repeat(1.0 / frequencies**2, len(_DAMPINGS))
+    b = (2.0 * np.array(_DAMPINGS) / frequencies[:, None]).ravel()
+    gain, zero, gained = _numerators(np.abs(data.s), weight, ratio, a, b, with_zeros)
+    found = []
+    for k in _separate(gained, len(_DAMPINGS)):
+        base = model.parameters[:2] + np.array([np.log(gain[k]), 0.0])
+        between = 2 + 2 * model.zeros
+        p = np.concatenate([base, model.parameters[2:between], zero[k], model.parameters[between:], [b[k], a[k]]])
+        started = replace(model, parameters=p, zeros=model.zeros + int(with_zeros), poles=model.poles + 1)
+        found.append(_refine(data, started, correlated))
+    return min(found, key=lambda one: one.description)
+
+
+def _numerators(omega: Array, weight: Array, ratio: Complex, a: Array, b: Array, with_zeros: bool) -> tuple[Array, Array, Array]:
+    """min Σ weight |ratio - (c + d s + e s²) / (1 + b s + a s²)|² for every a, b, real c, d, e; without zeros c alone.
+
+    At s = jω the normal equations of d stand apart from those of c and e. Gives c, (d, e) / c, and what the sum loses; that
+    is -1 where c is not positive.
+    """
+    below = 1.0 / ((1.0 - a[:, None] * omega**2) + 1j * (b[:, None] * omega))  # (trials, bins)
+    power = (below.real**2 + below.imag**2) @ (weight[:, None] * np.stack([omega**0, omega**2, omega**4], axis=1))
+    seen = below * (weight * np.conj(ratio))
+    right = np.stack([seen.real.sum(axis=1), -seen.imag @ omega, -seen.real @ omega**2], axis=1)
+    if not with_zeros:
+        c = right[:, 0] / power[:, 0]
+        return np.where(c > 0.0, c, 1.0), np.zeros((len(a), 0)), np.where(c > 0.0, c * right[:, 0], -1.0)
+    determinant = power[:, 0] * power[:, 2] - power[:, 1] ** 2
+    c = (power[:, 2] * right[:, 0] + power[:, 1] * right[:, 2]) / determinant
+    e = (power[:, 0] * right[:, 2] + power[:, 1] * right[:, 0]) / determinant
+    d = right[:, 1] / power[:, 1]
+    gained, positive = c * right[:, 0] + d * right[:, 1] + e * right[:, 2], c > 0.0
+    safe = np.where(positive, c, 1.0)
+    return safe, np.stack([d, e], axis=1) / safe[:, None], np.where(positive, gained, -1.0)
+
+
+def _separate(gained: Array, dampings: int) -> list[int]:
+    """The best trial, and the best of those that do not neighbour it."""
+    best = gained.reshape(-1, dampings)
+    order = np.argsort(-best.max(axis=1))
+    chosen: list[int] = []
+    for k in order:
+        if len(chosen) < _REFINED and all(abs(int(k) - j) > max(3, len(order) // 30) for j in chosen):
+            chosen.append(int(k))
+    return [k * dampings + int(best[k].argmax()) for k in chosen]
