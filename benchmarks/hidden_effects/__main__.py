@@ -1,35 +1,77 @@
-"""Make sealed cases.
+"""Make sealed cases, let a diagnosis judge them, print the table of issue 9.
 
-    python -m benchmarks.hidden_effects make --out FOLDER [--families single healthy] [--seed 0] [--part 1/4] [--short]
+    python -m benchmarks.hidden_effects make  --out FOLDER [--families single healthy] [--seed 0] [--part 1/4] [--short]
+    python -m benchmarks.hidden_effects judge --out FOLDER [--families single] [--taken-out] [--part 1/4]
+    python -m benchmarks.hidden_effects table --out FOLDER
+    python -m benchmarks.hidden_effects all   --out FOLDER [--part 1/4]     one after the other, with causes taken out too
+
+Whatever is there already is not done again, so each of them can be interrupted, and parts can run beside each other. All of it
+is some 600 cases of 52 s: an hour and a half to make on one core, and as long as the diagnosis takes to judge.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from benchmarks.hidden_effects.cases import FAMILIES, SealedCase, campaign
+from benchmarks.hidden_effects.judge import engine_named, judge, scores_in, tasks
 from benchmarks.hidden_effects.make import make_cases
+from benchmarks.hidden_effects.table import table
+
+T = TypeVar("T")
 
 
 def main() -> None:
+    arguments = _parser().parse_args()
+    kept = arguments.verdicts or arguments.out / "verdicts.jsonl"
+    if arguments.command in ("make", "all"):
+        _make(arguments)
+    if arguments.command in ("judge", "all"):
+        _judge(arguments, kept, arguments.taken_out)
+    if arguments.command == "all":
+        _judge(arguments, kept, True)
+    if arguments.command in ("table", "all"):
+        print(table(scores_in(arguments.out, kept)))
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = parser.add_subparsers(dest="command", required=True)
-    make = commands.add_parser("make", help="record cases")
-    make.add_argument("--out", type=Path, required=True)
-    make.add_argument("--families", nargs="*", default=[], choices=list(FAMILIES))
-    make.add_argument("--seed", type=int, default=0, help="another seed, other machines and motions")
-    make.add_argument("--part", default="1/1", help="i/N: every N-th case")
-    make.add_argument("--count", type=int, help="no more than so many")
-    make.add_argument("--causes", nargs="*", default=[], help="only cases that hide one of these")
-    make.add_argument("--strengths", nargs="*", type=float, default=[])
-    make.add_argument("--short", action="store_true", help="three logs of six seconds instead of 52 s")
-    arguments = parser.parse_args()
+    parser.add_argument("command", choices=("make", "judge", "table", "all"))
+    parser.add_argument("--out", type=Path, required=True, help="folder of the cases")
+    parser.add_argument("--families", nargs="*", default=[], choices=list(FAMILIES))
+    parser.add_argument("--part", default="1/1", help="i/N: every N-th case, from the i-th")
+    parser.add_argument("--count", type=int, help="no more than so many")
+    parser.add_argument("--seed", type=int, default=0, help="another seed, other machines and motions")
+    parser.add_argument("--causes", nargs="*", default=[], help="make only cases that hide one of these")
+    parser.add_argument("--strengths", nargs="*", type=float, default=[], help="make only cases of these strengths")
+    parser.add_argument("--short", action="store_true", help="make three logs of six seconds instead of 52 s")
+    parser.add_argument("--verdicts", type=Path, help="file of the answers; default: verdicts.jsonl among the cases")
+    parser.add_argument("--taken-out", action="store_true", help="judge with the true cause left out of the library")
+    parser.add_argument("--engine", help="module:function instead of the command")
+    return parser
+
+
+def _make(arguments: argparse.Namespace) -> None:
     chosen = [case for case in campaign(arguments.seed, arguments.families, arguments.short)
               if _wanted(case, arguments.causes, arguments.strengths)]
-    which, parts = (int(number) for number in arguments.part.split("/"))
-    for case, seconds in make_cases(chosen[which - 1::parts][:arguments.count], arguments.out):
+    for case, seconds in make_cases(_part(chosen, arguments), arguments.out):
         print(f"{case.key} {case.family:10} {case.session:8} {seconds:5.1f} s", flush=True)
+
+
+def _judge(arguments: argparse.Namespace, kept: Path, taken_out: bool) -> None:
+    chosen = _part(tasks(arguments.out, arguments.families, taken_out), arguments)
+    for score in judge(arguments.out, kept, chosen, engine_named(arguments.engine)):
+        outcome = "right" if score.right else "wrong" if score.wrong else "open"
+        print(f"{score.key} {score.family:10} {'+'.join(score.truth) or '-':40} {score.strength or 0:4g} -> {score.verdict}: "
+              f"{', '.join(score.named) or '-':30} {outcome:5} {score.seconds:5.1f} s", flush=True)
+
+
+def _part(chosen: Sequence[T], arguments: argparse.Namespace) -> Sequence[T]:
+    which, parts = (int(number) for number in arguments.part.split("/"))
+    return chosen[which - 1::parts][:arguments.count]
 
 
 def _wanted(case: SealedCase, causes: list[str], strengths: list[float]) -> bool:
