@@ -22,24 +22,20 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, write_model
 from pipelines.log.results import encode
-from pipelines.log.robot import RobotDescription
-from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import Effect
+from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.estimation.nominal import fitted_arm
 from pipelines.model.estimation.outcome import validity
+from pipelines.model.friction.acting import friction_of
 from pipelines.model.friction.findings import findings
 from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
-from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.methods import METHODS, by_method
-from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.friction.result import JointResult, Result, joint_result, several_results
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
 from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
 from pipelines.report.friction_report import friction_report
@@ -168,28 +164,8 @@ def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:
     base = tuple(Parameter(p.name, 0.0 if known is None else float(known[i]), None, p.unit,
                            origin="assumed" if known is None else "known", visible=known is not None)
                  for i, p in enumerate(body.parameters))
-    laws = [acting for joint in joints for acting in acting_laws(joint.fit, joint.logs.joint)]
-    friction = [law for law in laws if not acts_at_rest(law.effect, log.robot)]
-    return Arm(log.robot_name, body, base, tuple(friction), tuple(law for law in laws if law not in friction))
-
-
-def acts_at_rest(effect: Effect, robot: RobotDescription) -> bool:
-    """An offset is no friction: its torque is there without motion."""
-    joint = replace(effect, joint=1)
-    still = np.zeros((2, 1))
-    return bool(joint.columns(Motion(np.arange(2.0), still, still, still), OneJoint.of(robot, 1, 1.0)).any())
-
-
-def acting_laws(fit: LawFit, joint: int) -> list[Acting]:
-    """The law's effects at their joint of the arm, with their numbers."""
-    std = {number.name: number.std for number in fit.numbers}
-    shared = {name.partition(".")[2]: value for name, value in std.items() if name.endswith(".sharpness")}
-    found = []
-    for effect, values in zip(fit.law.shaped(fit.theta), fit.law.values(fit.theta, fit.amplitudes), strict=True):
-        own = {name: std.get(f"{effect.name}.{name}", shared.get(name)) for name in values}
-        found.append(Acting.of(find_effect(effect.name)(joint=joint), values, {k: s for k, s in own.items() if s is not None},
-                               revolute=fit.joint.revolute))
-    return found
+    friction, at_rest = friction_of(joints, log.robot)
+    return Arm(log.robot_name, body, base, friction, at_rest)
 
 
 def _notes(arm: Arm, joints: Sequence[JointResult]) -> tuple[str, ...]:

@@ -59,7 +59,8 @@ class Controlling:
             self._integral += experiment.sample_time * error
             feedback -= self._ki * self._integral
         if experiment.v is not None:
-            feedback += experiment.v[k][:, None]
+            v = experiment.v[k]
+            feedback += v if v.ndim == 2 else v[:, None]
         if experiment.controller.law == "computed-torque":
             return self._linearising(k, *(self._seen(error) if self._seen is not None else (e, de)), feedback)
         if self._feedforward is not None:

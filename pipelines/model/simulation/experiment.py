@@ -35,7 +35,7 @@ class Experiment:
     dq0: Array  # [rad/s] (n,)
     tau0: Array  # [N m] (n,) what a controller with delay has commanded before the first sample
     resolution: Array  # [rad] (n,) of the encoders; 0 where they do not quantise
-    v: Array | None = None  # (N, n) injected excitation
+    v: Array | None = None  # (N, n) injected excitation, or (N, n, replicas) where each has its own
     tau: Array | None = None  # [N m] (N, n) torque of the joints that are driven open loop
     driven: npt.NDArray[np.bool_] | None = None  # (n,) which joints are
     feedforward_arm: Arm | None = None  # the model that the controller used

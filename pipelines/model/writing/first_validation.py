@@ -1,0 +1,217 @@
+"""The first validation: the torque that the controller commanded beside the torque of the model on the realised motion.
+
+    found = first_validation(log, motion, arm, parts)
+    found.relative_error            ‖τ - τ̂‖/‖τ‖, joint by joint
+    found.letters                   the same, letter by letter
+
+Kostić et al. 2004, Section IV.C.5, Figs. 13 and 14. The motion is that of the smoother; as it would run while the arm moves, it is
+the controller's observer whose motion is fed into the model, sample by sample (`online_validation`).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.schema import joint_unit
+from pipelines.model.arm import Arm, ArmTorque
+from pipelines.model.estimation.conditioning import condition
+from pipelines.model.estimation.outcome import torques
+from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
+from pipelines.model.online import OnlineModel
+from pipelines.model.rigid.body import Motion
+from pipelines.model.rigid.geometry import serial_chain
+from pipelines.model.rigid.kinematics import tip_position
+from pipelines.model.writing.marks import Marks, marks_of, reference_tip
+from pipelines.signal.filters import zero_phase
+
+__all__ = ["Course", "FirstValidation", "Largest", "LetterError", "Online", "first_validation", "online_validation", "residual"]
+
+_POINTS = 3000  # of a figure
+_OBSERVED = ("q_obs", "dq_obs", "ddq_obs")
+_PARTS = ("inertia", "coriolis", "gravity", "friction", "effects")
+
+
+@dataclass(frozen=True)
+class LetterError:
+    """One letter, or another stretch of a log."""
+
+    label: str
+    start: float  # [s] since the log began
+    end: float
+    rms: tuple[float, ...]  # [N m] of what the model leaves, per joint
+    relative_error: tuple[float, ...]  # over the torque of the whole log: letters compare
+
+
+@dataclass(frozen=True)
+class Largest:
+    """Where the model of one joint's torque is worst, after the low-pass."""
+
+    joint: int  # counted from 1
+    label: str  # the letter with the largest rms
+    rms: float  # [N m] in it
+    t: float  # [s] of its largest sample
+    error: float  # [N m] there
+    tip: tuple[float, ...]  # [m] there
+
+
+@dataclass(frozen=True)
+class Course:
+    """Torques for the figures, thinned; (points, joints) [N m]."""
+
+    t: Array  # [s] (points,)
+    measured: Array
+    model: Array
+    inertia: Array
+    coriolis: Array
+    gravity: Array
+    friction: Array
+    effects: Array
+    left: Array  # measured - model
+    tip: Array  # [m] (points, 3) as executed
+
+
+@dataclass(frozen=True)
+class Online:
+    """The model sample by sample, on the motion that an observer sees while the arm moves."""
+
+    observer: str  # whose motion: "the controller's" | "a Kalman observer after the fact"
+    rms: Array  # [N m] (joints,)
+    relative_error: Array  # (joints,)
+    differs: float  # [N m] largest difference from the same model on arrays
+
+
+@dataclass(frozen=True)
+class FirstValidation:
+    """One log. Arrays are per joint."""
+
+    name: str
+    experiment: str
+    role: str
+    law: str  # of its controller
+    torque_units: tuple[str, ...]
+    rms: Array  # [N m] measured minus model
+    signal_rms: Array  # [N m] measured
+    relative_error: Array
+    low_pass_hz: float | None
+    relative_error_low_pass: Array  # after the same low-pass over both: without what noise puts into a command
+    parts_rms: dict[str, Array]  # [N m] of inertia, coriolis, gravity, friction, effects
+    marks: str  # "letters" | "strokes" | "time"
+    text: str  # what is written, read from the reference
+    letters: tuple[LetterError, ...]
+    largest: tuple[Largest, ...]
+    online: Online | None
+    course: Course | None
+
+
+def residual(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque) -> tuple[Array, float | None]:
+    """Measured minus modelled torque after a zero-phase low-pass (samples, joints) [N m], zero where nothing is known, and
+    its cut-off [Hz], five times the motion's highest frequency."""
+    left = np.where(_known(log, motion)[:, None], log.tau - parts.total, 0.0)
+    how = condition(motion.motion, 1.0 / log.sample_time, None, None, np.zeros(log.n_joints))
+    if how.low_pass is None or len(left) <= how.low_pass.padding:
+        return left, None
+    return zero_phase(left, how.low_pass), how.cutoff_hz
+
+
+def first_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts: ArmTorque, online: Online | None = None,
+                     draw: bool = True) -> FirstValidation:
+    """How far the model's torque is from the measured one, and where; `parts` are the model's (`outcome.torques`)."""
+    known = _known(log, motion)
+    left, measured = (log.tau - parts.total)[known], log.tau[known]
+    smooth, cutoff = residual(log, motion, parts)
+    whole = residual(log, motion, _nothing(parts))[0]
+    wanted = reference_tip(log)
+    marks, tip = marks_of(log, wanted), _tip(motion, arm)
+    size = _rms(measured)
+    return FirstValidation(
+        log.name, log.experiment, log.role, "unknown" if log.controller is None else log.controller.law,
+        tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints),
+        _rms(left), size, _ratio(_rms(left), size), cutoff, _ratio(_rms(smooth[known]), _rms(whole[known])),
+        {name: _rms(getattr(parts, name)[known]) for name in _PARTS}, marks.kind, marks.text,
+        _letters(log, smooth, known, marks, _rms(whole[known])), _largest(log, smooth, known, marks, tip), online,
+        _course(log, parts, tip, known) if draw else None)
+
+
+def online_validation(log: ExperimentLog, arm: Arm) -> tuple[Online, float]:
+    """The model as a controller evaluates it, sample by sample, and how long one sample took [s].
+
+    The motion is what the log says the controller observed; without that, what a Kalman observer would have.
+    """
+    logged = all(name in log and np.isfinite(log[name]).all() for name in _OBSERVED)
+    if logged:
+        q, dq, ddq = (log[name] for name in _OBSERVED)
+    else:
+        seen = reconstruct(log, Reconstruction(method="observer")).motion
+        q, dq, ddq = seen.q, seen.dq, seen.ddq
+    model, rows = OnlineModel(arm), list(zip(q.tolist(), dq.tolist(), ddq.tolist(), strict=True))
+    begun = time.perf_counter()
+    one_by_one = [model.torque(*row) for row in rows]
+    seconds = (time.perf_counter() - begun) / len(rows)
+    torque = np.array(one_by_one)
+    arrays = arm.torque(Motion(log.t, np.array(q), np.array(dq), np.array(ddq)))
+    known = np.isfinite(log.tau).all(axis=1)
+    left = _rms((log.tau - torque)[known])
+    return Online("the controller's" if logged else "a Kalman observer after the fact", left, _ratio(left, _rms(log.tau[known])),
+                  float(np.abs(torque - arrays).max())), seconds
+
+
+def _known(log: ExperimentLog, motion: Reconstructed) -> npt.NDArray[np.bool_]:
+    """(samples,) where torque and motion are measured and fit to be compared."""
+    good: npt.NDArray[np.bool_] = np.zeros(log.n_samples, dtype=bool)
+    good[motion.good.kept] = motion.good.fit
+    return np.asarray(good & np.isfinite(log.tau).all(axis=1))
+
+
+def _nothing(parts: ArmTorque) -> ArmTorque:
+    return ArmTorque(*(np.zeros_like(parts.inertia) for _ in _PARTS))
+
+
+def _tip(motion: Reconstructed, arm: Arm) -> Array:
+    return tip_position(serial_chain(arm.robot), motion.motion.q)
+
+
+def _rms(x: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(x**2, axis=0))) if len(x) else np.full(x.shape[1], np.nan)
+
+
+def _ratio(left: Array, whole: Array) -> Array:
+    """‖τ - τ̂‖/‖τ‖; infinite where a joint had no torque at all."""
+    return np.divide(left, whole, out=np.full_like(left, np.inf), where=whole > 0.0)
+
+
+def _letters(log: ExperimentLog, left: Array, known: npt.NDArray[np.bool_], marks: Marks, whole: Array) -> tuple[LetterError, ...]:
+    found = []
+    for k, label in enumerate(marks.labels):
+        here = np.flatnonzero((marks.at == k) & known)
+        if here.size:
+            rms = _rms(left[here])
+            found.append(LetterError(label, float(log.t[here[0]] - log.t[0]), float(log.t[here[-1]] - log.t[0]),
+                                     tuple(rms.tolist()), tuple(_ratio(rms, whole).tolist())))
+    return tuple(found)
+
+
+def _largest(log: ExperimentLog, left: Array, known: npt.NDArray[np.bool_], marks: Marks, tip: Array) -> tuple[Largest, ...]:
+    found = []
+    for j in range(log.n_joints):
+        each = [float(np.sqrt(np.mean(left[here, j]**2))) if (here := (marks.at == k) & known).any() else 0.0
+                for k in range(len(marks.labels))]
+        worst = int(np.argmax(each))
+        inside = np.where((marks.at == worst) & known, np.abs(left[:, j]), -1.0)
+        k = int(np.argmax(inside))
+        found.append(Largest(j + 1, marks.labels[worst], each[worst], float(log.t[k] - log.t[0]), float(left[k, j]),
+                             tuple(tip[k].tolist())))
+    return tuple(found)
+
+
+def _course(log: ExperimentLog, parts: ArmTorque, tip: Array, known: npt.NDArray[np.bool_]) -> Course:
+    """Every so-manieth sample: the torque of a task is smooth over milliseconds."""
+    rows = slice(None, None, max(1, -(-log.n_samples // _POINTS)))
+    shown = np.where(known[:, None], log.tau, np.nan)[rows]
+    split = {name: getattr(parts, name)[rows] for name in _PARTS}
+    model = parts.total[rows]
+    return Course((log.t - log.t[0])[rows], shown, model, left=shown - model, tip=tip[rows], **split)
