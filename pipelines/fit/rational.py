@@ -2,7 +2,7 @@
 
     H(s) = g s⁻ⁱ e^(-s delay) hold(s) · Π (1 + b s + a s²) [zeros] / Π (1 + b s + a s²) [poles]
 
-    found = fit_rational(frequency, response, variance, integrators=2, hold=1e-3, correlated=response.correlated)
+    found = fit_rational(frequency, response, variance, integrators=2, hold=1e-3, ...)    # rational_search.py
     found.modes()                       resonances and antiresonances inside the band, by frequency
     found.low, found.high               g below all modes, and what is left of it above them, g Π a_zeros / Π a_poles
     found.delay                         [s], beside the hold
@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "Complex", "Known", "Mode", "Rational"]
+__all__ = ["Array", "Complex", "Known", "Mode", "Rational", "known_part", "product"]
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -64,9 +64,9 @@ class Rational:
 
     def response(self, frequency: Array) -> Complex:
         """H at these frequencies [Hz]."""
-        from pipelines.fit.rational_search import evaluate
-
-        return evaluate(self, frequency)
+        s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
+        value, _ = product(self.parameters, np.asarray(s / self.unit), self.zeros, self.sign)
+        return np.asarray(value * known_part(s, self.integrators, self.hold))
 
     @property
     def low(self) -> Known:
@@ -110,6 +110,19 @@ class Rational:
         kind: Literal["resonance", "antiresonance"] = "antiresonance" if section < self.zeros else "resonance"
         return Mode(kind, Known(float(hertz), float(hertz * np.sqrt(c[1, 1]) / (2.0 * a))),
                     Known(float(damping), float(np.sqrt(gradient @ c @ gradient))), True)
+
+
+def known_part(s: Complex, integrators: int, hold: float) -> Complex:
+    """s⁻ⁱ times the response of a hold, (1 - e^(-s hold)) / (s hold), at s [rad/s] (bins,)."""
+    held = -np.expm1(-s * hold) / (s * hold) if hold > 0.0 else np.ones_like(s)
+    return np.asarray(held / s**integrators)
+
+
+def product(parameters: Array, s: Complex, zeros: int, sign: float) -> tuple[Complex, Complex]:
+    """Everything that is fitted, at s in units of the fit (bins,), and each 1 + b s + a s² (sections, bins)."""
+    sections = 1.0 + parameters[2::2, None] * s + parameters[3::2, None] * s**2
+    value = sign * np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0) / np.prod(sections[zeros:], axis=0)
+    return np.asarray(value), np.asarray(sections)
 
 
 def _same(m: Mode, other: Mode) -> bool:

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.fit.rational import Array, Complex, Rational
+from pipelines.fit.rational import Array, Complex, Rational, known_part, product
 
-__all__ = ["evaluate", "fit_rational"]
+__all__ = ["fit_rational"]
 
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # tried for a new pair of poles
 _FREQUENCIES = 150  # tried for it
@@ -37,12 +37,18 @@ class _Data:
     unit: float  # [rad/s]
     with_delay: bool
     sign: float
-    independent: float  # bins that count
+    correlated: float  # neighbouring bins that carry one independent estimate
+    freedom: float  # of the variance; infinite where it is known
+
+    @property
+    def independent(self) -> float:
+        """Bins that count."""
+        return len(self.s) / self.correlated
 
 
 def fit_rational(frequency: Array, response: Complex, variance: Array, *, integrators: int = 0, hold: float = 0.0,
                  most: int = 6, fewest: int = 0, with_delay: bool = True, correlated: float = 1.0,
-                 floor: float = 1e-3) -> Rational:
+                 freedom: float = np.inf, floor: float = 1e-3) -> Rational:
     """The rational function of the shortest description.
 
     Args:
@@ -54,20 +60,21 @@ def fit_rational(frequency: Array, response: Complex, variance: Array, *, integr
         most, fewest: sections of the denominator.
         with_delay: find one, positive or negative; else it is 0.
         correlated: neighbouring bins that carry one independent estimate.
+        freedom: degrees of freedom of the variance, as of a `Responses`; infinite where it is known.
         floor: relative deviation that every bin has at least, for what the model leaves out.
 
     Raises:
         InputRejected: T08, fewer bins than three times the parameters of one section; D09, not one bin with a finite variance.
     """
-    frequency, data = _prepare(frequency, response, variance, integrators, hold, with_delay, correlated, floor)
+    frequency, data = _prepare(frequency, response, variance, integrators, hold, with_delay, correlated, freedom, floor)
     shell = Rational(np.zeros(2), np.zeros((2, 2)), data.sign, 0, 0, integrators, hold, data.unit,
                      (float(frequency[0]), float(frequency[-1])), np.inf, np.inf)
-    current = _refine(data, replace(shell, parameters=np.array([_log_gain(data), 0.0])), correlated)
+    current = _refine(data, replace(shell, parameters=np.array([_log_gain(data), 0.0])))
     best, waited = (current if fewest == 0 else shell), 0
     for order in range(1, most + 1):
         if 2 + 4 * order > data.independent:
             break
-        square, fewer = _grow(data, current, True, correlated), _grow(data, current, False, correlated)
+        square, fewer = _grow(data, current, True), _grow(data, current, False)
         current = square
         if order < fewest:
             continue
@@ -79,20 +86,8 @@ def fit_rational(frequency: Array, response: Complex, variance: Array, *, integr
     return best
 
 
-def evaluate(model: Rational, frequency: Array) -> Complex:
-    """H at these frequencies [Hz]."""
-    s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-    value, _ = _value(model.parameters, np.asarray(s / model.unit), model.zeros, model.sign)
-    return np.asarray(value * _known(s, model.integrators, model.hold))
-
-
-def _known(s: Complex, integrators: int, hold: float) -> Complex:
-    held = -np.expm1(-s * hold) / (s * hold) if hold > 0.0 else np.ones_like(s)
-    return np.asarray(held / s**integrators)
-
-
 def _prepare(frequency: Array, response: Complex, variance: Array, integrators: int, hold: float, with_delay: bool,
-             correlated: float, floor: float) -> tuple[Array, _Data]:
+             correlated: float, freedom: float, floor: float) -> tuple[Array, _Data]:
     good = np.isfinite(response) & np.isfinite(variance) & (frequency > 0.0) & (response != 0.0)
     if not good.any():
         raise InputRejected("D09", "no frequency at which the response is known",
@@ -102,80 +97,104 @@ def _prepare(frequency: Array, response: Complex, variance: Array, integrators: 
     if len(frequency) < 18:
         raise InputRejected("T08", f"{len(frequency)} frequencies are too few for a mode",
                             remedy="record longer, or ask for a finer resolution or a wider band")
-    known = _known(s, integrators, hold)
+    known = known_part(s, integrators, hold)
     target = response[good] / known
     spread = variance[good] / np.abs(known) ** 2 + (floor**2 + _EXACT) * np.abs(target) ** 2
     unit = float(2.0 * np.pi * np.sqrt(frequency[0] * frequency[-1]))
     lowest = target[:max(3, len(target) // 20)]
     sign = 1.0 if (lowest.real / np.abs(lowest)).sum() >= 0.0 else -1.0
-    return frequency, _Data(s / unit, target, np.sqrt(2.0 / spread), unit, with_delay, sign, len(frequency) / correlated)
+    return frequency, _Data(s / unit, target, np.sqrt(2.0 / spread), unit, with_delay, sign, correlated, freedom)
 
 
 def _log_gain(data: _Data) -> float:
     return float(np.median(np.log(np.abs(data.target))))
 
 
-def _value(parameters: Array, s: Complex, zeros: int, sign: float) -> tuple[Complex, Complex]:
-    """Π of everything that is fitted, and the sections 1 + b s + a s² (sections, bins)."""
-    sections = 1.0 + parameters[2::2, None] * s + parameters[3::2, None] * s**2
-    value = sign * np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0) / np.prod(sections[zeros:], axis=0)
-    return np.asarray(value), np.asarray(sections)
-
-
-def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Array, Array]:
-    """Weighted residual and its Jacobian, real above imaginary. ∂H/∂b = ± H s / section, ∂H/∂a = ± H s² / section."""
-    value, sections = _value(parameters, data.s, zeros, data.sign)
+def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Complex, Complex]:
+    """Residual (bins,) and Jacobian (parameters, bins), weighted. ∂H/∂b = ± H s / section, ∂H/∂a = ± H s² / section."""
+    value, sections = product(parameters, data.s, zeros, data.sign)
     sign = np.where(np.arange(len(sections)) < zeros, 1.0, -1.0)[:, None]
     slope = np.empty((len(parameters), len(data.s)), dtype=np.complex128)
     slope[0], slope[1] = value, -data.s * value if data.with_delay else 0.0
     slope[2::2] = sign * value * data.s / sections
     slope[3::2] = slope[2::2] * data.s
-    rest, slope = (value - data.target) * data.weight, slope * data.weight
-    return np.concatenate([rest.real, rest.imag]), np.concatenate([slope.real, slope.imag], axis=1).T
+    return np.asarray((value - data.target) * data.weight), slope * data.weight
 
 
-def _refine(data: _Data, start: Rational, correlated: float) -> Rational:
-    """The nearest smallest sum of squares, with covariance and description length."""
+def _cost(rest: Complex, freedom: float) -> tuple[float, Array]:
+    """-2 log-likelihood, and the weights (bins,) with which least squares lowers it.
+
+    Where the variance is itself an estimate with ν degrees of freedom, |Ĝ - H|² / variance = u is F-distributed, and the sum is
+    Σ 2 (ν + 1) log(1 + u / ν), weights (ν + 1) / (ν + u); with ν = ∞ it is Σ 2 u, weights 1.
+    """
+    twice = rest.real**2 + rest.imag**2
+    if not np.isfinite(freedom):
+        return float(twice.sum()), np.ones(len(rest))
+    u = 0.5 * twice
+    return float(2.0 * (freedom + 1.0) * np.log1p(u / freedom).sum()), np.asarray((freedom + 1.0) / (freedom + u))
+
+
+def _refine(data: _Data, start: Rational) -> Rational:
+    """The nearest most likely parameters: by least squares first, then with what is known of the variance."""
+    p = _descend(data, start, np.inf)
+    return _judged(data, replace(start, parameters=p if data.freedom == np.inf else
+                                 _descend(data, replace(start, parameters=p), data.freedom)))
+
+
+def _descend(data: _Data, start: Rational, freedom: float) -> Array:
+    """Gauss-Newton steps, shortened until the cost decreases."""
     p, damping = start.parameters, 1e-3
     with np.errstate(all="ignore"):
         rest, slope = _residual(data, p, start.zeros)
-        cost = float(rest @ rest)
+        cost, w = _cost(rest, freedom)
         for _ in range(_STEPS):
-            normal, gradient = slope.T @ slope, slope.T @ rest
+            normal, gradient = _normal(slope, w), (np.conj(slope) @ (w * rest)).real
             scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
             matrix = normal / scale / scale[:, None]
             before = cost
             while damping < 1e8:
                 step = np.linalg.solve(matrix + damping * np.eye(len(p)), gradient / scale) / scale
                 tried, its_slope = _residual(data, p - step, start.zeros)
-                its_cost = float(tried @ tried)
+                its_cost, its_w = _cost(tried, freedom)
                 if its_cost < cost:
-                    p, rest, slope, cost, damping = p - step, tried, its_slope, its_cost, max(damping / 10.0, 1e-12)
+                    p, rest, slope, cost, w, damping = p - step, tried, its_slope, its_cost, its_w, max(damping / 10.0, 1e-12)
                     break
                 damping *= 4.0
             if not before - cost > _STOP * before:
                 break
-    return _judged(data, replace(start, parameters=p), cost, slope, correlated)
+    return p
 
 
-def _judged(data: _Data, model: Rational, cost: float, slope: Array, correlated: float) -> Rational:
-    """Covariance (JᵀJ)⁻¹, wider where bins are correlated or the model does not fit; description 2 log-likelihood + k log n."""
+def _normal(slope: Complex, w: Array) -> Array:
+    """Re J W Jᴴ, of real and imaginary part side by side."""
+    both = slope.view(np.float64)
+    return np.asarray((both * np.repeat(w, 2)) @ both.T)
+
+
+def _judged(data: _Data, model: Rational) -> Rational:
+    """Covariance and length of the description, -2 log-likelihood + k log n.
+
+    The information of a bin whose variance has ν degrees of freedom is ν / (ν + 2) of what its weight says. The covariance is wider
+    where bins are correlated, or where the model does not fit.
+    """
+    rest, slope = _residual(data, model.parameters, model.zeros)
+    cost, w = _cost(rest, data.freedom)
     free = np.ones(len(model.parameters), dtype=bool)
     free[1] = data.with_delay
-    degrees = max(2.0 * len(data.s) - float(free.sum()), 1.0)
-    misfit = cost / degrees
-    normal = slope[:, free].T @ slope[:, free]
+    misfit = float((w * np.abs(rest) ** 2).sum()) / max(2.0 * len(data.s) - float(free.sum()), 1.0)
+    normal = _normal(slope[free], w)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / scale / scale[:, None], rcond=1e-14, hermitian=True) / scale / scale[:, None]
+    wider = data.correlated * max(misfit, 1.0) * (1.0 if data.freedom == np.inf else 1.0 + 2.0 / data.freedom)
     covariance = np.zeros((len(free), len(free)))
-    covariance[np.ix_(free, free)] = inverse * correlated * max(misfit, 1.0)
-    description = cost / correlated + float(free.sum()) * np.log(2.0 * data.independent)
+    covariance[np.ix_(free, free)] = inverse * wider
+    description = cost / data.correlated + float(free.sum()) * np.log(2.0 * data.independent)
     return replace(model, covariance=covariance, misfit=misfit, description=float(description))
 
 
-def _grow(data: _Data, model: Rational, with_zeros: bool, correlated: float) -> Rational:
+def _grow(data: _Data, model: Rational, with_zeros: bool) -> Rational:
     """One more pair of poles, and one of zeros or none: the best of the trials, refined."""
-    value, _ = _value(model.parameters, data.s, model.zeros, data.sign)
+    value, _ = product(model.parameters, data.s, model.zeros, data.sign)
     weight, ratio = (data.weight * np.abs(value)) ** 2, data.target / value
     frequencies = np.abs(data.s[::max(1, len(data.s) // _FREQUENCIES)])
     a = np.repeat(1.0 / frequencies**2, len(_DAMPINGS))
@@ -187,7 +206,7 @@ def _grow(data: _Data, model: Rational, with_zeros: bool, correlated: float) -> 
         between = 2 + 2 * model.zeros
         p = np.concatenate([base, model.parameters[2:between], zero[k], model.parameters[between:], [b[k], a[k]]])
         started = replace(model, parameters=p, zeros=model.zeros + int(with_zeros), poles=model.poles + 1)
-        found.append(_refine(data, started, correlated))
+        found.append(_refine(data, started))
     return min(found, key=lambda one: one.description)
 
 

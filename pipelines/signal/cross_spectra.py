@@ -70,14 +70,14 @@ class CrossSpectra:
         noise = own - response[:, :, None] * np.conj(response)[:, None, :] * power[:, None, None]
         n = self.averages
         return Responses(self.frequency[1:], response, noise / ((n - 1.0) * power)[:, None, None], coherence, "welch",
-                         _HANN_WIDTH * float(self.frequency[1]), n, _HANN_BINS)
+                         _HANN_WIDTH * float(self.frequency[1]), n, _HANN_BINS, n - 1.0)
 
     def second_estimate(self, source: int, output: int) -> FrequencyResponse:
         """H₂ = Φ_zz / Φ_zx: unbiased where the noise is in the source instead. Variance as that of H₁, over the coherence."""
         first = self.responses(source, (output,)).of(0)
         coherence = np.where(first.coherence > 0.0, first.coherence, np.nan)
         return FrequencyResponse(first.frequency, first.response / coherence, first.variance / coherence**2, first.coherence,
-                                 "welch", first.resolution, first.averages, first.correlated)
+                                 "welch", first.resolution, first.averages, first.correlated, first.freedom)
 
 
 def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> CrossSpectra:

@@ -39,6 +39,7 @@ class FrequencyResponse:
     resolution: float  # [Hz] width of what one estimate looks at
     averages: float  # independent averages in one estimate
     correlated: float  # neighbouring bins that together carry one independent estimate, at least 1
+    freedom: float = np.inf  # degrees of freedom of the variance
 
     def within(self, low: float, high: float) -> FrequencyResponse:
         """The bins with low ≤ frequency ≤ high [Hz]."""
@@ -47,12 +48,12 @@ class FrequencyResponse:
     def where(self, kept: npt.NDArray[np.bool_]) -> FrequencyResponse:
         """The bins that are `kept` (bins,)."""
         return FrequencyResponse(self.frequency[kept], self.response[kept], self.variance[kept], self.coherence[kept], self.method,
-                                 self.resolution, self.averages, self.correlated)
+                                 self.resolution, self.averages, self.correlated, self.freedom)
 
     def times(self, factor: Complex) -> FrequencyResponse:
         """Response times a `factor` (bins,) that is exactly known, as (jω)² of a second derivative or 1/(jω)."""
         return FrequencyResponse(self.frequency, self.response * factor, self.variance * np.abs(factor) ** 2, self.coherence,
-                                 self.method, self.resolution, self.averages, self.correlated)
+                                 self.method, self.resolution, self.averages, self.correlated, self.freedom)
 
     def magnitude_band(self, confidence: float = 0.95) -> tuple[Array, Array]:
         """Lowest and highest magnitude (bins,) in the disc that holds the true response with this probability.
@@ -86,11 +87,13 @@ class Responses:
     resolution: float  # [Hz]
     averages: float
     correlated: float
+    freedom: float = np.inf
 
     def of(self, output: int) -> FrequencyResponse:
         """That to one output."""
         return FrequencyResponse(self.frequency, self.response[:, output], self.covariance[:, output, output].real,
-                                 self.coherence[:, output], self.method, self.resolution, self.averages, self.correlated)
+                                 self.coherence[:, output], self.method, self.resolution, self.averages, self.correlated,
+                                 self.freedom)
 
 
 def closed_loop(responses: Responses, output: int = 1, input: int = 0) -> FrequencyResponse:
@@ -108,7 +111,7 @@ def closed_loop(responses: Responses, output: int = 1, input: int = 0) -> Freque
     lower = np.minimum(responses.coherence[:, output], responses.coherence[:, input])
     return FrequencyResponse(responses.frequency, plant, np.maximum(spread, 0.0) / np.abs(safe) ** 2,
                              np.where(there, lower, 0.0), responses.method, responses.resolution, responses.averages,
-                             responses.correlated)
+                             responses.correlated, responses.freedom)
 
 
 def indirect(sensitivity: FrequencyResponse, controller: Complex) -> FrequencyResponse:
@@ -123,7 +126,8 @@ def indirect(sensitivity: FrequencyResponse, controller: Complex) -> FrequencyRe
     plant = np.where(there, (1.0 - s) / safe, np.nan)
     variance = sensitivity.variance / np.abs(safe * np.where(there, s, 1.0)) ** 2
     return FrequencyResponse(sensitivity.frequency, plant, variance, np.where(there, sensitivity.coherence, 0.0),
-                             sensitivity.method, sensitivity.resolution, sensitivity.averages, sensitivity.correlated)
+                             sensitivity.method, sensitivity.resolution, sensitivity.averages, sensitivity.correlated,
+                             sensitivity.freedom)
 
 
 def bands_below(frequency: Array, coherence: Array, limit: float = 0.7) -> tuple[tuple[float, float], ...]:

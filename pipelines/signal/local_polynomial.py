@@ -130,4 +130,4 @@ def _together(found: list[_Local], frequency: Array) -> Responses:
     correlated = max(1.0, averages / sum(one.bins for one in found) / spacing)
     covariance = np.where(there[:, None, None], noise / np.where(there, whole, 1.0)[:, None, None], np.inf)
     return Responses(frequency, np.where(there[:, None], response, np.nan), covariance, coherence, "local polynomial",
-                     max(one.width for one in found), averages, correlated)
+                     max(one.width for one in found), averages, correlated, float(freedom))

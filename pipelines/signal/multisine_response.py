@@ -99,20 +99,30 @@ def multisine_responses(realisations: Sequence[Array], rate: float, period: int,
     each = np.stack([one.mean[lines, 1:] / one.mean[lines, :1] for one in found])
     noise = np.stack([one.noise[lines, 1:, 1:] / (np.abs(one.mean[lines, 0]) ** 2)[:, None, None] for one in found])
     response, frequency = each.mean(axis=0), np.asarray(lines * (rate / period), dtype=np.float64)
-    total = None
+    total, pooled = None, -(-_FREEDOM // max(m - 1, 1)) | 1
     if m > 1:
         rest = each - response
-        total = np.einsum("mka,mkb->kab", rest, np.conj(rest)) / ((m - 1) * m)
+        total = _pooled(np.einsum("mka,mkb->kab", rest, np.conj(rest)) / ((m - 1) * m), np.abs(response), pooled)
     periods = tuple(one.periods for one in found)
 
-    def responses(covariance: Complex) -> Responses:
+    def responses(covariance: Complex, freedom: int) -> Responses:
         own = np.diagonal(covariance, axis1=1, axis2=2).real * sum(periods)  # of one period
         return Responses(frequency, response, covariance, np.abs(response) ** 2 / np.maximum(np.abs(response) ** 2 + own, 1e-300),
-                         "multisine", rate / period, float(sum(periods)), 1.0)
+                         "multisine", rate / period, float(sum(periods)), 1.0, float(freedom))
 
     amplitude = np.mean([np.abs(one.mean[lines, 1:]) for one in found], axis=0)
-    return MultisineResponses(responses(noise.sum(axis=0) / m**2), None if total is None else responses(total),
-                              _detection(found, lines, rate / period), amplitude, periods, m)
+    return MultisineResponses(responses(noise.sum(axis=0) / m**2, m * _FREEDOM),
+                              None if total is None else responses(total, pooled * (m - 1)), _detection(found, lines, rate / period), amplitude, periods, m)
+
+
+def _pooled(covariance: Complex, size: Array, neighbours: int) -> Complex:
+    """The mean of `neighbours` lines, relative to the `size` of the responses (lines, outputs).
+
+    Few realisations tell little of one line; distortion is smooth over the lines (Pintelon, Schoukens 2012, §3.4).
+    """
+    scale = np.maximum(size, 1e-300)[:, :, None] * np.maximum(size, 1e-300)[:, None, :]
+    around = np.clip(np.arange(len(size))[:, None] + np.arange(neighbours) - neighbours // 2, 0, len(size) - 1)
+    return np.asarray((covariance / scale)[around].mean(axis=1) * scale)
 
 
 def _lines(x: Array, period: int, order: int) -> _Lines:
