@@ -25,6 +25,7 @@ What a search over effects asks, so that it need not know any of them:
     fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
     possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
     per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
+    acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
     reported             the parameters as causes.md names them
 
 The columns of an effect need not be independent of each other, nor all seen, on every arm: solve with a rank threshold. Each
@@ -39,6 +40,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
@@ -123,7 +125,7 @@ class Hooks:
     (a delay line): after `sensor` was asked, before the command acts. A command is the torque as it reaches this effect:
     of several the last one meets it first. The motion handed in is the true one with ddq
     zero: what multiplies acceleration goes to `inertia` or `arm`. Where a sensor is in error, `settled` says where the arm
-truly is at rest when it reads its first position, so that the run does not begin with a jump.
+    truly is at rest when it reads its first position, so that the run does not begin with a jump.
     """
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
@@ -180,6 +182,10 @@ class Effect(ABC):
     def full(self) -> Self:
         """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
         return self
+
+    def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
+        """The samples in which it acts, where it acts for a moment only."""
+        return None
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ class Plant:
     curves: ManyCurves
     hooks: tuple[Hooks, ...]  # of all other effects
     needed: Callable[[Motion], Array]  # torque that a motion at the start needs [N m], for memories that are not empty
+    records: tuple[Callable[[Array, Array], Array], ...] = ()  # what comes between a command and the log
 
     @classmethod
     def of(cls, arm: Arm, p: Array | None = None) -> Plant:
@@ -51,7 +52,7 @@ class Plant:
         if p is not None and (p.ndim != 2 or p.shape[1] != len(arm.p)):
             raise ValueError(f"p has the shape {p.shape}, wanted is (replicas, {len(arm.p)})")
         rigid, acting_on = Arm(arm.name, arm.body, arm.base), cast("ArmModel", arm.nominal)
-        curves, hooks, added = [], [], np.zeros((arm.n_joints, arm.n_joints))
+        curves, hooks, records, added = [], [], [], np.zeros((arm.n_joints, arm.n_joints))
         laws = [(law, True) for law in arm.friction]
         for acting, friction in (*laws, *((effect, False) for effect in arm.effects)):
             curve = acting.effect.speed_curve(acting.values)
@@ -61,14 +62,22 @@ class Plant:
             own = acting.effect.simulate(rigid if friction else acting_on, acting.values)
             acting_on = acting_on if own.arm is None else own.arm
             added = added if own.inertia is None else added + own.inertia
+            records += [own.record] if own.record else []
             if any((own.load, own.actuator, own.sensor, own.settled, own.states)):
                 hooks.append(own)
         parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
-        return cls(acting_on.body, parameters, added, stacked(curves, arm.n_joints), tuple(hooks), arm.nominal.torque)
+        return cls(acting_on.body, parameters, added, stacked(curves, arm.n_joints), tuple(hooks), arm.nominal.torque,
+                   tuple(records))
 
     @property
     def n_joints(self) -> int:
         return self.body.robot.n_joints
+
+    def logged(self, t: Array, tau: Array) -> Array:
+        """What the log holds of the commands tau (samples, joints)."""
+        for record in self.records:
+            tau = record(t, tau)
+        return tau
 
     @property
     def plain(self) -> bool:

@@ -46,7 +46,7 @@ class Simulated:
 
     t: Array  # [s] (samples,)
     q: Array  # [rad] as the encoders counted it
-    tau: Array  # [N m] as it was commanded
+    tau: Array  # [N m] as it was commanded, or as the recorder passed it on
     true_q: Array  # [rad]
     true_dq: Array  # [rad/s]
     steps: int  # of the integrator, a sample
@@ -86,6 +86,8 @@ def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = 
     times: Array = experiment.start_time + experiment.sample_time * np.arange(shape[0], dtype=np.float64)
     _refuse_runaway(state, shape[0], experiment)
     q, tau, moved = (np.ascontiguousarray(np.moveaxis(x, 2, 0)) for x in (counted, commanded, motion))
+    if plant.records:
+        tau = np.stack([plant.logged(times, one) for one in tau])
     return Simulated(times, q, tau, moved[..., :n], moved[..., n:], steps)
 
 

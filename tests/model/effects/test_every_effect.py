@@ -16,7 +16,7 @@ from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 
 UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "kg m^2", "N", "N m", "N m s/rad",
-         "N m/rad", "N m s^2/rad^2"}
+         "N m/rad", "N m/rad^2", "N m/rad^3", "N m s^2/rad^2"}
 FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
 
 every_effect = pytest.mark.parametrize("kind", all_effects(), ids=lambda kind: kind.name)
@@ -45,9 +45,13 @@ def placed(kind: type[Effect]) -> Effect:
 
 
 def drawn(effect: Effect, seed: int) -> dict[str, float]:
-    """Values out of the prior ranges."""
+    """Values out of the prior ranges; what counts joints or time is one of this arm, and within this motion."""
     rng = np.random.default_rng(seed)
-    return {q.name: float(rng.uniform(max(q.low, -1e3), min(q.high, 1e3))) for q in effect.parameters}
+    values = {q.name: float(rng.uniform(max(q.low, -1e3), min(q.high, 1e3))) for q in effect.parameters}
+    chosen = {q.name: float(getattr(effect, q.name)) for q in effect.parameters if q.discrete}
+    moment = {q.name: float(getattr(effect, q.name)) for q in effect.parameters if q.shape and q.name in effect.per_log}
+    values |= chosen | moment
+    return effect.at(values).values(effect.at(values).amplitudes(values))
 
 
 def without_amplitude(effect: Effect, values: dict[str, float]) -> dict[str, float]:
@@ -109,7 +113,8 @@ def test_twins_exist(kind: type[Effect], shared: Path) -> None:
 def test_place(kind: type[Effect], arm: Arm) -> None:
     """It stands at every joint once, or once for the arm; a wrong place is refused."""
     everywhere = kind.everywhere(arm.n_joints)
-    assert [effect.joint for effect in everywhere] == ([1, 2, 3] if kind.scope == "joint" else [None])
+    joints = [effect.joint for effect in everywhere]
+    assert joints in ([[1, 2, 3], [2, 3]] if kind.scope == "joint" else [[None]])
     for joint in (None, 0) if kind.scope == "joint" else (1,):
         with pytest.raises(ValueError, match="belongs to"):
             kind(joint=joint)
@@ -136,6 +141,8 @@ def test_values_and_amplitudes_are_one(kind: type[Effect]) -> None:
     effect = placed(kind).at(values)
     back = effect.values(effect.amplitudes(values))
     np.testing.assert_allclose(effect.amplitudes(back), effect.amplitudes(values), rtol=1e-9, atol=1e-12)
+    assert back == pytest.approx(values, rel=1e-7, abs=1e-9)
+    assert effect.possible(values)
     assert list(back) == [q.name for q in kind.parameters]
     assert effect.at(back) == effect
 
@@ -196,7 +203,7 @@ def test_simulation_hooks(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """It enters the simulation in some way; a plain load is its torque."""
     values = drawn(placed(kind), 6)
     hooks = placed(kind).simulate(arm, values)
-    assert any(hook is not None for hook in (hooks.load, hooks.actuator, hooks.sensor, hooks.inertia, hooks.arm))
+    assert any(hook is not None for hook in (hooks.load, hooks.actuator, hooks.sensor, hooks.inertia, hooks.arm, hooks.record))
     assert (hooks.states == 0) == (hooks.rate is None and hooks.update is None)
     if kind.simulate is Effect.simulate:
         assert hooks.load is not None

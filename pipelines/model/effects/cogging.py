@@ -1,0 +1,98 @@
+"""Cogging: a torque that ripples along the turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["Cogging"]
+
+_HIGHEST = 150.0  # order that is searched for
+_MOST = 200  # orders on the grid
+_PEAKS = 24
+
+
+@dataclass(frozen=True)
+class Cogging(Effect):
+    """τ = Σ A_m sin(m k q + φ_m), m = 1, 2, 3: the same at all speeds and in both directions.
+
+    The columns are sin mkq, cos mkq; their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks for m = 1 alone. The order k
+    need not be whole: a gear wheel may stand between motor and joint. On a prismatic joint it counts waves in 2π metres.
+    """
+
+    order: float = 12.0  # k [1/rev of the joint]
+    harmonics: int = 3  # how many m there are
+
+    name = "cogging"
+    title = "Cogging"
+    parameters = (
+        Quantity("order", "1/rev", 0.25, 1000.0, "waves in one turn of the joint", shape=True),
+        Quantity("amplitude", "N m", 0.0, 50.0, "of the first wave"),
+        Quantity("phase", "rad", -math.pi, math.pi, "angle of the first wave at the joint's zero"),
+        Quantity("order_2", "1/rev", 0.5, 2000.0, "twice the order", derived=True),
+        Quantity("amplitude_2", "N m", 0.0, 50.0, "of the second harmonic"),
+        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic"),
+        Quantity("order_3", "1/rev", 0.75, 3000.0, "three times the order", derived=True),
+        Quantity("amplitude_3", "N m", 0.0, 50.0, "of the third harmonic"),
+        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic"),
+    )
+    signature = "A torque that repeats along the turn of the joint, the same at every speed and in both directions."
+    explanation = "Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: each once or many times a turn."
+    remedy = "Add it to the feed-forward by the joint's angle; a new one points to a damaged magnet, tooth or bearing."
+    experiment = "Turn the joint slowly through its whole range, both ways, at two speeds."
+    twins = ("position_friction", "spring", "gravity_tilt", "encoder_eccentricity")
+    per_log = ("phase", "phase_2", "phase_3")  # where an encoder is zeroed at each start
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        once = np.exp(1j * self.order * self.own(motion.q))
+        waves = [once**m for m in range(1, self.harmonics + 1)]
+        return self.on_own_row(arm, *(part for wave in waves for part in (wave.imag, wave.real)))
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """From one wave in the range travelled, in steps of half of what that range can tell apart: whole ones over many turns."""
+        travel = max(float(np.ptp(self.own(motion.q))), 1e-3)
+        lowest = max(1.0, 2.0 * math.pi / travel)
+        step = max(math.pi / travel, (_HIGHEST - 1.0) / _MOST)
+        highest = max(_HIGHEST, 4.0 * lowest)
+        start = lowest if travel < 4.0 * math.pi else 1.0
+        for order in np.arange(start, highest, step if travel < 4.0 * math.pi else 1.0).tolist():
+            yield replace(self, order=order, harmonics=1)
+
+    def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
+        """The highest peaks of the residual's spectrum over angle: Σ r exp(-i k q), by bins and a Fourier transform."""
+        q, r = self.own(motion.q), self.own(residual)
+        travel = float(np.ptp(q))
+        if travel < 1e-3:
+            return
+        width = math.pi / (4.0 * _HIGHEST) if travel > 0.1 else travel / 64.0
+        bins = ((q - q.min()) / width).astype(int)
+        size = 1 << int(np.ceil(np.log2(4.0 * (bins.max() + 1))))
+        power = np.abs(np.fft.rfft(np.bincount(bins, r, minlength=size), n=size))
+        order = 2.0 * math.pi / (size * width) * np.arange(len(power))
+        wanted = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)) & (order >= max(0.25, 0.5 * 2.0 * math.pi / travel))
+        wanted &= order < 0.5 * math.pi / width
+        peaks = np.flatnonzero(wanted)
+        for peak in peaks[np.argsort(power[peaks])[::-1][:_PEAKS]]:
+            yield replace(self, order=float(order[peak]), harmonics=1)
+
+    def full(self) -> Self:
+        return replace(self, harmonics=3)
+
+    def amplitudes(self, values: Values) -> Array:
+        waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in ("", "_2", "_3")[:self.harmonics]]
+        return np.array([part for wave in waves for part in (wave.real, wave.imag)])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        pairs = [*np.reshape(np.asarray(amplitudes, dtype=float), (-1, 2)).tolist(), *[[0.0, 0.0]] * (3 - self.harmonics)]
+        found: dict[str, float] = {}
+        for m, (tail, (cosine, sine)) in enumerate(zip(("", "_2", "_3"), pairs, strict=True), start=1):
+            found |= {f"order{tail}": m * self.order, f"amplitude{tail}": math.hypot(cosine, sine),
+                      f"phase{tail}": math.atan2(sine, cosine)}
+        return found

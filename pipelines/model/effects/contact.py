@@ -1,0 +1,83 @@
+"""Something that pushes against the tip for a moment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, Values
+from pipelines.model.rigid.altered import tip_jacobian
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["Contact"]
+
+_PLACES = 8
+
+
+@dataclass(frozen=True)
+class Contact(Effect):
+    """τ = -Jᵀ F sin(π (t - t0)/D) while 0 < t - t0 < D: a push F on the tip, in the base frame, that grows and fades.
+
+    Time is that of the log. It belongs to one log: what a fit of the arm should do is to leave out its samples (`acting`).
+    """
+
+    start: float = 0.0  # t0 [s]
+    duration: float = 0.2  # D [s]
+
+    name = "contact"
+    title = "A touch at the tip"
+    scope = "arm"
+    parameters = (
+        Quantity("start", "s", -1e12, 1e12, "time of the log at which it begins", shape=True),
+        Quantity("duration", "s", 0.02, 10.0, "how long it lasts", shape=True),
+        Quantity("force", "N", 0.0, 1e5, "the largest", derived=True),
+        *(Quantity(f"force_{axis}", "N", -1e5, 1e5, f"{axis} of the largest, in the base frame") for axis in "xyz"),
+    )
+    signature = "All joints are disturbed at once, for a moment, as a force at the tip would do it."
+    explanation = "Somebody or something touched the arm, or it brushed against an obstacle."
+    remedy = "Leave the moment out of the fit; clear the workspace and record again."
+    experiment = "Repeat the same motion: what does not come again was a touch."
+    twins = ("backlash", "payload")
+    per_log = ("start", "duration", "force", "force_x", "force_y", "force_z")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        table = np.zeros((*motion.q.shape, 3))
+        during = np.flatnonzero(self.acting(motion))
+        if len(during):
+            window = np.sin(math.pi * (motion.t[during] - self.start) / self.duration)
+            table[during] = -window[:, None, None] * tip_jacobian(arm.body, motion.q[during]).transpose(0, 2, 1)
+        return table
+
+    def acting(self, motion: Motion) -> npt.NDArray[np.bool_]:
+        return np.asarray((motion.t > self.start) & (motion.t < self.start + self.duration))
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """Windows of 0.1 and 0.3 s that overlap by half."""
+        for duration in (0.1, 0.3):
+            for start in np.arange(motion.t[0], motion.t[-1] - 0.5 * duration, 0.5 * duration).tolist():
+                yield replace(self, start=start, duration=duration)
+
+    def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
+        """Where the residual, every joint by its own median size, is largest over 0.15 s."""
+        size = np.median(np.abs(residual), axis=0)
+        power = np.sum(np.square(residual / np.where(size > 0.0, size, 1.0)), axis=1)
+        width = max(1, int(np.searchsorted(motion.t, motion.t[0] + 0.15)))
+        mean = np.convolve(power, np.ones(width) / width, mode="same")
+        for _ in range(_PLACES):
+            centre = int(np.argmax(mean))
+            mean[max(0, centre - 2 * width):centre + 2 * width] = -1.0
+            for duration in (0.1, 0.2, 0.3):
+                yield replace(self, start=float(motion.t[centre]) - 0.5 * duration, duration=duration)
+
+    def amplitudes(self, values: Values) -> Array:
+        return np.array([values[f"force_{axis}"] for axis in "xyz"])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        x, y, z = map(float, amplitudes)
+        return {"start": self.start, "duration": self.duration, "force": math.hypot(x, y, z), "force_x": x, "force_y": y,
+                "force_z": z}

@@ -1,0 +1,58 @@
+"""A drive whose torque follows its command late."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.signal.first_order import rate_of_change
+
+__all__ = ["DriveLag"]
+
+
+@dataclass(frozen=True)
+class DriveLag(Effect):
+    """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt: earlier than the arm feels it."""
+
+    name = "drive_lag"
+    title = "A drive that lags"
+    parameters = (Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command"),)
+    signature = "The logged torque leads the torque that the arm feels, on one joint; more so the faster the torque changes."
+    explanation = "The current loop is slow, or the amplifier filters its command."
+    remedy = "Tune the current loop; lead the feed-forward by the time constant."
+    experiment = "Repeat an experiment at two speeds, or record the joint's frequency response."
+    twins = ("time_delay", "torque_lag", "rotor_inertia")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, rate_of_change(self.own(self.predicted(motion, arm)), motion.t))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        """The whole torque lags, other effects included."""
+        tau = predict(motion, arm) if predict is not None else arm.torque(motion)
+        tau[:, self._index] += values["time_constant"] * rate_of_change(self.own(tau), motion.t)
+        return tau
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """Exact while a command is held: τ = u + (τ_k - u) e^(-(t - t_k)/T). The memory is τ_k, t_k and u; the drive has
+        settled at the first command, and until then there is none.
+        """
+        time = max(values["time_constant"], 1e-9)
+
+        def update(motion: Motion, command: Array, states: Array) -> Array:
+            now = self.own(command)
+            reached = np.where(np.isnan(states[:, 0]), now, _reached(states, motion.t, states[:, 2], time))
+            return np.stack([reached, motion.t, now], axis=1)
+
+        def applied(command: Array, motion: Motion, states: Array) -> Array:
+            late = command.copy()
+            late[..., self._index] = _reached(states, motion.t, self.own(command), time)
+            return late
+
+        return Hooks(actuator=applied, states=3, start=lambda motion, _: np.full((len(motion.t), 3), np.nan), update=update)
+
+
+def _reached(states: Array, t: Array, command: Array, time: float) -> Array:
+    return np.asarray(command + (states[:, 0] - command) * np.exp(-np.maximum(t - states[:, 1], 0.0) / time))

@@ -1,0 +1,101 @@
+"""A base that does not stand level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.altered import carry_over, chain_of, gravity_regressor, standard_of, with_gravity
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["GravityTilt"]
+
+_UPRIGHT = 1e-6  # sine of the angle between gravity and the first axis
+
+
+@dataclass(frozen=True)
+class GravityTilt(Effect):
+    """g = |g| (cos θ down + sin θ (cos δ e_x + sin δ e_y)), e_x and e_y the base axes across nominal gravity.
+
+    A joint 1 that stands upright then feels the weight of what it carries. Where its centre of mass lies no level arm tells: two
+    more amplitudes, S sin q1 + C cos q1 on joint 1.
+    """
+
+    name = "gravity_tilt"
+    title = "A base that is not level"
+    scope = "arm"
+    parameters = (
+        Quantity("angle", "rad", 0.0, 1.5, "between true and nominal gravity"),
+        Quantity("direction", "rad", -math.pi, math.pi, "of the horizontal part of true gravity, from the base's x axis"),
+        Quantity("waist_sine", "N m", -1e4, 1e4, "S: weight of what joint 1 carries, as far as a level arm does not tell"),
+        Quantity("waist_cosine", "N m", -1e4, 1e4, "C: the same, a quarter of a turn on"),
+    )
+    signature = "Joint 1 feels gravity, and the other joints' gravity changes as joint 1 turns."
+    explanation = "The floor, the table or the mounting plate is not level, or gravity was described in other axes."
+    remedy = "Level the base, or correct gravity in the robot description."
+    experiment = "Hold the arm still, stretched out, in eight angles of joint 1, and with the elbow bent in the same eight."
+    twins = ("spring", "cogging", "torque_offset")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        size, _, first, second = _axes(arm)
+        phi = standard_of(arm.body, arm.p)
+        table = np.zeros((*motion.q.shape, 4))
+        for k, axis in enumerate((first, second)):
+            table[:, :, k] = gravity_regressor(arm.body, motion.q, size * axis) @ phi
+        table[:, 0, 2:] = _waist(motion, arm)
+        return table
+
+    def amplitudes(self, values: Values) -> Array:
+        angle, direction, sine, cosine = (values[q.name] for q in self.parameters)
+        return np.array([angle * math.cos(direction), angle * math.sin(direction), sine, cosine])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        x, y, sine, cosine = map(float, amplitudes)
+        return {"angle": math.hypot(x, y), "direction": math.atan2(y, x), "waist_sine": sine, "waist_cosine": cosine}
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        tilted = _tilted(arm, values["angle"], values["direction"]) if values["angle"] else arm
+        tau = predict(motion, tilted) if predict is not None else tilted.torque(motion)
+        tau[:, 0] += _waist(motion, arm) @ [values["waist_sine"], values["waist_cosine"]]
+        return tau
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        def load(motion: Motion, _: Array) -> Array:
+            torque = np.zeros_like(motion.q)
+            torque[:, 0] = _waist(motion, arm) @ [values["waist_sine"], values["waist_cosine"]]
+            return torque
+
+        return Hooks(load=load, arm=_tilted(arm, values["angle"], values["direction"]))
+
+
+def _axes(arm: ArmModel) -> tuple[float, Array, Array, Array]:
+    """|g|, down, and e_x, e_y: the base's x and y (z, where one of them lies along gravity) without their part along it."""
+    gravity = chain_of(arm.body).gravity
+    size = float(np.linalg.norm(gravity))
+    basis = [gravity / size] if size else [np.array([0.0, 0.0, -1.0])]
+    for axis in np.eye(3):
+        across = axis - sum((axis @ known) * known for known in basis)
+        length = float(np.linalg.norm(across))
+        if length > _UPRIGHT and len(basis) < 3:
+            basis.append(across / length)
+    return size, *basis
+
+
+def _tilted(arm: ArmModel, angle: float, direction: float) -> ArmModel:
+    size, down, first, second = _axes(arm)
+    towards = math.cos(direction) * first + math.sin(direction) * second
+    body = with_gravity(arm.body, size * (math.cos(angle) * down + math.sin(angle) * towards))
+    return arm.with_body(body, carry_over(arm.body, body) @ arm.p)
+
+
+def _waist(motion: Motion, arm: ArmModel) -> Array:
+    """(samples, 2) sin q1 and cos q1; zero where joint 1 feels gravity anyway, and its fit tells both."""
+    chain = chain_of(arm.body)
+    axis = chain.before[0].rotation[:, 2]
+    if not chain.revolute[0] or np.linalg.norm(np.cross(axis, _axes(arm)[1])) > _UPRIGHT:
+        return np.zeros((len(motion.q), 2))
+    return np.stack([np.sin(motion.q[:, 0]), np.cos(motion.q[:, 0])], axis=1)

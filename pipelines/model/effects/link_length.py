@@ -1,0 +1,68 @@
+"""A link that is not as long as described."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.altered import carry_over, with_longer_link
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["LinkLength"]
+
+_STEP = 1e-3  # [m] of the difference: torque is close to quadratic in a length
+
+
+@dataclass(frozen=True)
+class LinkLength(Effect):
+    """τ = Y(a + e) p': all beyond link k sits e further along it, along x of its frame, in a URDF towards the next joint.
+
+    p' are the base parameters of the same links in the new geometry.
+    """
+
+    link: float = 1.0  # k, 1-based: from joint k to joint k + 1
+
+    name = "link_length"
+    title = "A link of another length"
+    scope = "arm"
+    parameters = (
+        Quantity("error", "m", -1.0, 1.0, "true length minus that of the description"),
+        Quantity("link", "1", 1.0, 100.0, "which link, counted from the base", shape=True, discrete=True),
+    )
+    signature = "Gravity and inertia of the links beyond do not agree with each other."
+    explanation = "The drawing, the calibration or the robot description has another length than the arm."
+    remedy = "Measure the link and correct the robot description; the tip is off by as much."
+    experiment = "Hold the arm in static poses with the elbow bent and straight, and move it fast in the same poses."
+    twins = ("rotor_inertia", "payload", "encoder_crosstalk")
+    absorbed_by = ("base parameters, where a length only ever multiplies one of them",)
+
+    @classmethod
+    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
+        return (cls(),) if n_joints > 1 else ()
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        either = [self._altered(arm, by) for by in (_STEP, -_STEP)]
+        longer, shorter = (one.body.torque(motion.q, motion.dq, motion.ddq, one.p) for one in either)
+        return np.asarray(longer - shorter)[..., None] / (2.0 * _STEP)
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """Every link but the last, whose length no torque tells."""
+        for link in range(1, arm.n_joints):
+            yield replace(self, link=float(link))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        true = self.at(values)._altered(arm, values["error"])
+        return predict(motion, true) if predict is not None else true.torque(motion)
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        return Hooks(arm=self.at(values)._altered(arm, values["error"]))
+
+    def _altered(self, arm: ArmModel, by: float) -> ArmModel:
+        if not by:
+            return arm
+        body = with_longer_link(arm.body, int(self.link), by)
+        return arm.with_body(body, carry_over(arm.body, body) @ arm.p)

@@ -1,0 +1,62 @@
+"""A joint that gets part of another joint's torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["TorqueCrosstalk"]
+
+
+@dataclass(frozen=True)
+class TorqueCrosstalk(Effect):
+    """Applied torque of joint j = u_j - c u_i, so that the log shows u_j = τ_j + c τ_i. From the joint before, if none is given."""
+
+    from_joint: float = 0.0  # i, 1-based
+
+    name = "torque_crosstalk"
+    title = "Torque of another joint"
+    parameters = (
+        Quantity("coefficient", "1", -1.0, 1.0, "share of the other joint's torque that this joint has to give more"),
+        Quantity("from_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True),
+    )
+    signature = "A residual in proportion to another joint's torque."
+    explanation = "Two current measurements or motor cables influence each other, or a transmission leads torque past its joint."
+    remedy = "Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission."
+    experiment = "Load one joint while the others carry nothing, each in turn."
+    twins = ("torque_gain", "transmission_coupling")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.from_joint and self.joint is not None:
+            object.__setattr__(self, "from_joint", float(self.joint - 1 or 2))
+
+    @classmethod
+    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
+        return super().everywhere(n_joints) if n_joints > 1 else ()
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, self.predicted(motion, arm)[:, int(self.from_joint) - 1])
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        for other in range(1, arm.n_joints + 1):
+            if other != self.joint:
+                yield replace(self, from_joint=float(other))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        """Other effects on both joints included."""
+        tau = predict(motion, arm) if predict is not None else arm.torque(motion)
+        tau[:, self._index] += values["coefficient"] * tau[:, int(values["from_joint"]) - 1]
+        return tau
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        def applied(command: Array, motion: Motion, _: Array) -> Array:
+            mixed = command.copy()
+            mixed[..., self._index] -= values["coefficient"] * command[..., int(values["from_joint"]) - 1]
+            return mixed
+
+        return Hooks(actuator=applied)

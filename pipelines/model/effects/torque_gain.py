@@ -1,0 +1,56 @@
+"""A drive that gives more or less torque than it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["TorqueGain"]
+
+_LEAST = 1e-6  # of the torque that arrives
+
+
+@dataclass(frozen=True)
+class TorqueGain(Effect):
+    """Applied torque = (1 + ε) logged torque, so that the log shows τ/(1 + ε), τ the model's torque.
+
+    The column is τ, its amplitude c = 1/(1 + ε) - 1.
+    """
+
+    name = "torque_gain"
+    title = "Wrong torque scale"
+    parameters = (Quantity("gain_error", "1", -0.7, 2.0, "applied torque = (1 + gain_error) logged torque"),)
+    signature = "A residual in proportion to the joint's own torque, at all speeds and in all postures."
+    explanation = "Torque constant, current measurement or gear ratio is not what the log assumes; magnets lose strength."
+    remedy = "Correct the torque constant; where it fell, look at the motor's magnets and the amplifier."
+    experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
+    twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
+    needs = ("a known payload, where all joints have the same error",)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, self.own(self.predicted(motion, arm)))
+
+    def amplitudes(self, values: Values) -> Array:
+        return np.array([1.0 / (1.0 + values["gain_error"]) - 1.0])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        return {"gain_error": 1.0 / max(1.0 + float(amplitudes[0]), _LEAST) - 1.0}
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        """The whole torque is scaled, other effects included."""
+        tau = predict(motion, arm) if predict is not None else arm.torque(motion)
+        tau[:, self._index] /= 1.0 + values["gain_error"]
+        return tau
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        def applied(command: Array, motion: Motion, _: Array) -> Array:
+            scaled = command.copy()
+            scaled[..., self._index] *= 1.0 + values["gain_error"]
+            return scaled
+
+        return Hooks(actuator=applied)

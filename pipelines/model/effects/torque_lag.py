@@ -1,0 +1,46 @@
+"""A logged torque that went through a low-pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.signal.first_order import held_mean, lagging, rate_of_change
+
+__all__ = ["TorqueLag"]
+
+
+@dataclass(frozen=True)
+class TorqueLag(Effect):
+    """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once."""
+
+    name = "torque_lag"
+    title = "A torque that is logged late"
+    parameters = (Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one"),)
+    signature = "The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative."
+    explanation = "The recorder, or the current measurement, filters the torque before it is logged."
+    remedy = "Log the torque unfiltered, or filter position by the same low-pass; the arm itself is in order."
+    experiment = "Repeat an experiment at two speeds: a fit at one must hold at the other."
+    twins = ("time_delay", "drive_lag", "rotor_inertia")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, -rate_of_change(self.own(self.predicted(motion, arm)), motion.t))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        """The whole torque goes through the low-pass H, other effects included: y = H τ = τ - T H dτ/dt."""
+        tau = predict(motion, arm) if predict is not None else arm.torque(motion)
+        time = values["time_constant"]
+        tau[:, self._index] -= time * lagging(rate_of_change(self.own(tau), motion.t), motion.t, time)
+        return tau
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """The arm moves as without it; only the log differs."""
+        def record(t: Array, command: Array) -> Array:
+            logged = command.copy()
+            logged[:, self._index] = held_mean(self.own(command), float(np.median(np.diff(t))), values["time_constant"])
+            return logged
+
+        return Hooks(record=record)

@@ -1,0 +1,74 @@
+"""A drive that cannot give all the torque it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["TorqueSaturation"]
+
+
+@dataclass(frozen=True)
+class TorqueSaturation(Effect):
+    """Applied torque = u - e, e = sign(u) max(|u| - L, 0), u the logged torque: the log shows e more than the arm feels.
+
+    The arm's motion tells the torque that came out, never what was asked for above L: u is `Motion.tau`, or where there is none
+    the predicted torque. As other torques are, e is centred: ½ (e_k + e_{k-1}), for u is held over each sample.
+    """
+
+    limit: float = 10.0  # L [N m]
+
+    name = "torque_saturation"
+    title = "Torque that is clipped"
+    parameters = (
+        Quantity("limit", "N m", 1e-3, 1e5, "largest torque that comes out", shape=True),
+        Quantity("coefficient", "1", 0.0, 2.0, "share of the excess that is lost: 1 where the drive clips"),
+    )
+    signature = "The log shows more torque than the arm feels, only where the torque is high."
+    explanation = "Current or voltage is limited, or the motor saturates; the command is logged all the same."
+    remedy = "Correct the limit in the controller's settings, or ask for less acceleration; look at supply and temperature limits."
+    experiment = "Repeat the experiment slower, so that the torque stays below the limit."
+    twins = ("torque_gain", "load_friction", "quadratic_drag")
+    fixed_amplitudes = (1.0,)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, self._excess(motion, self.own(self._asked(motion, arm)), self.limit))
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """Parts of the largest torque that is asked for."""
+        peak = max(float(np.abs(self.own(self._asked(motion, arm))).max()), 1e-3)
+        for share in (0.45, 0.55, 0.65, 0.75, 0.82, 0.88, 0.94):
+            yield replace(self, limit=float(np.clip(share * peak, 1e-3, 1e5)))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        tau = predict(motion, arm) if predict is not None else arm.torque(motion)
+        asked = self.own(tau if motion.tau is None else motion.tau)
+        tau[:, self._index] += values["coefficient"] * self._excess(motion, asked, values["limit"])
+        return tau
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        def applied(command: Array, motion: Motion, _: Array) -> Array:
+            left = command.copy()
+            left[..., self._index] -= values["coefficient"] * _above(self.own(command), values["limit"])
+            return left
+
+        return Hooks(actuator=applied)
+
+    def _asked(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.predicted(motion, arm) if motion.tau is None else motion.tau
+
+    def _excess(self, motion: Motion, asked: Array, limit: float) -> Array:
+        excess = _above(asked, limit)
+        if motion.tau is not None:
+            excess[1:] = 0.5 * (excess[1:] + excess[:-1])
+        return excess
+
+
+def _above(torque: Array, limit: float) -> Array:
+    return np.asarray(torque - np.clip(torque, -limit, limit))

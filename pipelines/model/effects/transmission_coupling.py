@@ -1,0 +1,89 @@
+"""A motor that turns with two joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["TransmissionCoupling"]
+
+
+@dataclass(frozen=True)
+class TransmissionCoupling(Effect):
+    """τ_s = J ds/dt + B s + C tanh(w s), s = v_j + ρ v_i, a load of τ_s on joint j and of ρ τ_s on joint i.
+
+    ρ is what the robot's transmission matrix N says of the motor that both share: N_ki/N_kj, k one of the two; 1 without one.
+    Of the two joints j is the later, for s does not tell them apart.
+    """
+
+    with_joint: float = 0.0  # i, 1-based; the joint before, if none is given
+    sharpness: float = 100.0  # w [s/rad]
+
+    name = "transmission_coupling"
+    title = "A motor that turns with two joints"
+    parameters = (
+        Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True),
+        Quantity("inertia", "kg m^2", 0.0, 100.0, "of the motor, at joint side"),
+        Quantity("viscous", "N m s/rad", 0.0, 500.0, "viscous friction of the motor, at joint side"),
+        Quantity("coulomb", "N m", 0.0, 500.0, "dry friction of the motor, at joint side"),
+        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which dry friction changes sign", shape=True),
+    )
+    signature = "Inertia and friction that follow the sum of two joints' speeds, felt at both."
+    explanation = "One joint's motor sits before the other joint, and turns when either moves: a differential, a long shaft."
+    remedy = "Describe the transmission matrix in the robot description and keep this effect in the model."
+    experiment = "Move the two joints together, against each other, and each alone."
+    twins = ("load_friction", "torque_crosstalk", "rotor_inertia")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.with_joint and self.joint is not None:
+            object.__setattr__(self, "with_joint", float(self.joint - 1 or 2))
+
+    @classmethod
+    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
+        return tuple(cls(joint=k) for k in range(2, n_joints + 1))
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        other, ratio = int(self.with_joint) - 1, self._ratio(arm)
+        speed, acceleration = (self.own(x) + ratio * x[..., other] for x in (motion.dq, motion.ddq))
+        table = self.on_own_row(arm, acceleration, speed, np.tanh(self.sharpness * speed))
+        table[:, other] = ratio * table[:, self._index]
+        return table
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """The joints that share a motor by the transmission matrix; the one before, where there is none."""
+        matrix = arm.robot.drive.transmission if arm.robot.drive is not None else None
+        own, earlier = self._index, range(self._index)
+        shared = [i for i in earlier if matrix is not None and (matrix[own][i] or matrix[i][own])]
+        for other in shared or [own - 1 if own else 1]:
+            for sharpness in (20.0, 100.0, 500.0):
+                yield replace(self, with_joint=other + 1.0, sharpness=sharpness)
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """Its inertia belongs to the arm's: J (1, ρ)ᵀ (1, ρ)."""
+        shaped = self.at(values)
+        own = np.zeros(arm.n_joints)
+        own[self._index], own[int(shaped.with_joint) - 1] = 1.0, shaped._ratio(arm)
+        b, c, w = values["viscous"], values["coulomb"], values["sharpness"]
+
+        def load(motion: Motion, _: Array) -> Array:
+            speed = motion.dq @ own
+            return np.asarray((b * speed + c * np.tanh(w * speed))[:, None] * own)
+
+        return Hooks(load=load, inertia=values["inertia"] * np.outer(own, own))
+
+    def _ratio(self, arm: ArmModel) -> float:
+        matrix = arm.robot.drive.transmission if arm.robot.drive is not None else None
+        j, i = self._index, int(self.with_joint) - 1
+        if matrix is None:
+            return 1.0
+        for motor in (i, j):
+            if matrix[motor][i] and matrix[motor][j]:
+                return matrix[motor][i] / matrix[motor][j]
+        return 1.0

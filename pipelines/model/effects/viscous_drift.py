@@ -1,0 +1,71 @@
+"""Viscous friction that drifts as the joint warms up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["ViscousDrift"]
+
+_FAST = 1e3  # [rad/s] where dry friction no longer changes
+
+
+@dataclass(frozen=True)
+class ViscousDrift(Effect):
+    """τ = r Fv (1 - e^(-(t - t0)/T)) v: viscous friction Fv at the start of the log, (1 + r) Fv in the end."""
+
+    time_constant: float = 15.0  # T [s]
+
+    name = "viscous_drift"
+    title = "Viscous friction that drifts"
+    parameters = (
+        Quantity("relative_change", "1", -1.0, 10.0, "of viscous friction, from the start of the log to the end of the drift"),
+        Quantity("time_constant", "s", 0.2, 1000.0, "of the drift", shape=True),
+    )
+    signature = "Torque per unit of speed that changes in the course of the log."
+    explanation = "Grease gets thinner as it warms up, and thickens again in a pause."
+    remedy = "Warm the arm up before it is measured or used; let the feed-forward follow the temperature."
+    experiment = "Repeat one cycle for several minutes from a cold start, and once more when the arm is warm."
+    twins = ("position_friction", "load_friction")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        left = np.expm1(-(motion.t - motion.t[0]) / self.time_constant)
+        return self.on_own_row(arm, -self._viscous(arm) * left * self.own(motion.dq))
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """From a fifth to five times the duration; beyond that it is a straight line."""
+        duration = max(float(np.ptp(motion.t)), 1.0)
+        for share in (0.2, 0.5, 1.5, 5.0):
+            yield replace(self, time_constant=float(np.clip(share * duration, 0.2, 1000.0)))
+
+    def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
+        """What is added when the drift has ended."""
+        return np.asarray(values["relative_change"] * self._viscous(arm) * dq)
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """Its memory is the time at which the log began."""
+        change, time = values["relative_change"] * self._viscous(arm), values["time_constant"]
+
+        def load(motion: Motion, states: Array) -> Array:
+            grown = -np.expm1(-(motion.t - states[:, 0]) / time)
+            return self.on_own_row(arm, change * grown * self.own(motion.dq))[..., 0]
+
+        return Hooks(load=load, states=1, start=lambda motion, _: motion.t[:, None], update=lambda motion, _, states: states)
+
+    def _viscous(self, arm: ArmModel) -> float:
+        """Fv [N m s/rad] of the model: what of the torque's odd part is linear in the joint's own speed, all else at rest.
+
+        Far above the speeds where friction changes sign, f(v) = Fc + Fv v + c v |v|: from three speeds v, 2v, 3v.
+        """
+        still = np.zeros((6, arm.n_joints))
+        speed = self.on_own_row(arm, _FAST * np.array([1.0, 2.0, 3.0, -1.0, -2.0, -3.0]))[..., 0]
+        tau = self.own(self.predicted(Motion(np.arange(6.0), still, speed, still), arm))
+        one, two, three = 0.5 * (tau[:3] - tau[3:])
+        bent = 0.5 * (three - 2.0 * two + one)
+        return float((two - one - 3.0 * bent) / _FAST)
