@@ -77,8 +77,13 @@ def campaign(seed: int = 0, families: Iterable[str] = (), short: bool = False) -
 
 
 def single(seed: int) -> Iterator[SealedCase]:
-    """Every cause that torque and position tell, at every joint and strength."""
+    """Every cause that torque and position tell, once at every joint where they do, at every strength."""
+    seen: set[tuple[float, str, int]] = set()
     for place, (strength, (cause, joint)) in enumerate(product(STRENGTHS, _places(EASY))):
+        if joint is not None:
+            if (strength, cause, joint) in seen:
+                continue
+            seen.add((strength, cause, joint))
         yield _case("single", seed, place, [(cause, joint, strength)], reference=place % 4 == 3)
 
 

@@ -20,7 +20,7 @@ from pipelines.bench.session import answer
 from pipelines.log.atomic import write_file
 from pipelines.log.files import write_log
 
-__all__ = ["Sealed", "answers_in", "make_case", "make_cases"]
+__all__ = ["Sealed", "answers_in", "make_case", "make_cases", "seal"]
 
 _VERDICTS = {"healthy": "nothing-wrong", "standing": "nothing-wrong", "zero": "nothing-wrong", "outside": "unknown",
              "invisible": "not-testable", "uncentred": "flagged"}
@@ -64,14 +64,15 @@ def make_case(case: SealedCase, out: Path) -> bool:
         write_log(draft / f"{log.name}.h5", log)
     for place in (folder.parent, sheet.parent):
         place.mkdir(parents=True, exist_ok=True)
-    sealed = _sealed(case, session)
+    sealed = seal(case, session)
     write_file(sheet, lambda path: _write(path, json.dumps(asdict(sealed), indent=1) + "\n"))
     shutil.rmtree(folder, ignore_errors=True)
     draft.rename(folder)
     return True
 
 
-def _sealed(case: SealedCase, session: Session) -> Sealed:
+def seal(case: SealedCase, session: Session) -> Sealed:
+    """The answer of a case."""
     verdict = _VERDICTS.get(case.family, "cause")
     findings = answer(session.hidden) if verdict != "nothing-wrong" else []
     return Sealed(case.key, case.family, verdict, tuple(findings), tuple(answer(session.standing)), asdict(case))
