@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eig, expm
 
 from pipelines.bench.fault import Fault
@@ -23,6 +24,7 @@ from pipelines.log.experiment import Array
 
 __all__ = ["Truth", "linearised"]
 
+Complex = NDArray[np.complex128]
 _SMALL = 1e-6
 
 
@@ -35,7 +37,7 @@ class Truth:
     c: Array
     delay: float  # [s] between the motion and its measurement
 
-    def response(self, frequency: Array) -> Array:
+    def response(self, frequency: Array) -> Complex:
         """q_j/r_j (frequencies,) complex [s^2]."""
         z = np.exp(2j * np.pi * frequency * SAMPLE_TIME)
         states = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None].astype(complex))
@@ -47,10 +49,9 @@ class Truth:
         pencil = np.block([[self.a, self.b[:, None]], [self.c[None], np.zeros((1, 1))]])
         mass = np.zeros((n + 1, n + 1))
         mass[:n, :n] = np.eye(n)
-        zeros = eig(pencil, mass, right=False)
-        poles, zeros = (_oscillating(values, band) for values in (np.linalg.eigvals(self.a), zeros[np.isfinite(zeros)]))
-        poles, zeros = _not_cancelled(poles, zeros)
-        return poles, zeros
+        found = np.asarray(eig(pencil, mass, right=False), dtype=np.complex128)
+        poles = np.asarray(np.linalg.eigvals(self.a), dtype=np.complex128)
+        return _not_cancelled(_oscillating(poles, band), _oscillating(found[np.isfinite(found)], band))
 
 
 def linearised(machine: Machine, joint: int, posture: Array, speed: float, inertia: Array, gains: tuple[float, float],
@@ -117,9 +118,9 @@ def _others_closed(a: Array, b: Array, reads: Array, j: int, gains: tuple[float,
     return Truth(closed, np.concatenate([b[:, j], np.zeros(count)]), np.concatenate([reads[j], np.zeros(count)]), delay)
 
 
-def _oscillating(z: Array, band: tuple[float, float]) -> Array:
+def _oscillating(z: Complex, band: tuple[float, float]) -> Array:
     """(frequency [Hz], damping ratio) of the roots that swing in the band, one of each pair."""
-    s = np.log(z[np.abs(z) > 1e-9].astype(complex)) / SAMPLE_TIME
+    s = np.log(z[np.abs(z) > 1e-9]) / SAMPLE_TIME
     s = s[(s.imag > 1e-6) & (np.abs(s.imag) < 0.99 * np.pi / SAMPLE_TIME)]
     found = np.column_stack([np.abs(s) / (2.0 * np.pi), -s.real / np.abs(s)])
     kept = found[(found[:, 0] > band[0]) & (found[:, 0] < band[1]) & (np.abs(found[:, 1]) < 0.3)]

@@ -1,0 +1,189 @@
+"""The modes of a response: where it leaves the rigid body, with frequency, damping and their deviations.
+
+    modes = fitted_modes(measured)
+
+The response over the sampled double integrator is the acceleration beside that of a rigid body that the controller's model
+describes: 1 where that model is right, whatever the hold does. A rational function is fitted to it. An antiresonance with a
+resonance above it is a part that gives way; what it carries drops out above it, and the level rises by (f_r / f_a)².
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.fit.rational import Known, Mode, Rational
+from pipelines.fit.rational_search import fit_rational
+from pipelines.log.experiment import Array
+from pipelines.model.frf.controller import Complex, loop_delay
+from pipelines.model.frf.responses import Measured, double_integrator
+from pipelines.signal.frequency_response import FrequencyResponse
+
+__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration"]
+
+BAND = (4.0, 250.0)  # [Hz] below it friction and gravity are at work, above it hardly any log has signal
+_OF_RATE = 0.3  # highest, of the rate
+_STIFFEST = 0.35  # damping ratio beyond which a pair is no mode
+_SURE = 0.05  # relative std of a frequency that is known at all
+_CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
+_STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
+_FLOOR = 1e-3  # relative deviation that every bin has at least
+_FEWEST = 12  # bins
+_FRICTION = 0.1  # of the magnitude, what friction has to change to be said
+
+
+@dataclass(frozen=True)
+class Pair:
+    """An antiresonance and the resonance above it."""
+
+    antiresonance: Mode
+    resonance: Mode
+
+    @property
+    def rise(self) -> float:
+        """(f_r / f_a)²: the level above over the level below; 1 + what dropped out over what is left."""
+        return (self.resonance.frequency.value / self.antiresonance.frequency.value) ** 2
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Of one response."""
+
+    modes: tuple[Mode, ...]  # distinct ones, by frequency
+    pairs: tuple[Pair, ...]
+    single: tuple[Mode, ...]  # that have no partner
+    level: Known  # of the rigid body above friction and below the modes, beside the model's: 1 where its inertia is right
+    level_above: Known  # above all modes
+    delay: Known  # [s], beside the hold and the controller's own delay
+    flat: float  # largest deviation from `level` of what the fit has beside the modes, as a ratio ≥ 1
+    inertia: Known | None  # [kg m^2] that the torque moves below the modes
+    friction_below: float  # [Hz] below which friction and load change the magnitude by more than a tenth; 0: nowhere
+    misfit: float  # 1 where the rational function explains all but the noise
+    band: tuple[float, float]  # [Hz] of the fit
+    fit: Rational
+
+
+def relative_acceleration(measured: Measured, response: FrequencyResponse | None = None) -> FrequencyResponse:
+    """`response` (default: the plant's) over the double integrator, sampled and delayed as the loop was."""
+    response = response or measured.plant
+    return response.times(np.asarray(1.0 / _rigid(measured, response.frequency)))
+
+
+def _rigid(measured: Measured, frequency: Array) -> Complex:
+    first = measured.first
+    _, delay = loop_delay(first.controller, first.quantity)
+    return np.asarray(double_integrator(frequency, first.sample_time, delay), dtype=np.complex128)
+
+
+def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
+    """Modes of the plant within `band` [Hz].
+
+    Raises:
+        InputRejected: T08, too few frequencies in the band.
+    """
+    relative = relative_acceleration(measured)
+    part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
+    fit = fit_rational(part.frequency, part.response, part.variance, correlated=part.correlated)
+    modes = tuple(m for m in fit.modes() if _is_mode(m))
+    pairs, single = _paired(modes)
+    rest = relative.times(1.0 / _carried(modes, relative.frequency))
+    level, delay = _level_and_delay(rest)
+    rise = float(np.prod([p.rise for p in pairs])) if pairs else 1.0
+    above = Known(level.value * rise, float(np.hypot(level.std * rise, level.value * rise * _rise_std(pairs))))
+    smooth = np.arange(_STRAIGHT[0], min(_STRAIGHT[1], part.frequency[-1]), 1.0)
+    size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
+    return Modes(modes, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
+                 _inertia(measured, level), _friction_below(relative, level), fit.misfit,
+                 (float(part.frequency[0]), float(part.frequency[-1])), fit)
+
+
+def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:
+    """Π (1 + 2ζ s/ω + s²/ω²) of antiresonances over that of resonances, 1 far below them all."""
+    s = 2j * np.pi * np.asarray(frequency)
+    value = np.ones(len(s), dtype=np.complex128)
+    for mode in modes:
+        omega = 2.0 * np.pi * mode.frequency.value
+        section = 1.0 + 2.0 * mode.damping.value * s / omega + (s / omega) ** 2
+        value = value * section if mode.kind == "antiresonance" else value / section
+    return value
+
+
+def _level_and_delay(rest: FrequencyResponse) -> tuple[Known, Known]:
+    """What the modes leave: its mean size, and the slope of its phase beside the 1/ω of friction, by weighted least squares.
+
+    Deviations hold what scatters in fact, were that more than the noise.
+    """
+    part = rest.within(*_STRAIGHT)
+    relative = np.maximum(part.variance / 2.0 / np.abs(part.response) ** 2, _FLOOR**2)
+    good = np.isfinite(relative) & (relative < 0.1)
+    weight, omega = 1.0 / relative[good], 2.0 * np.pi * part.frequency[good]
+    if good.sum() < _FEWEST:
+        return Known(float(np.median(np.abs(rest.response))), np.inf), Known(0.0, np.inf)
+    size, phase = np.log(np.abs(part.response[good])), np.angle(part.response[good] * np.exp(-1j * _turn(part.response[good])))
+    level, level_std = _weighted(np.ones((len(size), 1)), size, weight, part.correlated)
+    slope, slope_std = _weighted(np.column_stack([-omega, 1.0 / omega]), phase, weight, part.correlated)
+    value = float(np.exp(level[0]))
+    return Known(value, value * float(level_std[0])), Known(float(slope[0]), float(slope_std[0]))
+
+
+def _turn(response: Complex) -> float:
+    """Half a turn where the response is of the other sign: it is taken off before phases are compared."""
+    return 0.0 if float(np.median(np.real(response))) >= 0.0 else float(np.pi)
+
+
+def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tuple[Array, Array]:
+    root = np.sqrt(weight)
+    normal = (columns * weight[:, None]).T @ columns
+    scale = np.sqrt(np.diag(normal))
+    inverse = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
+    found = inverse @ (columns.T @ (weight * y))
+    misfit = float(np.sum((root * (y - columns @ found)) ** 2)) / max(len(y) - len(found), 1)
+    return np.asarray(found), np.sqrt(np.diag(inverse) * correlated * max(misfit, 1.0))
+
+
+def _is_mode(mode: Mode) -> bool:
+    return mode.distinct and abs(mode.damping.value) < _STIFFEST and mode.frequency.std < _SURE * mode.frequency.value
+
+
+def _paired(modes: tuple[Mode, ...]) -> tuple[tuple[Pair, ...], tuple[Mode, ...]]:
+    """Each antiresonance with the resonance that follows it."""
+    pairs, single, k = [], [], 0
+    while k < len(modes):
+        here, after = modes[k], modes[k + 1] if k + 1 < len(modes) else None
+        if after is not None and here.kind == "antiresonance" and after.kind == "resonance":
+            pairs.append(Pair(here, after))
+            k += 2
+        else:
+            single.append(here)
+            k += 1
+    return tuple(pairs), tuple(single)
+
+
+def _rise_std(pairs: tuple[Pair, ...]) -> float:
+    """Relative, of the product of all rises."""
+    parts = [2.0 * f.std / f.value for p in pairs for f in (p.antiresonance.frequency, p.resonance.frequency)]
+    return float(np.sqrt(np.sum(np.square(parts))))
+
+
+def _inertia(measured: Measured, level: Known) -> Known | None:
+    """u/τ is one number per joint, D̂ or 1: the inertia is that over the level."""
+    torque = measured.compliance.within(*_CONSTANT)
+    plant = measured.plant.within(*_CONSTANT)
+    if not len(torque.frequency) or len(torque.frequency) != len(plant.frequency):
+        return None
+    ratio = plant.response / torque.response  # τ/u
+    weight = np.abs(torque.response) ** 2 / np.maximum(torque.variance, 1e-300)
+    order = np.argsort(ratio.real)
+    middle = np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum())
+    torque_per_input = float(ratio.real[order][min(int(middle), len(order) - 1)])
+    value = torque_per_input / level.value
+    return Known(value, abs(value) * level.std / abs(level.value))
+
+
+def _friction_below(relative: FrequencyResponse, level: Known) -> float:
+    """Up to where, from below, the magnitude is a tenth off, or the coherence too low to say."""
+    low = relative.within(0.0, 2.0 * BAND[0])
+    off = np.abs(np.abs(low.response) / abs(level.value) - 1.0) > _FRICTION
+    beyond = np.flatnonzero(off & (np.sqrt(low.variance) < 0.5 * _FRICTION * abs(level.value)))
+    return float(low.frequency[beyond[-1]]) if len(beyond) else 0.0

@@ -1,0 +1,237 @@
+"""The plant's frequency response of one joint in one posture, by three methods, from all its logs.
+
+    for measured in measured_responses(logs, how): ...
+
+    closed-loop   P = Φ_vq / Φ_vu           needs no controller, no bias; the default
+    indirect      P = (1 - S)/(C S), (29)   with the controller as it was sampled
+    direct        P = Φ_uq / Φ_uu, (26)     biased where a disturbance goes round the loop, whatever its coherence says
+
+Kostić et al. 2004, Section IV.D, eq. (26)-(29). u is r under computed torque, τ under PD. Compliance and accelerance are
+those of Φ_vq / Φ_vτ. Logs of one joint and one posture are realisations: what differs between them, or between the two
+directions, beyond the noise, is distortion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
+from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
+from pipelines.signal.cross_spectra import CrossSpectra, cross_spectra
+from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
+from pipelines.signal.local_polynomial import local_polynomial
+from pipelines.signal.multisine_response import MultisineResponses, multisine_responses
+
+__all__ = ["ESTIMATORS", "How", "Measured", "double_integrator", "measured_responses"]
+
+ESTIMATORS = ("auto", "multisine", "local-polynomial", "welch")
+
+_SAME_POSTURE = 0.02  # [rad]
+_HIGHEST = 0.45  # of the rate
+_LOWEST = 0.5  # [Hz]
+_SEGMENTS = 4  # at least, for Welch's coherence and variance
+_NO_POWER = 1e-12  # of the strongest bin of the source
+_SMOOTH = 25  # lines over which distortion is compared with noise
+
+
+@dataclass(frozen=True)
+class How:
+    """How spectra are taken."""
+
+    estimator: str = "auto"  # multisine where v repeats, local-polynomial else
+    resolution: float | None = None  # [Hz] None: one over the period, or 0.25 Hz
+
+    def checked(self) -> How:
+        """Raises UsageError, C02, for what is no estimator or no resolution."""
+        if self.estimator not in ESTIMATORS:
+            raise UsageError("C02", f"'{self.estimator}' is no estimator", where="--estimator",
+                             remedy=f"one of {', '.join(ESTIMATORS)}")
+        if self.resolution is not None and not 0.01 <= self.resolution <= 20.0:
+            raise UsageError("C02", f"a resolution of {self.resolution:g} Hz", where="--resolution", remedy="give 0.01 to 20 Hz")
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One joint in one posture."""
+
+    turned: tuple[Turned, ...]  # its logs
+    plant: FrequencyResponse  # u → q by Φ_vq/Φ_vu
+    direct: FrequencyResponse
+    indirect: FrequencyResponse | None  # None: the log does not describe the controller
+    continuous: FrequencyResponse | None  # what (29) gives with k_p + k_d jω: shown, never used
+    compliance: FrequencyResponse  # τ → q [rad/N m]
+    sensitivity: FrequencyResponse  # v → u
+    with_reversal: FrequencyResponse | None  # u → q from the whole log, None where it is too short
+    distortion: float | None  # what differs between realisations over what noise explains, median of variances; None of one
+
+    @property
+    def first(self) -> Turned:
+        return self.turned[0]
+
+    @property
+    def joint(self) -> int:
+        return self.first.joint
+
+    @property
+    def others(self) -> Array:
+        """The angles of the held joints (n - 1,) [rad]."""
+        return np.delete(self.first.posture, self.joint - 1)
+
+
+def measured_responses(logs: Iterable[ExperimentLog], how: How | None = None) -> tuple[Measured, ...]:
+    """Every joint and posture in turn, by joint, then by the order of the logs.
+
+    Raises:
+        InputRejected: a log that no spectrum can be taken of, with what to record: S01, T05, T08, D09.
+    """
+    how = (how or How()).checked()
+    groups: list[list[Turned]] = []
+    for turned in sorted((turned_joint(log) for log in logs), key=lambda t: t.joint):
+        for group in groups:
+            if _together(group[0], turned):
+                group.append(turned)
+                break
+        else:
+            groups.append([turned])
+    return tuple(_measured(tuple(group), how) for group in groups)
+
+
+def _together(a: Turned, b: Turned) -> bool:
+    if a.settings() != b.settings():
+        return False
+    apart = np.delete(a.posture - b.posture, a.joint - 1)
+    return bool(np.abs(apart).max(initial=0.0) < _SAME_POSTURE)
+
+
+def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
+    first = turned[0]
+    stretches = [s for one in turned for s in one.stretches]
+    several, distortion = _excited(turned, stretches, how)
+    plant = _reliable(closed_loop(several, POSITION - 1, INPUT - 1))
+    sensitivity = several.of(INPUT - 1)
+    late, _ = loop_delay(first.controller, first.quantity)
+    shift = np.exp(2j * np.pi * plant.frequency * late * first.sample_time)
+    sampled = sampled_controller(first.controller, first.joint, plant.frequency, first.sample_time)
+    smooth = continuous_controller(first.controller, first.joint, plant.frequency) if first.controller else None
+    both = [None if c is None else indirect(sensitivity.times(shift), c / shift) for c in (sampled, smooth)]
+    segment = _segment(turned, stretches, how)
+    return Measured(turned, plant, _direct([s.signals for s in stretches], first.rate, segment), both[0], both[1],
+                    closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion)
+
+
+def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch], how: How) -> tuple[Responses, float | None]:
+    """v → (u, q, τ), and the distortion where there are realisations."""
+    first, signals = turned[0], [s.signals for s in stretches]
+    outputs = (INPUT, POSITION, TORQUE)
+    periods = {one.period for one in turned}
+    whole = [x for x in signals if first.period is not None and len(x) >= 2 * first.period]
+    periodic = len(periods) == 1 and first.period is not None and bool(whole)
+    if how.estimator == "multisine" and not periodic:
+        raise InputRejected("T07", f"v of joint {first.joint} does not repeat while the joint turns at constant speed",
+                            where=first.name,
+                            remedy="inject a periodic multisine for two periods or more, or take another estimator")
+    if how.estimator == "multisine" or (how.estimator == "auto" and periodic and first.period is not None):
+        assert first.period is not None
+        return _of_multisine(multisine_responses(whole, first.rate, first.period, V, outputs))
+    if how.estimator == "welch":
+        segment = _segment(turned, stretches, how)
+        return _in_band(_excited_bins(cross_spectra(signals, first.rate, segment), V).responses(V, outputs), first.rate), None
+    spacing = how.resolution or 0.25
+    frequency = np.arange(np.ceil(_LOWEST / spacing), np.floor(_HIGHEST * first.rate / spacing) + 1) * spacing
+    return _known(local_polynomial(signals, first.rate, frequency, V, outputs)), None
+
+
+def _of_multisine(found: MultisineResponses) -> tuple[Responses, float | None]:
+    """The response with the covariance of noise, raised where realisations differ by more than noise does.
+
+    Few realisations tell the distortion of one line badly: it is compared with the noise over neighbouring lines.
+    """
+    noise = found.noise
+    if found.total is None:
+        return noise, None
+    position = POSITION - 1
+    own, total = (np.maximum(r.covariance[:, position, position].real, 1e-300) for r in (noise, found.total))
+    ratio = total / own
+    width = min(_SMOOTH, len(ratio))
+    padded = np.pad(ratio, (width // 2, width - 1 - width // 2), mode="edge")
+    local = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+    raised = np.maximum(local, 1.0)
+    return replace(noise, covariance=noise.covariance * raised[:, None, None]), float(np.median(local))
+
+
+def _in_band(several: Responses, rate: float) -> Responses:
+    kept = (several.frequency >= _LOWEST) & (several.frequency <= _HIGHEST * rate)
+    return replace(several, frequency=several.frequency[kept], response=several.response[kept],
+                   covariance=several.covariance[kept], coherence=several.coherence[kept])
+
+
+def _known(several: Responses) -> Responses:
+    """The bins where the excitation had power."""
+    kept = np.isfinite(several.response).all(axis=1)
+    return replace(several, frequency=several.frequency[kept], response=several.response[kept],
+                   covariance=several.covariance[kept], coherence=several.coherence[kept])
+
+
+def _reliable(response: FrequencyResponse) -> FrequencyResponse:
+    if not len(response.frequency):
+        raise InputRejected("D09", "the excitation has no power at any frequency", remedy="excite the joint")
+    return response
+
+
+def _segment(turned: tuple[Turned, ...], stretches: Sequence[Stretch], how: How) -> int:
+    """Samples of Welch's segments: the period, or what the resolution asks, so many that four of them are averaged.
+
+    Raises:
+        InputRejected: T08, the record is too short for the resolution.
+    """
+    first, lengths = turned[0], [s.stop - s.start for s in stretches]
+    wanted = first.period if how.resolution is None and first.period else round(first.rate / (how.resolution or 0.25))
+
+    def count(segment: int) -> int:
+        return sum(1 + 2 * (length - segment) // segment for length in lengths if length >= segment)
+
+    if count(wanted) >= _SEGMENTS:
+        return wanted
+    if how.resolution is not None:
+        raise InputRejected("T08", f"{sum(lengths) / first.rate:.3g} s at constant speed are too short for {how.resolution:g} Hz",
+                            where=first.name,
+                            remedy=f"record {_SEGMENTS / how.resolution:.3g} s each way, or ask for a coarser one")
+    while wanted > 64 and count(wanted) < _SEGMENTS:
+        wanted //= 2
+    return wanted
+
+
+def _direct(signals: Sequence[Array], rate: float, segment: int) -> FrequencyResponse:
+    spectra = _excited_bins(cross_spectra([x[:, [INPUT, POSITION]] for x in signals], rate, segment), 0)
+    return _in_band(spectra.responses(0, (1,)), rate).of(0)
+
+
+def _with_reversal(turned: tuple[Turned, ...], how: How) -> FrequencyResponse | None:
+    """From the whole log by Welch's method: what it would have been had nothing been left out."""
+    known = [one.whole[np.isfinite(one.whole).all(axis=1)] for one in turned]
+    first = turned[0]
+    segment = first.period or round(first.rate / (how.resolution or 0.25))
+    if sum(2 * len(x) // segment for x in known) < _SEGMENTS or not any(len(x) >= segment for x in known):
+        return None
+    several = _excited_bins(cross_spectra(known, first.rate, segment), V).responses(V, (INPUT, POSITION))
+    return closed_loop(_in_band(several, first.rate))
+
+
+def _excited_bins(spectra: CrossSpectra, source: int) -> CrossSpectra:
+    """Without the bins where the source has no power beside its strongest. The first two tell the resolution and stay."""
+    power = spectra.density[:, source, source].real
+    kept = power > _NO_POWER * power.max()
+    kept[:2] = True
+    return replace(spectra, frequency=spectra.frequency[kept], density=spectra.density[kept])
+
+
+def double_integrator(frequency: Array, sample_time: float, delay: int = 0) -> Array:
+    """(z + 1) T²/(2 (z - 1)²) z^-delay (frequencies,), complex: unit inertia under a torque held over a sample."""
+    z = np.exp(2j * np.pi * np.asarray(frequency) * sample_time)
+    return np.asarray(sample_time**2 * (z + 1.0) / (2.0 * (z - 1.0) ** 2) * z ** -float(delay))
