@@ -37,6 +37,7 @@ class Coulomb(Effect):
     explanation = "Dry friction in bearings, seals and gears: its size does not depend on speed."
     remedy = "Compensate it in the feed-forward; if it has grown, check lubrication, preload and seals."
     experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
+    evidence = "none"
     twins = ("viscous", "three_sigmoid", "asymmetric_friction", "presliding")
     friction = True
 

@@ -39,6 +39,7 @@ class Payload(Effect):
     explanation = "A tool or a workpiece hangs at the tip that was not there before, or is no longer there."
     remedy = "Take it off, or add it to the model."
     experiment = "Repeat the same experiment without the load."
+    evidence = "base parameters"
     twins = ("link_length",)
     absorbed_by = ("base parameters of the last links",)
     needs = ("a reference log without the load",)

@@ -21,6 +21,7 @@ class Viscous(Effect):
     explanation = "Sheared lubricant, and eddy currents in the motor."
     remedy = "Compensate it in the feed-forward; it falls as the joint warms up, so log the temperature."
     experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
+    evidence = "none"
     twins = ("coulomb", "three_sigmoid", "quadratic_drag", "viscous_drift")
     friction = True
 

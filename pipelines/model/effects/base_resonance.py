@@ -1,0 +1,112 @@
+"""A base that gives way under the first joint's torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite, pi
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_torque, shifted
+
+__all__ = ["BaseResonance"]
+
+_FIRST = 0  # the joint whose axis the base turns about
+
+
+@dataclass(frozen=True)
+class BaseResonance(Effect):
+    """I (ẍ + 2 ζ w ẋ + w² x) = -τ_1, w = 2πf: the base turns by x about the first joint's axis, and the arm with it.
+
+    τ_1 is the rigid arm's torque on that joint; its encoder and its friction turn with the base. To first order
+    τ = 1/I P_1(x I) with τ_1 of the arm on a firm base; exactly, of the arm as it then moves.
+    """
+
+    frequency: float = 28.0  # f [Hz]
+    damping_ratio: float = 0.05  # ζ
+
+    name = "base_resonance"
+    title = "Base that gives way"
+    scope = "arm"
+    parameters = (
+        Quantity("frequency", "Hz", 1.0, 200.0, "of the base alone: the pole", shape=True),
+        Quantity("damping_ratio", "1", 0.001, 1.0, "of the base", shape=True),
+        Quantity("inertia", "kg m^2", 1e-3, 1e5, "of the base about the first joint's axis"),
+    )
+    signature = "A pole and a zero just below it in the first joint's frequency response, at the same frequency in every posture."
+    explanation = "The table, the floor or the bolts under the arm are a spring; the arm's reaction moves them."
+    remedy = "Tighten or stiffen what the arm stands on; keep the first joint's bandwidth below it."
+    experiment = "Measure the frequency response of the first joint in two postures with different inertia."
+    evidence = "frequency responses"
+    twins = ("joint_elasticity",)
+    absorbed_by = ("inertia of the first joint at low frequency",)
+    needs = ("frequency responses in two postures",)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        rigid, w, one = _rigid(arm), 2.0 * pi * self.frequency, np.ones(len(motion.t))
+        x = oscillation(motion.t, one, 2.0 * self.damping_ratio * w * one, w * w * one, -rigid(motion)[:, _FIRST])
+        return perturbed_torque(rigid, motion, _FIRST, *x)[..., None]
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        for frequency in (8.0, 12.0, 17.0, 24.0, 28.0, 34.0, 48.0):
+            yield replace(self, frequency=frequency)
+
+    def amplitudes(self, values: Values) -> Array:
+        return np.array([1.0 / values["inertia"]])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        mobility = float(amplitudes[0])
+        return {"frequency": self.frequency, "damping_ratio": self.damping_ratio, "inertia": 1.0 / mobility if mobility else inf}
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        without = predict(motion, arm) if predict is not None else arm.torque(motion)
+        inertia, w = values["inertia"], 2.0 * pi * values["frequency"]
+        if not isfinite(inertia):
+            return without
+        rigid = _rigid(arm)
+        x = deflection(rigid, motion, _FIRST, inertia * w * w, 2.0 * values["damping_ratio"] * w * inertia, inertia)
+        return np.asarray(without + (rigid(shifted(motion, _FIRST, *x)) - rigid(motion)))
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """The arm's first angle is the true one, against the ground; angle and speed of the base are two states."""
+        inertia, ratio, w = values["inertia"], values["damping_ratio"], 2.0 * pi * values["frequency"]
+
+        def friction(motion: Motion, speed: Array) -> Array:
+            dq = motion.dq.copy()
+            dq[:, _FIRST] = speed
+            return np.asarray(arm.friction_torque(replace(motion, dq=dq))[:, _FIRST])
+
+        def actuator(command: Array, motion: Motion, states: Array) -> Array:
+            """Friction is that of the speed against the base."""
+            passed, speed = command.copy(), motion.dq[:, _FIRST]
+            passed[:, _FIRST] += friction(motion, speed) - friction(motion, speed - states[:, 1])
+            return passed
+
+        def rate(motion: Motion, command: Array, states: Array) -> Array:
+            x, v = states.T
+            reaction = command[:, _FIRST] - friction(motion, motion.dq[:, _FIRST] - v)
+            return np.stack([v, -w * w * x - 2.0 * ratio * w * v - reaction / inertia], axis=-1)
+
+        def sensor(q: Array, states: Array) -> Array:
+            seen = q.copy()
+            seen[:, _FIRST] -= states[:, 0]
+            return seen
+
+        def settled(motion: Motion, tau: Array) -> Array:
+            q = motion.q.copy()
+            q[:, _FIRST] -= tau[:, _FIRST] / (inertia * w * w)
+            return q
+
+        def start(motion: Motion, tau: Array) -> Array:
+            return np.stack([-tau[:, _FIRST] / (inertia * w * w), np.zeros(len(tau))], axis=-1)
+
+        return Hooks(actuator=actuator, sensor=sensor, states=2, settled=settled, start=start, rate=rate)
+
+
+def _rigid(arm: ArmModel) -> Callable[[Motion], Array]:
+    """Torque of the rigid arm alone."""
+    return lambda motion: arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)

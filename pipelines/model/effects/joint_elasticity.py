@@ -1,0 +1,145 @@
+"""A spring between a motor and its link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf, isfinite, pi, sqrt
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.perturbation import deflection, perturbed_torque, rate_of, shifted
+
+__all__ = ["JointElasticity"]
+
+
+@dataclass(frozen=True)
+class JointElasticity(Effect):
+    """k x + d ẋ + τ_link(q + x) = 0, x = q_link - q: torque, friction and encoder sit on the motor's side.
+
+    τ_link is the rigid torque of the joint without its motor, τ_j - J_m q̈_j. To first order, x = -(τ_j - J_m q̈_j)/k:
+    τ = 1/k (P_j(-τ_j) + J_m P_j(q̈_j) - J_m ẍ k) with P_j of the rigid arm, for friction does not feel the link. Exactly: x is
+    solved from sample to sample. `frequency` = √(k/J)/2π, the motor locked, J the link's inertia averaged over the motion.
+    """
+
+    damping: float = 0.0  # d [N m s/rad]
+    motor_inertia: float = 0.0  # J_m [kg m^2]
+    link_inertia: float = field(default=1.0, compare=False)  # J [kg m^2]; what the frequency follows from
+
+    name = "joint_elasticity"
+    title = "Elastic joint"
+    parameters = (
+        Quantity("stiffness", "N m/rad", 1.0, 1e7, "of the spring between motor and link"),
+        Quantity("damping", "N m s/rad", 0.0, 1e3, "beside the spring", shape=True),
+        Quantity("frequency", "Hz", 0.1, 1e4, "of the link on its spring, the motor locked", derived=True),
+        Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
+    )
+    signature = ("A residual that grows with the fourth power of frequency; antiresonance and resonance that move with posture, "
+                 "and above them the motor's inertia alone.")
+    explanation = "Gear, belt or shaft give way: the link does not stand where the motor's encoder says."
+    remedy = "Keep the bandwidth below the antiresonance; compensate the deflection by the predicted torque; check belt and clamps."
+    experiment = "Measure the frequency response of this joint in two postures with different inertia."
+    evidence = "frequency responses"
+    twins = ("base_resonance", "backlash")
+    absorbed_by = ("inertia of the joint at low frequency",)
+    needs = ("frequency responses in two postures",)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        d, motor = self._give(motion, arm), self.motor_inertia
+        rate = rate_of(d, motion.t)
+        second = rate_of(rate, motion.t)
+        tau = perturbed_torque(_rigid(arm), motion, self._index, d, rate, second)
+        tau[:, self._index] -= motor * second
+        return tau[..., None]
+
+    def _give(self, motion: Motion, arm: ArmModel) -> Array:
+        """x k (samples,) [N m]."""
+        return np.asarray(self.motor_inertia * self.own(motion.ddq) - self.own(_rigid(arm)(motion)))
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """No motor, a light one and one of a third of what the joint feels; lightly damped."""
+        felt = _felt(arm, motion.q, self._index)
+        for share in (0.0, 0.1, 0.3):
+            yield replace(self, motor_inertia=share * felt, link_inertia=(1.0 - share) * felt)
+
+    def amplitudes(self, values: Values) -> Array:
+        return np.array([1.0 / values["stiffness"]])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        compliance = float(amplitudes[0])
+        stiffness = 1.0 / compliance if compliance else inf
+        frequency = sqrt(max(stiffness / self.link_inertia, 0.0)) / (2.0 * pi)
+        return {"stiffness": stiffness, "damping": self.damping, "frequency": frequency, "motor_inertia": self.motor_inertia}
+
+    def at(self, values: Values) -> Self:
+        k, f = values["stiffness"], values["frequency"]
+        link = k / (2.0 * pi * f) ** 2 if 0.0 < k < inf and 0.0 < f < inf else self.link_inertia
+        return replace(self, damping=values["damping"], motor_inertia=values["motor_inertia"], link_inertia=link)
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        """What the drive feels beside the rigid arm: τ(q + x) - τ(q) of the rigid arm, and the motor that does not follow x."""
+        without = predict(motion, arm) if predict is not None else arm.torque(motion)
+        if not isfinite(values["stiffness"]):
+            return without
+        rigid, motor = _rigid(arm), values["motor_inertia"]
+        x, rate, second = deflection(rigid, motion, self._index, values["stiffness"], values["damping"], -motor)
+        more = rigid(shifted(motion, self._index, x, rate, second)) - rigid(motion)
+        more[:, self._index] -= motor * second
+        return np.asarray(without + more)
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """The arm is the links; angle and speed of the motor are two states. Friction acts on the motor.
+
+        J_m θ̈ = τ - τ_friction(θ̇) - k (θ - q) - d (θ̇ - q̇)
+        """
+        j, k, d = self._index, values["stiffness"], values["damping"]
+        light = 0.01 * _felt(arm, np.zeros((1, arm.n_joints)), j)  # of a motor without inertia nothing can be integrated
+        motor = max(values["motor_inertia"], light)
+        without = np.zeros((arm.n_joints, arm.n_joints))
+        without[j, j] = -motor
+
+        def friction(motion: Motion, speed: Array) -> Array:
+            dq = motion.dq.copy()
+            dq[:, j] = speed
+            return self.own(arm.friction_torque(replace(motion, dq=dq)))
+
+        def spring(motion: Motion, states: Array) -> Array:
+            return np.asarray(k * (states[:, 0] - self.own(motion.q)) + d * (states[:, 1] - self.own(motion.dq)))
+
+        def actuator(command: Array, motion: Motion, states: Array) -> Array:
+            passed = command.copy()
+            passed[:, j] = spring(motion, states) + friction(motion, self.own(motion.dq))
+            return passed
+
+        def rate(motion: Motion, command: Array, states: Array) -> Array:
+            left = self.own(command) - friction(motion, states[:, 1]) - spring(motion, states)
+            return np.stack([states[:, 1], left / motor], axis=-1)
+
+        def sensor(q: Array, states: Array) -> Array:
+            seen = q.copy()
+            seen[:, j] = states[:, 0]
+            return seen
+
+        def settled(motion: Motion, tau: Array) -> Array:
+            q = motion.q.copy()
+            q[:, j] -= self.own(tau) / k
+            return q
+
+        def start(motion: Motion, tau: Array) -> Array:
+            return np.stack([self.own(motion.q) + self.own(tau) / k, self.own(motion.dq)], axis=-1)
+
+        return Hooks(actuator=actuator, sensor=sensor, inertia=without, states=2, settled=settled, start=start, rate=rate)
+
+
+def _rigid(arm: ArmModel) -> Callable[[Motion], Array]:
+    """Torque of the rigid arm alone."""
+    return lambda motion: arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)
+
+
+def _felt(arm: ArmModel, q: Array, index: int) -> float:
+    """Inertia [kg m^2] that the joint feels, the others held, averaged over q (samples, joints)."""
+    some = q[::max(1, len(q) // 200)]
+    return float(np.mean(arm.body.mass_matrix(some, arm.p)[:, index, index]))
