@@ -220,7 +220,7 @@ class LogEquations:
 
     def _conditioned(self, wide: slice, first: int, last: int, phase: int) -> _Piece:
         how = self.conditioning
-        motion, tau = self._stretch(wide)
+        motion, tau = self.stretch(wide)
         rows, _ = self.columns.rows(motion)
         known = None if self.known is None else self.known(motion)
         begin = 0
@@ -247,7 +247,7 @@ class LogEquations:
         kept, motion = self.found.good.kept, self.found.motion
         return np.asarray(~np.isfinite(motion.q + motion.dq + motion.ddq)[kept] | self.found.vague[kept])
 
-    def _stretch(self, wide: slice) -> tuple[Motion, Array]:
+    def stretch(self, wide: slice) -> tuple[Motion, Array]:
         """Motion and torque with what is spoilt bridged by straight lines."""
         good, motion = self.found.good, _part(self.found, wide)
         tau = good.log.tau[wide]

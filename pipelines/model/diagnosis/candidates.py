@@ -1,0 +1,111 @@
+"""Every cause that could be: each effect at every place, in every shape worth trying.
+
+    for family in families(columns, motion, arm): ...
+    for laid in lay_family(data, family, arm): ...           its columns, a few shapes at a time
+
+An effect whose non-linear number is one of the friction fitted at its joint, how sharply it changes sign say, takes it from
+there: what a second law beside the first would gain by another one is an artefact of reversals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.effects import all_effects
+from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.body import Motion
+
+__all__ = ["Family", "Laid", "families", "lay_family", "lay_one", "place_of", "whole_motion"]
+
+Indices = npt.NDArray[np.intp]
+
+_AT_ONCE = 48  # columns
+
+
+@dataclass(frozen=True)
+class Family:
+    """One cause at one place."""
+
+    cause: str
+    joint: int | None
+    shapes: tuple[Effect, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """Columns of some shapes of a family, on the rows where they are not zero."""
+
+    first: int  # shape
+    table: Array  # (shapes, k, rows here)
+    rows: Indices | slice  # which of all rows
+
+
+def place_of(cause: str, joint: int | None) -> str:
+    """As causes are written on the command line: "cogging:2", "gravity_tilt"."""
+    return cause if joint is None else f"{cause}:{joint}"
+
+
+def families(laws: Sequence[Effect], motion: Motion, arm: Arm, without: Sequence[str] = ()) -> tuple[Family, ...]:
+    """Every effect at every place, but those that the nominal model holds, and those left out.
+
+    Args:
+        laws: of the nominal model.
+        motion: of all logs, for the range of shapes.
+    """
+    nominal = {law.name for law in laws}
+    found = []
+    for kind in all_effects():
+        if kind.name in nominal or kind.name in without:
+            continue
+        for effect in kind.everywhere(arm.n_joints):
+            found.append(Family(kind.name, effect.joint, _shapes(effect, laws, motion, arm)))
+    return tuple(found)
+
+
+def _shapes(effect: Effect, laws: Sequence[Effect], motion: Motion, arm: Arm) -> tuple[Effect, ...]:
+    shared: dict[str, Any] = {}
+    for law in laws:
+        if law.joint == effect.joint:
+            shared |= {q.name: getattr(law, q.name) for q in law.parameters if q.shape
+                       and q.name in {own.name for own in effect.parameters if own.shape}}
+    shaped = replace(effect, **shared)
+    return tuple(dict.fromkeys(replace(one, **shared) for one in shaped.shapes(motion, arm)))
+
+
+def whole_motion(data: Data) -> Motion:
+    """The motions of all logs one behind the other: for ranges, never for slopes."""
+    motions = [one.motion for one in data.logs]
+    return Motion(*(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("t", "q", "dq", "ddq", "tau")))
+
+
+def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
+    """The columns of every shape, a few shapes at a time."""
+    count = sum(not q.shape for q in family.shapes[0].parameters)
+    size = max(1, _AT_ONCE // max(count, 1))
+    for first in range(0, len(family.shapes), size):
+        some = family.shapes[first:first + size]
+        tables = [[shape.columns(one.motion, arm) for shape in some] for one in data.logs]
+        k = tables[0][0].shape[2]
+        acting = np.flatnonzero(np.any([table.any(axis=(0, 2)) for per_log in tables for table in per_log], axis=0))
+        laid = []
+        for one, per_log in zip(data.logs, tables, strict=True):
+            flat = np.concatenate([table[:, acting].transpose(2, 1, 0).reshape(-1, len(table)) for table in per_log])
+            laid.append(one.lay_signals(flat).reshape(len(some), k, -1))
+        rows = np.flatnonzero(np.isin(data.joint, acting))
+        found = np.concatenate(laid, axis=2)
+        if not data.counts.all():
+            found = np.where(data.counts[rows], found, 0.0)
+        yield Laid(first, found, rows)
+
+
+def lay_one(data: Data, effect: Effect, arm: Arm) -> Array:
+    """(k, rows) of one effect in one shape."""
+    return data.lay(lambda motion: effect.columns(motion, arm))

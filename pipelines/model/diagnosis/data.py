@@ -1,0 +1,260 @@
+"""The equations of all logs as plain arrays: whatever is a torque over a motion is averaged, filtered and thinned out alike.
+
+    data = gather(motions, columns, recipe)
+    data.y                              (rows,) measured torque of every log and joint, one behind the other
+    data.lay(lambda motion: torque)     (rows,) any torque, or (rows, k) of k columns, in the same rows
+
+One log's rows are those of its first joint in order of time, then those of its second …; the logs follow each other. What is
+done to a signal is linear, and done to torque and columns alike: for a held command the average over two samples, then the
+zero-phase low-pass in the frequency domain, |H|² of `signal.filters`, then decimation. Rows next to the end of a stretch, where
+the low-pass has to guess what was before, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.estimation.logs import Motions, Recipe, equations_of
+from pipelines.model.estimation.regression import Columns, LogEquations, Rows
+from pipelines.model.rigid.body import Motion
+from pipelines.signal.filters import passed_both_ways
+
+__all__ = ["Data", "LogData", "gather"]
+
+Indices = npt.NDArray[np.intp]
+
+_PAD = 4.0  # periods of the cut-off a stretch is continued by
+_END = 1.0  # periods of the cut-off left out at either end of a stretch
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A stretch without a gap: what is done to a signal of it."""
+
+    part: slice  # of the log's kept samples
+    centred: bool  # average over two samples first
+    response: Array | None  # of the low-pass at the frequencies of the padded stretch
+    pad: int
+    chosen: Indices  # places in the centred stretch that become rows
+
+    def lay(self, x: Array) -> Array:
+        """(channels, samples) -> (channels, rows)."""
+        if self.centred:
+            x = _centred(x)
+        if self.response is None:
+            return np.asarray(x[:, self.chosen])
+        pad, n = self.pad, x.shape[1]
+        wide = np.concatenate([2.0 * x[:, :1] - x[:, pad:0:-1], x, 2.0 * x[:, -1:] - x[:, -2:-pad - 2:-1]], axis=1)
+        spectrum = np.fft.rfft(wide, n=2 * (len(self.response) - 1), axis=1)
+        spectrum *= self.response
+        smooth = np.fft.irfft(spectrum, axis=1)[:, pad:pad + n]
+        return np.asarray(smooth[:, self.chosen])
+
+    def lay_command(self, tau: Array) -> Array:
+        """The same of a held command (joints, samples): ½ (u_k + u_{k-1}) is its average."""
+        if not self.centred:
+            return self.lay(tau)
+        return replace(self, centred=False).lay(0.5 * (tau[:, 1:-1] + tau[:, :-2]))
+
+
+def _centred(x: Array) -> Array:
+    """`signal.filters.centre_samples` along axis 1."""
+    out = x[:, 1:-1] * (4.0 / 6.0)
+    out += (x[:, :-2] + x[:, 2:]) * (1.0 / 6.0)
+    out[:, 1:-1] -= (x[:, :-4] - 4.0 * x[:, 1:-3] + 6.0 * x[:, 2:-2] - 4.0 * x[:, 3:-1] + x[:, 4:]) * (1.0 / 180.0)
+    return np.asarray(out)
+
+
+@dataclass(frozen=True, eq=False)
+class LogData:
+    """One log: its motion at full rate, and how a signal over it becomes rows."""
+
+    log: ExperimentLog
+    equations: LogEquations
+    motion: Motion  # at the kept samples of all runs
+    tau: Array  # [N m] (samples, joints) of the same
+    pieces: tuple[slice, ...]  # of each run among those samples
+    runs: tuple[_Run, ...]
+
+    @property
+    def n_joints(self) -> int:
+        return int(self.tau.shape[1])
+
+    @cached_property
+    def rows(self) -> int:
+        """Of each joint."""
+        return sum(len(run.chosen) for run in self.runs)
+
+    @cached_property
+    def t(self) -> Array:
+        """(rows,) [s] of each joint's rows."""
+        return np.asarray(self.at_rows(self.motion.t), dtype=np.float64)
+
+    @cached_property
+    def y(self) -> Array:
+        """(joints, rows) measured torque."""
+        return np.concatenate([run.lay_command(self.tau[piece].T) for piece, run in self._parts], axis=1)
+
+    @cached_property
+    def weighed(self) -> npt.NDArray[np.bool_]:
+        """(joints, rows) which rows count: those of a joint that is not too slow."""
+        slow = self.equations.rows.slow
+        kept = np.concatenate([slow[run.part] for run in self.runs])
+        return np.asarray(~self.at_rows(kept).astype(bool).T)
+
+    def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """What `x` (samples, …) is at the moments of the rows, unfiltered."""
+        return np.concatenate([x[piece][run.chosen + int(run.centred)] for piece, run in self._parts])
+
+    def lay(self, table: Array) -> Array:
+        """Columns over the motion, (samples, joints) or (samples, joints, k), as (joints, rows) or (k, joints, rows)."""
+        flat = table.reshape(len(table), -1).T
+        active = np.flatnonzero(flat.any(axis=1))
+        out = np.zeros((len(flat), self.rows))
+        if len(active):
+            out[active] = self.lay_signals(flat[active])
+        if table.ndim == 2:
+            return out
+        return out.reshape(table.shape[1], table.shape[2], self.rows).transpose(1, 0, 2)
+
+    def lay_signals(self, x: Array) -> Array:
+        """(channels, samples) -> (channels, rows)."""
+        return np.concatenate([run.lay(np.ascontiguousarray(x[:, piece])) for piece, run in self._parts], axis=1)
+
+    @property
+    def _parts(self) -> list[tuple[slice, _Run]]:
+        return list(zip(self.pieces, self.runs, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Rows of several logs. A row that does not count is zero in everything."""
+
+    logs: tuple[LogData, ...]
+
+    @property
+    def n_joints(self) -> int:
+        return self.logs[0].n_joints
+
+    @cached_property
+    def joint(self) -> Indices:
+        """(rows,) joint of each row, from 0."""
+        return np.concatenate([np.repeat(np.arange(one.n_joints), one.rows) for one in self.logs])
+
+    @cached_property
+    def log_of(self) -> Indices:
+        """(rows,) log of each row."""
+        return np.concatenate([np.full(one.n_joints * one.rows, k) for k, one in enumerate(self.logs)])
+
+    @cached_property
+    def t(self) -> Array:
+        """(rows,) [s] within each log."""
+        return np.concatenate([np.tile(one.t, one.n_joints) for one in self.logs])
+
+    @cached_property
+    def counts(self) -> npt.NDArray[np.bool_]:
+        return np.concatenate([one.weighed.ravel() for one in self.logs])
+
+    @cached_property
+    def y(self) -> Array:
+        return self._counted(np.concatenate([one.y.ravel() for one in self.logs]))
+
+    @property
+    def rows(self) -> int:
+        return len(self.joint)
+
+    def lay(self, torque: Callable[[Motion], Array]) -> Array:
+        """`torque` of the motion of each log, (samples, joints) or (samples, joints, k), as (rows,) or (k, rows)."""
+        laid = [one.lay(torque(one.motion)) for one in self.logs]
+        return self._counted(np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1))
+
+    def blocks(self, count: int) -> Indices:
+        """(rows,) to which of about `count` stretches of time a row belongs, each within one log, all joints alike."""
+        total = sum(one.rows for one in self.logs)
+        out, first = [], 0
+        for one in self.logs:
+            own = max(1, round(count * one.rows / total))
+            out.append(np.tile(first + np.arange(one.rows) * own // max(one.rows, 1), one.n_joints))
+            first += own
+        return np.concatenate(out)
+
+    def split(self, x: Array) -> Iterator[Array]:
+        """(rows,) -> (joints, rows) of each log."""
+        first = 0
+        for one in self.logs:
+            size = one.n_joints * one.rows
+            yield x[first:first + size].reshape(one.n_joints, one.rows)
+            first += size
+
+    def rms(self, x: Array) -> Array:
+        """(joints,) root mean square of `x` (rows,) over the rows that count."""
+        power = np.bincount(self.joint, np.where(self.counts, x, 0.0) ** 2, minlength=self.n_joints)
+        return np.asarray(np.sqrt(power / np.maximum(np.bincount(self.joint[self.counts], minlength=self.n_joints), 1)))
+
+    def _counted(self, x: Array) -> Array:
+        return x if self.counts.all() else np.where(self.counts, x, 0.0)
+
+
+def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Rows] | None = None) -> Data:
+    """The rows of the logs; `recipe` with its cut-off.
+
+    Args:
+        rows: of each log which samples may be rows; its own choice where left out.
+
+    Raises:
+        InputRejected: T04, every stretch of a log is too short for the low-pass, or spoilt.
+    """
+    logs = zip(motions, equations_of(motions, recipe, columns, rows), strict=True)
+    return Data(tuple(_of_log(log, equations) for (log, _), equations in logs))
+
+
+def _of_log(log: ExperimentLog, equations: LogEquations) -> LogData:
+    stretches = [equations.stretch(run) for run in equations.runs]
+    tau = np.concatenate([tau for _, tau in stretches])
+    motion = Motion(*(np.concatenate([getattr(m, name) for m, _ in stretches]) for name in ("t", "q", "dq", "ddq")), tau)
+    ends = np.cumsum([0, *(len(tau) for _, tau in stretches)]).tolist()
+    pieces = tuple(slice(a, b) for a, b in pairwise(ends))
+    return LogData(log, equations, motion, tau, pieces,
+                   tuple(_run(equations, run) for run in equations.runs))
+
+
+def _run(equations: LogEquations, part: slice) -> _Run:
+    how, centred = equations.conditioning, equations.held
+    rate = 1.0 / equations.found.good.log.sample_time
+    n = part.stop - part.start - 2 * int(centred)
+    reach = 2 if how.cutoff_hz is None else int(np.ceil(_END * rate / how.cutoff_hz))
+    chosen = np.arange(min(reach, n // 4), n - min(reach, n // 4), how.decimation)
+    chosen = chosen[~equations.rows.out[part][chosen + int(centred)]]
+    if how.cutoff_hz is None:
+        return _Run(part, centred, None, 0, chosen)
+    pad = min(n - 2, int(np.ceil(_PAD * rate / how.cutoff_hz)))
+    size = _quick(n + 2 * pad)
+    response = passed_both_ways(np.arange(size // 2 + 1) * rate / size, how.cutoff_hz, rate)
+    return _Run(part, centred, response, pad, chosen)
+
+
+def _quick(n: int) -> int:
+    """The smallest even 2^a 3^b 5^c from n on: lengths of a quick Fourier transform."""
+    best = 1 << max(1, (n - 1).bit_length())
+    for five in range(8):
+        for three in range(12):
+            odd = 5**five * 3**three
+            if odd >= best:
+                break
+            size = odd << max(1, int(np.ceil(np.log2(max(n / odd, 1.0)))))
+            if n <= size < best:
+                best = size
+    return best
+
+
+def joined(parts: Sequence[Data]) -> Data:
+    """The rows of several, one behind the other."""
+    return Data(tuple(one for part in parts for one in part.logs))

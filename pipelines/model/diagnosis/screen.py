@@ -1,0 +1,84 @@
+"""Screen every cause: how much of the residual its columns would take away, after the model was refitted beside them.
+
+    found = screen(data, fit, families, arm, residuals)
+    found[i].gain                 (residuals,) what the best shape takes off the squared weighted residual
+
+With c⊥ = c - Q Qᵀ c the part of the columns that the nominal model Q cannot imitate, the gain is gᵀ G⁻¹ g, G = c⊥ᵀc⊥,
+g = c⊥ᵀ r. Several residuals at once: those of a log and of the twin's replicas, which must not be confused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import Family, Laid, lay_family
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.nominal import Fit
+from pipelines.model.effects.base import Effect
+
+__all__ = ["Screened", "screen", "screen_family"]
+
+_INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
+_SPREAD = 1e-4  # of the largest: directions of c⊥ that are left alone
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """One cause at one place. Arrays (residuals,)."""
+
+    family: Family
+    gain: Array  # of the best shape
+    shape: tuple[Effect, ...]  # the best one for each residual
+    visibility: Array  # η of it
+    best_visibility: float  # the largest η of any shape
+
+    @property
+    def cause(self) -> str:
+        return self.family.cause
+
+    @property
+    def joint(self) -> int | None:
+        return self.family.joint
+
+
+def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm, residuals: Array | None = None) -> list[Screened]:
+    """Every family; `residuals` (m, rows), weighted and orthogonal to the fit, that of the fit where left out."""
+    return [screen_family(data, fit, family, arm, residuals) for family in candidates]
+
+
+def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Array | None = None) -> Screened:
+    wanted = fit.residual[None] if residuals is None else residuals
+    gains, visible = [], []
+    for laid in lay_family(data, family, arm):
+        gain, eta = _gains(laid, fit, wanted)
+        gains.append(gain)
+        visible.append(eta)
+    gain, eta = np.concatenate(gains), np.concatenate(visible)
+    best = np.argmax(gain, axis=0)
+    return Screened(family, gain[best, np.arange(gain.shape[1])], tuple(family.shapes[int(k)] for k in best), eta[best],
+                    float(eta.max()))
+
+
+def _gains(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array]:
+    """(shapes, residuals) gains and (shapes,) visibility."""
+    shapes, k, _ = laid.table.shape
+    c = laid.table * fit.weights[laid.rows]
+    flat = c.reshape(shapes * k, -1)
+    seen = (flat @ fit.basis[:, laid.rows].T).reshape(shapes, k, -1)
+    whole = c @ c.transpose(0, 2, 1)
+    gram = whole - seen @ seen.transpose(0, 2, 1)
+    moment = (flat @ residuals[:, laid.rows].T).reshape(shapes, k, -1)
+    scale = np.sqrt(np.maximum(np.einsum("skk->sk", whole), 1e-300))
+    unit = gram / scale[:, :, None] / scale[:, None, :]
+    values, vectors = np.linalg.eigh(unit)
+    turned = np.square(np.einsum("skl,skm->slm", vectors, moment / scale[:, :, None]))
+    lowest = np.maximum(_INVISIBLE**2, _SPREAD**2 * values[:, -1:])
+    sure = values > lowest
+    gain = np.sum(np.where(sure[:, :, None], turned / np.where(sure, values, 1.0)[:, :, None], 0.0), axis=1)
+    share = np.sqrt(np.clip(np.einsum("skk->s", unit) / k, 0.0, None))
+    return gain, np.asarray(np.minimum(share, 1.0))

@@ -1,0 +1,125 @@
+"""The twin: the fitted model run through the same experiments, controller, quantisation and noise, and then analysed alike.
+
+    noise = drive_noise(...)                       of the drives, from what the log shows at rest from everything else
+    twin = make_twin(arm, data, fit, recipe, ...)  replicas of every log whose controller is known
+    twin.residuals                                 (replicas, rows) of the log's own rows
+
+What the twin shows too is an artefact of sampling, smoothing and friction at reversals, no fault: its residual is the floor,
+and what a cause gains on it is what that cause has to exceed on the log. Twins of logs that cannot be simulated do not exist.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.errors import InputRejected
+from pipelines.log.experiment import Array, ExperimentLog, Signal
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.data import Data, gather
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, rows_of
+from pipelines.model.estimation.logs import Motions, Recipe
+from pipelines.model.estimation.regression import Columns
+from pipelines.model.motion import Reconstructed, reconstruct
+from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
+
+__all__ = ["Twin", "drive_noise", "make_twin", "replayable"]
+
+_WINDOW = 0.4  # [s] in which the noise is looked at
+_QUIET = 0.3  # of the windows are taken for quiet
+_SMOOTH = 5  # rows of the moving average whose remainder is noise
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """Replicas of the logs that can be simulated."""
+
+    data: Data  # motion and rows of the first replica
+    fit: Fit  # of the first replica, weights those of the log's fit
+    residuals: Array  # (replicas, rows) weighted, each orthogonal to its own fit
+    places: tuple[int, ...]  # which of the logs
+    noise: Array  # (joints,) [N m] of the drives
+
+    @property
+    def rms(self) -> Array:
+        """(joints,) [N m] over all replicas: the floor."""
+        each = [self.data.rms(one / self.fit.weights) for one in self.residuals]
+        return np.asarray(np.sqrt(np.mean(np.square(each), axis=0)))
+
+
+def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
+    """Places of the logs whose controller is known."""
+    found = []
+    for place, log in enumerate(logs):
+        try:
+            Experiment.of_log(log)
+        except InputRejected:
+            continue
+        found.append(place)
+    return tuple(found)
+
+
+def drive_noise(arm: Arm, data: Data, fit: Fit, columns: Columns, motions: Motions, recipe: Recipe, place: int, seed: int) -> Array:
+    """(joints,) [N m] white torque noise of the drives: as much as makes a replica as rough as log number `place`.
+
+    Rough: quick changes of the residual in its quietest windows, where neither reversals nor any fault are. Two replicas,
+    without noise and with a guess of it, tell what of it is counting of the encoders and how noise shows.
+    """
+    mine = list(data.split(fit.left))[place]
+    step = float(np.median(np.diff(data.logs[place].t)))
+    log = motions[place][0]
+    rough = _roughness(mine, step)
+    guess = rough * np.sqrt(step / log.sample_time)
+    seen = []
+    for level, own in ((np.zeros_like(guess), seed), (guess, seed + 1)):
+        done = simulate(arm, Experiment.of_log(log), Noise(level, np.zeros_like(guess)), (own,))
+        copy, found = _analysed(log, done, 0, recipe, columns, data, place)
+        seen.append(_roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t)))))
+    still, shaken = np.square(seen[0]), np.square(seen[1])
+    share = (np.square(rough) - still) / np.maximum(shaken - still, 1e-6 * np.square(rough) + 1e-300)
+    return np.asarray(guess * np.sqrt(np.clip(share, 0.0, 4.0)))
+
+
+def _roughness(x: Array, step: float) -> Array:
+    """(joints,) of x (joints, rows): standard deviation of what a moving average leaves, in the quietest windows."""
+    kernel = np.ones(_SMOOTH) / _SMOOTH
+    rest = np.array([row[_SMOOTH // 2:len(row) - _SMOOTH // 2] - np.convolve(row, kernel, mode="valid") for row in x])
+    size = max(4, round(_WINDOW / step))
+    windows = rest[:, :rest.shape[1] // size * size].reshape(len(rest), -1, size)
+    return np.asarray(np.sqrt(np.quantile(windows.var(axis=2), _QUIET, axis=1)))
+
+
+def make_twin(arm: Arm, data: Data, fit: Fit, columns: Columns, motions: Motions, recipe: Recipe, noise: Array, replicas: int,
+              seed: int) -> Twin | None:
+    """Replicas of every log that can be simulated; None where there is none.
+
+    Raises:
+        InputRejected: D15, D17: the fitted arm cannot be simulated.
+    """
+    places = replayable([log for log, _ in motions])
+    if not places or replicas < 1:
+        return None
+    drawn = Noise(noise, np.zeros_like(noise))
+    runs = {place: simulate(arm, Experiment.of_log(motions[place][0]), drawn, range(seed, seed + replicas)) for place in places}
+    found = []
+    for k in range(replicas):
+        parts = [_motion(motions[place][0], done, k, recipe) for place, done in runs.items()]
+        rows = [data.logs[place].equations.rows for place in places]
+        own = gather(tuple(parts), columns, recipe, rows)
+        found.append(fit_columns(own, rows_of(own, columns), weight=fit.weight))
+    return Twin(found[0].data, found[0], np.array([one.residual for one in found]), places, noise)
+
+
+def _analysed(log: ExperimentLog, done: Simulated, k: int, recipe: Recipe, columns: Columns, data: Data,
+              place: int) -> tuple[Data, Fit]:
+    own = gather((_motion(log, done, k, recipe),), columns, recipe, (data.logs[place].equations.rows,))
+    return own, fit_columns(own, rows_of(own, columns))
+
+
+def _motion(log: ExperimentLog, done: Simulated, k: int, recipe: Recipe) -> tuple[ExperimentLog, Reconstructed]:
+    signals = {name: Signal(values, log.signals[name].units, log.signals[name].long_name)
+               for name, values in (("t", log.t), ("q", done.q[k]), ("tau", done.tau[k]))}
+    copy = replace(log, name=f"{log.name} twin {k + 1}", torque=None, signals=signals, period=None, derived=None)
+    return copy, reconstruct(copy, recipe.how)
