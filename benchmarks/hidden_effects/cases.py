@@ -37,6 +37,7 @@ class Hidden:
     joint: int | None  # 1-based; None: of the whole arm
     strength: float  # times the figure of causes.md
     seed: int  # of its phases and directions
+    once: bool = False  # it happens in one of the logs only
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,6 @@ class SealedCase:
     frf: bool = False  # with frequency responses and reversals of every joint
     amplifier: float = 1.0  # times the amplifier's noise
     held: bool = True  # the log says that torque was held over each sample, as it was
-    once: bool = False  # what is hidden happens in one of the logs only
 
     @property
     def key(self) -> str:
@@ -143,10 +143,11 @@ def noise(seed: int) -> Iterator[SealedCase]:
 
 def standing(seed: int) -> Iterator[SealedCase]:
     """A cause that was there from the first day, with reference logs: nothing has changed."""
-    for place, cause in enumerate(EASY):
+    for place, cause in enumerate(name for name in EASY if name != "contact"):
         joints = [joint for name, joint in _places(EASY) if name == cause]
-        there = (Hidden(cause, joints[place % len(joints)], STRENGTHS[place % 2], 1000 * seed + place),)
-        yield replace(_case("standing", seed, place, [], reference=True), standing=there)
+        there = [(cause, joints[place % len(joints)], STRENGTHS[place % 2])]
+        case = _case("standing", seed, place, there, reference=True)
+        yield replace(case, hidden=(), standing=case.hidden)
 
 
 def zero(seed: int) -> Iterator[SealedCase]:
@@ -179,8 +180,9 @@ def _places(causes: Iterable[str]) -> list[tuple[str, int | None]]:
 
 def _case(family: str, seed: int, place: int, hidden: Iterable[tuple[str, int | None, float]], **others: object) -> SealedCase:
     rng = np.random.default_rng([92, seed, place, *family.encode()])
-    causes = tuple(Hidden(cause, joint, strength, 1000 * seed + place) for cause, joint, strength in hidden)
-    once = place % 2 == 0 and "contact" in [one.cause for one in causes]
-    case = SealedCase(family, causes, 100 * seed + (place + place // MACHINES) % MACHINES, 1000 * seed + place,
-                      _SESSIONS[int(rng.integers(len(_SESSIONS)))], once=once)
+    own = 100_000 * seed + 1000 * list(FAMILIES).index(family) + place  # no two cases share motions or noise
+    causes = tuple(Hidden(cause, joint, strength, own, once=cause == "contact" and place % 2 == 0)
+                   for cause, joint, strength in hidden)
+    case = SealedCase(family, causes, 100 * seed + (place + place // MACHINES) % MACHINES, own,
+                      _SESSIONS[int(rng.integers(len(_SESSIONS)))])
     return replace(case, **others)  # type: ignore[arg-type]

@@ -73,10 +73,9 @@ def _record(case: SealedCase, session: str) -> Session:
     if case.reference:
         before = [plan.before() for plan in plans if plan.kind in ("excitation", "free") and plan.role == "identify"]
         logs += _recorded(machine, before, standing, 2 * case.seed, _BEFORE)
-    affected = plans[0] if case.once else None
     for place, plan in enumerate(plans):
-        there = hidden if affected in (None, plan) else ()
-        logs += _recorded(machine, [plan], (*standing, *there), 100 * (2 * case.seed + 1) + place, _NOW + place * _BETWEEN)
+        here = [fault for one, fault in zip(case.hidden, hidden, strict=True) if not one.once or place == 0]
+        logs += _recorded(machine, [plan], (*standing, *here), 100 * (2 * case.seed + 1) + place, _NOW + place * _BETWEEN)
     if not case.held:
         logs = [replace(log, torque="measured") for log in logs]
     return Session(tuple(logs), hidden, standing)

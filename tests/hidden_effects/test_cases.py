@@ -75,7 +75,7 @@ def test_a_seed_is_a_campaign() -> None:
     """The same again for the same seed; for another nothing in common, neither machines nor cases."""
     once, again, other = campaign(4), campaign(4), campaign(5)
     assert once == again
-    assert len({case.key for case in once}) == len(once)
+    assert len({case.key for case in once}) == len({case.seed for case in once}) == len(once)
     assert not {case.key for case in once} & {case.key for case in other}
     assert not {case.machine for case in once} & {case.machine for case in other}
 
@@ -132,10 +132,11 @@ def test_no_log_tells_what_is_hidden(hidden: tuple[Hidden, ...], reference: bool
 
 @pytest.mark.usefixtures("brief")
 def test_what_happens_once_is_in_one_log() -> None:
-    case = replace(CASE, hidden=(CONTACT,), once=True)
-    sick, well = record_case(case).logs, record_case(replace(case, hidden=())).logs
-    changed = [not np.array_equal(one.q, other.q) for one, other in zip(sick, well, strict=True)]
-    assert changed == [True, False, False]
+    """And leaves the other causes where they are."""
+    contact = replace(CONTACT, once=True)
+    for hidden, expected in (((contact,), [True, False, False]), ((contact, COGGING), [True, True, True])):
+        sick, well = record_case(replace(CASE, hidden=hidden)).logs, record_case(replace(CASE, hidden=())).logs
+        assert [not np.array_equal(one.q, other.q) for one, other in zip(sick, well, strict=True)] == expected
 
 
 @pytest.mark.usefixtures("brief")
