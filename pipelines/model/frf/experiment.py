@@ -54,7 +54,9 @@ class Turned:
     sample_time: float  # [s]
     quantity: str  # "r" [rad/s^2] under computed torque, "tau" [N m] under PD: the input of the plant
     controller: Controller | None
+    revolute: bool
     speed: float  # [rad/s] at which it turned; 0: it did not
+    swing: float  # [rad/s] std of its speed about that, by the excitation
     period: int | None  # [samples] of v; None: it does not repeat
     stretches: tuple[Stretch, ...]
     whole: Array  # (samples, 4) the log with its reversal
@@ -108,7 +110,8 @@ def turned_joint(log: ExperimentLog) -> Turned:
     top = float(np.nanmax(np.abs(speed)))
     kept = sum(s.stop - s.start for s in stretches)
     posture = log.posture if log.posture is not None else np.asarray(np.nanmedian(mended.q, axis=0))
-    return Turned(log.name, joint, posture, log.sample_time, quantity, log.controller, top if top > _STILL else 0.0,
+    return Turned(log.name, joint, posture, log.sample_time, quantity, log.controller,
+                  log.robot.joints[j].revolute, top if top > _STILL else 0.0, _swing(stretches, log.sample_time),
                   excitation_period(v, log.period, log.sample_time), stretches, signals, 1.0 - kept / log.n_samples,
                   (_mean(stretches, 1), _mean(stretches, -1)))
 
@@ -186,6 +189,12 @@ def _repeats(v: Array, period: int) -> bool:
     difference = np.abs(v[period:] - v[:-period])
     known = difference[np.isfinite(difference)]
     return bool(known.size and known.max() <= _SAME * np.nanmax(np.abs(v)))
+
+
+def _swing(stretches: tuple[Stretch, ...], sample_time: float) -> float:
+    """Std of the speed by differences over four samples, which lets less of the encoder's steps through."""
+    speeds = [(s.signals[4:, POSITION] - s.signals[:-4, POSITION]) / (4.0 * sample_time) for s in stretches]
+    return float(np.sqrt(np.mean(np.concatenate([(v - v.mean()) ** 2 for v in speeds]))))
 
 
 def _mean(stretches: tuple[Stretch, ...], direction: int) -> float | None:

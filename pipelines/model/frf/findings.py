@@ -1,0 +1,78 @@
+"""What gives way, from the responses of all joints and postures: base, joint, delay or nothing, each with its evidence.
+
+    found = frf_findings(logs, arm)
+    found.classification       what is sure
+    found.undecided            what is there and could be more than one thing, and what to record
+
+Kostić et al. 2004, Section IV.D: the base shows at the same frequency in every posture, with a temporary phase lead; what bends in
+the arm moves with the posture. A pair of antiresonance and resonance is explained by masses and springs of either kind with the
+inertia measured in each posture; the one is chosen that explains all postures far better. Where the postures do not tell, only
+what drops out does: a base does not weigh less than the arm it carries. Wrongly naming one for the other is worse than saying
+that it is open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from pipelines.fit.rational import Known
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Arm
+from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
+from pipelines.model.frf.modes import BAND, Modes, fitted_modes
+from pipelines.model.frf.responses import How, Measured, measured_responses
+from pipelines.model.frf.rigid import Expected, expected_rigid
+
+__all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings"]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One joint in one posture: what was measured, its modes, and what the rigid body would do."""
+
+    measured: Measured
+    modes: Modes
+    expected: Expected
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """Of all "frf" logs of an arm."""
+
+    seen: tuple[Seen, ...]
+    classification: tuple[Finding, ...]
+    undecided: tuple[Open, ...]
+
+    def of_cause(self, cause: str) -> tuple[Finding, ...]:
+        """Those that stand for a cause of the library: base_resonance, joint_elasticity, time_delay."""
+        return tuple(one for one in self.classification if one.cause == cause)
+
+
+def frf_findings(logs: Iterable[ExperimentLog], arm: Arm | None = None, how: How | None = None,
+                 band: tuple[float, float] = BAND) -> Findings:
+    """Responses, modes and grouping of "frf" logs.
+
+    Args:
+        logs: of experiment "frf", of one robot.
+        arm: its model, for the inertia to expect; None: the controller's own, where the logs carry it.
+        band: [Hz] in which modes are looked for.
+
+    Raises:
+        InputRejected: a log that no spectrum can be taken of, with what to record: S01, T05, T08, D09.
+    """
+    return findings_of(measured_responses(logs, how), arm, band)
+
+
+def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tuple[float, float] = BAND) -> Findings:
+    """The same, of responses that are there already."""
+    seen = tuple(Seen(one, fitted_modes(one, band), expected_rigid(one, arm)) for one in measured)
+    sure: list[Finding] = []
+    unsure: list[Open] = []
+    for joint in sorted({one.measured.joint for one in seen}):
+        own = [one for one in seen if one.measured.joint == joint]
+        turned = own[0].measured.first
+        found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute)
+        sure += found
+        unsure += left
+    return Findings(seen, *seen_elsewhere(sure, unsure))

@@ -1,0 +1,253 @@
+"""Group the modes of one joint across its postures: base, joint, delay, rigid, or open; the evidence in words and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.fit.rational import Known
+from pipelines.model.frf.compliant import Explained, explain
+from pipelines.model.frf.modes import Modes, Pair
+
+__all__ = ["Finding", "Open", "group_joint", "seen_elsewhere"]
+
+_TELLS = 9.0  # χ² by which one explanation must be better: three standard deviations
+_FITS = 4.0  # χ² per number, beyond which an explanation is none
+_HEAVY = 2.0  # rise above which what drops out outweighs the rest: no base does
+_LIGHT = 0.5  # of the arm's inertia: no base weighs less
+_FLAT = 1.15  # a ratio of magnitudes below it is flat
+_DELAY = 0.15  # of the sample time: the smallest delay worth a word
+_SURE = 5.0  # standard deviations of it
+_NEAR = 0.03  # two joints show the same base within such a share of its frequency
+_TRACE = 1.3  # rise of a pair that may be only a trace of what another joint, or the base, does
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is sure."""
+
+    kind: str  # "base", "joint", "rigid", "delay"
+    joint: int | None  # 1-based; None: the base
+    evidence: str
+    cause: str | None  # as the library of causes calls it; None: nothing is wrong
+    frequency: Known | None  # [Hz] of the base's resonance; of the joint's antiresonance, its motor locked
+    damping: Known | None  # ratio, of the same
+    parameters: Mapping[str, Known]  # as findings report them, SI
+    seen_at: tuple[int, ...]  # joints
+
+
+@dataclass(frozen=True)
+class Open:
+    """One thing that is there and could be more than one."""
+
+    joint: int
+    frequency: Known | None  # [Hz]
+    candidates: tuple[str, ...]
+    evidence: str
+    experiment: str  # what to record to tell
+
+
+def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True) -> tuple[list[Finding], list[Open]]:
+    """What the responses of one joint (1-based), one a posture, say together."""
+    delays, unclear = _delay(joint, modes, sample_time)
+    count = min(len(m.pairs) for m in modes)
+    pairs = [_strongest(m, count) for m in modes]
+    unclear += _leftover(joint, modes, count)
+    found, more = _springs(joint, modes, pairs, "kg m²" if revolute else "kg") if count else ([], [])
+    if not (found or more or delays or unclear):
+        still = _rigid(joint, modes)
+        found, more = ([still], []) if isinstance(still, Finding) else ([], [still])
+    return [*found, *delays], [*more, *unclear]
+
+
+def _strongest(modes: Modes, count: int) -> list[Pair]:
+    kept = sorted(modes.pairs, key=lambda p: -p.rise)[:count]
+    return sorted(kept, key=lambda p: p.antiresonance.frequency.value)
+
+
+def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
+    """What one posture shows and another does not, and what has no partner."""
+    extra = [p.resonance.frequency for m in modes for p in sorted(m.pairs, key=lambda p: -p.rise)[count:]]
+    alone = [m.frequency for one in modes for m in one.single]
+    found = []
+    if extra:
+        found.append(Open(joint, extra[0], ("base_resonance", "joint_elasticity"),
+                          f"A pair at {_many(extra)} Hz is seen in some postures of joint {joint} only.",
+                          "the same posture again, longer or excited more strongly"))
+    if alone:
+        found.append(Open(joint, alone[0], ("joint_elasticity", "base_resonance", "drive_lag"),
+                          f"A mode at {_many(alone)} Hz has no partner: antiresonance without resonance above it, or the reverse.",
+                          "excitation to higher frequencies, and a second posture"))
+    return found
+
+
+def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str) -> tuple[list[Finding], list[Open]]:
+    inertia = [m.inertia.value if m.inertia else float("nan") for m in modes]
+    if not np.isfinite(inertia).all() or min(inertia) <= 0.0:
+        return [], [_open(joint, pairs, "the inertia of the joint could not be measured")]
+    if len(pairs[0]) == 1:
+        return _one_spring(joint, pairs, inertia, unit)
+    if len(pairs[0]) == 2:
+        both = explain(pairs, inertia, base=True, joint=True)
+        if both is not None and len(pairs) > 1 and _accepted(both) and _moves(inertia):
+            words = (f"{_told(pairs, inertia, unit)}. A base and a spring in the joint together explain both pairs in all "
+                     f"{len(pairs)} postures (χ² {both.misfit:.3g} for {both.freedom}).")
+            return [_as_base(both, pairs, words, joint), _as_joint(joint, both, pairs, inertia, words)], []
+        strong = [sorted(own, key=lambda p: -p.rise) for own in pairs]
+        if all(own[0].rise > _HEAVY and own[1].rise < _TRACE for own in strong):
+            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit)
+            return found, [*open_, _open(joint, [[own[1]] for own in strong], "a small pair beside a large one")]
+    return [], [_open(joint, pairs, f"{len(pairs[0])} pairs that no base and joint spring explain together")]
+
+
+def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str) -> tuple[list[Finding], list[Open]]:
+    base, spring = explain(pairs, inertia, True, False), explain(pairs, inertia, False, True)
+    assert base is not None
+    assert spring is not None
+    told = _told(pairs, inertia, unit)
+    rise = float(np.mean([own[0].rise for own in pairs]))
+    assert base.base is not None
+    if spring.misfit > base.misfit + _TELLS and _accepted(base):
+        if base.base[1] < _LIGHT * float(np.mean(inertia)):
+            return [], [_open(joint, pairs, f"{told}; it stays as a base's would, but {base.base[1]:.2g} {unit} are too little "
+                              "for a base")]
+        words = (f"{told}. The resonance stays where it is while the inertia changes, with a phase lead between the two: a base of "
+                 f"{base.base[1]:.3g} {unit} explains every frequency (χ² {base.misfit:.2g} for {base.freedom}), a spring in the "
+                 f"joint does not (χ² {spring.misfit:.3g}).")
+        return [_as_base(base, pairs, words, joint)], []
+    if base.misfit > spring.misfit + _TELLS and _accepted(spring):
+        assert spring.joint is not None
+        words = (f"{told}. The antiresonance moves with the posture as a link on a spring does. The level above the resonance is "
+                 f"{rise:.3g} times that below: 1/J of a motor of {spring.joint[1]:.3g} {unit}. A spring in the joint explains "
+                 f"every frequency (χ² {spring.misfit:.2g} for {spring.freedom}), a base does not (χ² {base.misfit:.3g}).")
+        return [_as_joint(joint, spring, pairs, inertia, words)], []
+    if _accepted(spring) and all(own[0].rise > _HEAVY for own in pairs):
+        assert spring.joint is not None
+        words = (f"{told}. The postures do not tell base and joint apart, but the level above the resonance is {rise:.3g} times "
+                 f"that below: what drops out there outweighs what is left, {spring.joint[1]:.3g} {unit}. That is a link behind a "
+                 "spring, not a base lighter than its arm.")
+        return [_as_joint(joint, spring, pairs, inertia, words)], []
+    why = "one posture only" if len(pairs) == 1 else "the inertia hardly differs between the postures" if not _moves(inertia) \
+        else f"a base explains it with χ² {base.misfit:.3g}, a spring in the joint with {spring.misfit:.3g} for {base.freedom}"
+    return [], [_open(joint, pairs, f"{told}; {why}")]
+
+
+def _accepted(one: Explained) -> bool:
+    return one.misfit <= _TELLS + _FITS * one.freedom
+
+
+def _moves(inertia: Sequence[float]) -> bool:
+    """Whether postures differ enough in inertia to tell by."""
+    return max(inertia) > 1.03 * min(inertia)
+
+
+def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int) -> Finding:
+    assert one.base is not None
+    frequency, inertia = (Known(v, v * s) for v, s in zip(one.base, one.std[:2], strict=True))
+    near = [min(own, key=lambda p: abs(p.resonance.frequency.value - frequency.value)) for own in pairs]
+    measured = _mean([p.resonance.frequency for p in near])
+    damping = _mean([p.resonance.damping for p in near])
+    return Finding("base", None, words, "base_resonance", measured, damping,
+                   {"frequency": measured, "damping_ratio": damping, "inertia": inertia}, (joint,))
+
+
+def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list[float], words: str) -> Finding:
+    assert one.joint is not None
+    stiffness, motor = (Known(v, v * s) for v, s in zip(one.joint, one.std[-2:], strict=True))
+    link = np.array(inertia) - motor.value
+    locked = np.sqrt(stiffness.value / link) / (2.0 * np.pi)
+    near = [min(own, key=lambda p: abs(p.antiresonance.frequency.value - f)) for own, f in zip(pairs, locked, strict=True)]
+    damping = _mean([p.antiresonance.damping for p in near])
+    d = [2.0 * p.antiresonance.damping.value * np.sqrt(stiffness.value * j) for p, j in zip(near, link, strict=True)]
+    share = float(np.hypot(damping.std / max(abs(damping.value), 1e-9), 0.5 * stiffness.std / stiffness.value))
+    mean_link = float(np.mean(link))
+    frequency = float(np.sqrt(stiffness.value / mean_link) / (2.0 * np.pi))
+    return Finding("joint", joint, words, "joint_elasticity",
+                   Known(frequency, frequency * max(p.antiresonance.frequency.std / p.antiresonance.frequency.value for p in near)),
+                   damping, {"stiffness": stiffness, "damping": Known(float(np.mean(d)), float(np.mean(d)) * share),
+                             "frequency": Known(frequency, 0.5 * frequency * stiffness.std / stiffness.value),
+                             "motor_inertia": motor}, (joint,))
+
+
+def _mean(values: Sequence[Known]) -> Known:
+    """Weighted with 1/std²; its deviation holds what the values scatter, too."""
+    weight = np.array([1.0 / max(v.std, 1e-12) ** 2 for v in values])
+    mean = float(weight @ [v.value for v in values] / weight.sum())
+    scatter = float(weight @ [(v.value - mean) ** 2 for v in values]) / max(len(values) - 1, 1)
+    return Known(mean, float(np.sqrt(max(scatter, 1.0) / weight.sum())))
+
+
+def _delay(joint: int, modes: Sequence[Modes], sample_time: float) -> tuple[list[Finding], list[Open]]:
+    mean = _mean([m.delay for m in modes])
+    if not np.isfinite(mean.value) or abs(mean.value) < max(_DELAY * sample_time, _SURE * mean.std):
+        return [], []
+    each = ", ".join(f"{1e3 * m.delay.value:.3g}" for m in modes)
+    flat = max(m.flat for m in modes)
+    if flat < _FLAT and mean.value > 0.0:
+        words = (f"Beside its modes the magnitude is flat within {100.0 * (flat - 1.0):.2g} % and the phase falls in proportion to "
+                 f"the frequency: position comes {each} ms late in {_postures(modes)}, beyond the hold and the controller's own delay.")
+        return [Finding("delay", joint, words, "time_delay", None, None, {"delay": mean}, (joint,))], []
+    return [], [Open(joint, None, ("drive_lag", "time_delay", "torque_lag"),
+                     f"The phase falls as with {each} ms of delay, but the magnitude is not flat: it changes by a factor of {flat:.3g}.",
+                     "the measured motor current beside the command")]
+
+
+def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
+    flat, low, high = max(m.flat for m in modes), min(m.band[0] for m in modes), max(m.band[1] for m in modes)
+    if flat < _FLAT:
+        words = (f"No mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration per input is flat within "
+                 f"{100.0 * (flat - 1.0):.2g} %, without delay.")
+        return Finding("rigid", joint, words, None, None, None, {}, (joint,))
+    return Open(joint, None, ("drive_lag", "joint_elasticity"),
+                f"No mode is distinct, yet the acceleration per input changes by a factor of {flat:.3g}.",
+                "longer, with stronger excitation, and in a second posture")
+
+
+def _open(joint: int, pairs: list[list[Pair]], why: str) -> Open:
+    first = min((p for own in pairs for p in own), key=lambda p: p.resonance.frequency.value)
+    return Open(joint, first.resonance.frequency, ("base_resonance", "joint_elasticity"),
+                f"{why[0].upper()}{why[1:]}.",
+                f"joint {joint} in a further posture of the other joints that changes its inertia by a tenth or more")
+
+
+def _told(pairs: list[list[Pair]], inertia: Sequence[float], unit: str) -> str:
+    low = [p.antiresonance.frequency for own in pairs for p in own]
+    high = [p.resonance.frequency for own in pairs for p in own]
+    moved = ", ".join(f"{j:.3g}" for j in inertia)
+    return f"Antiresonance at {_many(low)} Hz, resonance at {_many(high)} Hz, with {moved} {unit} at the joint"
+
+
+def _postures(modes: Sequence[Modes]) -> str:
+    return "one posture" if len(modes) == 1 else f"{len(modes)} postures"
+
+
+def _many(values: Sequence[Known]) -> str:
+    return ", ".join(f"{v.value:.4g}" for v in values)
+
+
+def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
+    """Where the base is known, what other joints show at its frequency is the base as well."""
+    bases = [one for one in sure if one.kind == "base"]
+    rest = [one for one in sure if one.kind != "base"]
+    merged: list[Finding] = []
+    for one in bases:
+        same = next((k for k, m in enumerate(merged) if _same(m.frequency, one.frequency)), None)
+        if same is None:
+            merged.append(one)
+        else:
+            merged[same] = replace(merged[same], seen_at=(*merged[same].seen_at, *one.seen_at))
+    left = []
+    for question in unsure:
+        place = next((k for k, m in enumerate(merged) if "base_resonance" in question.candidates
+                      and _same(m.frequency, question.frequency)), None)
+        if place is None:
+            left.append(question)
+        elif question.joint not in merged[place].seen_at:
+            merged[place] = replace(merged[place], seen_at=(*merged[place].seen_at, question.joint))
+    return (*merged, *rest), tuple(left)
+
+
+def _same(a: Known | None, b: Known | None) -> bool:
+    return a is not None and b is not None and abs(a.value - b.value) < _NEAR * a.value

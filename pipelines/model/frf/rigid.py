@@ -1,0 +1,68 @@
+"""What a rigid body would answer: the double integrator with the inertia of the posture.
+
+    under computed torque   q_j/r_j = D̂_jj(q) / D_jj(q) · 1/s²,    under PD   q_j/τ_j = 1 / (D_jj(q) s²)
+
+sampled and held, the other joints standing still. D̂ is the inertia of the controller's model, D that of the arm's: where no
+better model is known they are one, and the response is 1/s² (Kostić et al. 2004, eq. (26)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.errors import RrridError
+from pipelines.log.experiment import Array
+from pipelines.log.model_file import parse_model
+from pipelines.model.arm import Arm
+from pipelines.model.frf.experiment import Turned
+from pipelines.model.frf.responses import Measured
+
+__all__ = ["Expected", "expected_rigid"]
+
+_ANGLES = 16  # of the turn, over which the inertia is averaged
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Of one response."""
+
+    level: float | None  # of the acceleration per input: 1 or D̂/D under computed torque, 1/D under PD [1/(kg m^2)]
+    inertia: float | None  # D_jj [kg m^2] in the posture
+    source: str  # whose model: "given model", "controller's model", "none"
+
+
+def expected_rigid(measured: Measured, arm: Arm | None) -> Expected:
+    """The level of acceleration to expect, and the inertia behind it."""
+    turned = measured.first
+    controllers = _controllers(turned)
+    model = arm if arm is not None else controllers
+    inertia = None if model is None else _inertia(model, turned)
+    source = "none" if model is None else "given model" if arm is not None else "controller's model"
+    if turned.quantity == "tau":
+        return Expected(None if inertia is None else 1.0 / inertia, inertia, source)
+    if inertia is None:
+        return Expected(1.0, None, source)
+    theirs = _inertia(controllers, turned) if controllers is not None else inertia
+    return Expected(theirs / inertia, inertia, source)
+
+
+def _controllers(turned: Turned) -> Arm | None:
+    text = turned.controller.model if turned.controller is not None else None
+    if text is None:
+        return None
+    try:
+        return Arm.from_model(parse_model(text))
+    except RrridError:
+        return None  # a model that cannot be read is one that is not there
+
+
+def _inertia(arm: Arm, turned: Turned) -> float:
+    """D_jj in the posture, mean over the turn of joint j."""
+    j = turned.joint - 1
+    postures = np.repeat(turned.posture[None], _ANGLES, axis=0)
+    if turned.speed > 0.0 and arm.robot.joints[j].revolute:
+        postures[:, j] += np.linspace(0.0, 2.0 * np.pi, _ANGLES, endpoint=False)
+    matrices: Array = arm.body.mass_matrix(postures, arm.p)
+    return float(matrices[:, j, j].mean())
