@@ -1,0 +1,77 @@
+"""An encoder whose reading follows another joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.perturbation import perturbed_torque, shifted
+
+__all__ = ["EncoderCrosstalk"]
+
+
+@dataclass(frozen=True)
+class EncoderCrosstalk(Effect):
+    """q_measured,j = q_j + c q_i: joint j, where this effect sits, is read with a part of joint i, which is read well.
+
+    To first order τ = c P_j(-q_i). Exactly: c q_i taken off q_j, and so with speed and acceleration.
+    """
+
+    from_joint: int = 1  # i
+
+    name = "encoder_crosstalk"
+    title = "Encoder that follows another joint"
+    parameters = (
+        Quantity("coefficient", "1", -0.5, 0.5, "part of the other joint's angle in this one's reading"),
+        Quantity("from_joint", "1", 1.0, 64.0, "the other joint", shape=True, discrete=True),
+    )
+    signature = "An error of this joint's angle that follows the angle of another one, felt by all rows."
+    explanation = "Belts, cables or a parallel rod turn this encoder a little when another joint moves, or two channels mix."
+    remedy = "Take the part found off the reading; look at what couples the two encoders."
+    experiment = "Hold this joint still against a stop or a level and move the other over its range."
+    twins = ("link_length", "transmission_coupling")
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return perturbed_torque(arm.torque, motion, self._index, *self._error(motion))[..., None]
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        for other in range(1, arm.n_joints + 1):
+            if other != self.joint:
+                yield replace(self, from_joint=other)
+
+    def at(self, values: Values) -> Self:
+        return replace(self, from_joint=round(values["from_joint"]))
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
+        true, c = motion, values["coefficient"]
+        if c:
+            d, rate, second = self.at(values)._error(motion)
+            true = shifted(motion, self._index, c * d, c * rate, c * second)
+        return predict(true, arm) if predict is not None else arm.torque(true)
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        c, other = values["coefficient"], self.at(values)._other(arm.n_joints)
+
+        def sensor(q: Array, _: Array) -> Array:
+            seen = q.copy()
+            seen[:, self._index] += c * q[:, other]
+            return seen
+
+        def settled(motion: Motion, _: Array) -> Array:
+            q = motion.q.copy()
+            q[:, self._index] -= c * q[:, other]
+            return q
+
+        return Hooks(sensor=sensor, settled=settled)
+
+    def _error(self, motion: Motion) -> tuple[Array, Array, Array]:
+        """-q_i and its derivatives."""
+        other = self._other(motion.q.shape[1])
+        return -motion.q[:, other], -motion.dq[:, other], -motion.ddq[:, other]
+
+    def _other(self, n_joints: int) -> int:
+        """Column of the other joint; on an arm that has no such joint the last one's."""
+        return min(self.from_joint, n_joints) - 1

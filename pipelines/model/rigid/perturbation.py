@@ -1,0 +1,111 @@
+"""What torque becomes when one joint is not where it was measured, and how far a soft joint gives way.
+
+    P_j(d) = K_j d + C_j ḋ + M_j d̈,    K, C, M = ∂τ/∂(q, q̇, q̈)
+
+`torque` is any function of a motion: with friction inside, its slope is part of C. Derivatives by time are taken of what a
+model predicts, never of what was measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["deflection", "oscillation", "perturbed_torque", "rate_of", "shifted"]
+
+Torque = Callable[[Motion], Array]
+
+_STEP = 1e-6  # [rad], [rad/s] and, thousandfold, [rad/s^2]: far below what friction's sharpness resolves, far above rounding
+_ROUNDS = 3  # each leaves what is of higher order in the deflection
+_LEAST = 0.1  # of the inertia that a joint feels: what stays beyond its spring at least
+
+
+def rate_of(x: Array, t: Array) -> Array:
+    """dx/dt (samples, …) by central differences; zero of a single sample."""
+    return np.asarray(np.gradient(x, t, axis=0)) if len(t) > 1 else np.zeros_like(x)
+
+
+def shifted(motion: Motion, index: int, d: Array, rate: Array, second: Array) -> Motion:
+    """`motion` with joint `index` further by d (samples,) [rad], with the derivatives of d."""
+    q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+    q[:, index] += d
+    dq[:, index] += rate
+    ddq[:, index] += second
+    return replace(motion, q=q, dq=dq, ddq=ddq)
+
+
+def perturbed_torque(torque: Torque, motion: Motion, index: int, d: Array, rate: Array, second: Array) -> Array:
+    """P_j(d) (samples, joints), by central differences along the direction (d, ḋ, d̈), in all samples at once."""
+    size = max(np.abs(d).max(initial=0.0), np.abs(rate).max(initial=0.0), 1e-3 * np.abs(second).max(initial=0.0))
+    if size == 0.0:
+        return np.zeros_like(motion.q)
+    e = _STEP / size
+    ahead, behind = (torque(shifted(motion, index, s * d, s * rate, s * second)) for s in (e, -e))
+    return np.asarray((ahead - behind) / (2.0 * e))
+
+
+def deflection(torque: Torque, motion: Motion, index: int, stiffness: float, damping: float,
+               inertia: float) -> tuple[Array, Array, Array]:
+    """x, ẋ, ẍ (samples,) by which a joint on a spring gives way: exactly, with what it then needs.
+
+        k x + d ẋ + I (q̈ + ẍ) + τ_j(q + x) = 0          for I < 0: a motor that was counted with its link
+        k x + d ẋ + I ẍ + τ_j(q + x) = 0                 for I > 0: a base below the joint
+
+    `torque` is that of the rigid arm. Newton's method: what is linear in x has coefficients that vary with time and is
+    solved from sample to sample.
+    """
+    base, own = inertia > 0.0, motion.ddq[:, index]
+    zero, one = np.zeros(len(motion.t)), np.ones(len(motion.t))
+    mass, drag, spring = (perturbed_torque(torque, motion, index, *unit)[:, index]
+                          for unit in ((zero, zero, one), (zero, one, zero), (one, zero, zero)))
+    mass = np.maximum(mass + inertia, _LEAST * mass)
+    drag, spring = drag + damping, np.maximum(spring + stiffness, 0.5 * stiffness)
+    x = rate = second = zero
+    for _ in range(_ROUNDS):
+        tau = torque(shifted(motion, index, x, rate, second))[:, index]
+        left = stiffness * x + damping * rate + tau + inertia * (second if base else own + second)
+        more = oscillation(motion.t, mass, drag, spring, -left)
+        x, rate, second = (a + b for a, b in zip((x, rate, second), more, strict=True))
+    return x, rate, second
+
+
+def oscillation(t: Array, mass: Array, drag: Array, spring: Array, force: Array) -> tuple[Array, Array, Array]:
+    """x, ẋ, ẍ of m ẍ + c ẋ + k x = f, coefficients and force (samples,), settled at the first sample.
+
+    x = f/k + y: what remains for y is small where the spring is stiff, so that no digits are lost there. Within a sample
+    coefficients are held and the force is a straight line: exact for that, however stiff.
+    """
+    still = force / spring
+    rate = rate_of(still, t)
+    second = rate_of(rate, t)
+    rest = -(mass * second + drag * rate)
+    m, c, k = (0.5 * (z[1:] + z[:-1]) for z in (mass, drag, spring))
+    y, dy = _propagated(np.diff(t), m, c, k, rest)
+    return still + y, rate + dy, second + (rest - drag * dy - spring * y) / mass
+
+
+def _propagated(h: Array, m: Array, c: Array, k: Array, f: Array) -> tuple[Array, Array]:
+    """y and ẏ (samples,) of m ÿ + c ẏ + k y = f; h, m, c, k (samples - 1,) of the intervals.
+
+    With slope s of the force, y = (f + s t)/k - c s/k² + e^(-at) (A cos wt + B sin wt), a = c/2m, w² = k/m - a².
+    """
+    s = np.diff(f) / h
+    a = 0.5 * c / m
+    w = np.sqrt((k / m - a * a).astype(complex))
+    one, other = np.exp((1j * w - a) * h), np.exp((-1j * w - a) * h)
+    cos, sinc = 0.5 * (one + other).real, ((one - other) / np.where(w == 0.0, 1.0, 2j * w)).real  # e^(-at) cos wt, sin wt / w
+    sinc, lag = np.where(w == 0.0, h * one.real, sinc), c * s / k**2
+    columns = (cos + a * sinc, sinc, -sinc * k / m, cos - a * sinc,
+               f[:-1] / k - lag, f[1:] / k - lag, s / k)
+    y, dy = (float(column[0]) if len(column) else 0.0 for column in (columns[4], columns[6]))  # settled: no ringing at the start
+    found = [(y, dy)]
+    for p11, p12, p21, p22, before, after, speed in zip(*(column.tolist() for column in columns), strict=True):
+        u, v = y - before, dy - speed
+        y, dy = after + p11 * u + p12 * v, speed + p21 * u + p22 * v
+        found.append((y, dy))
+    both = np.array(found)
+    return both[:, 0], both[:, 1]
