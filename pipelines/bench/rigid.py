@@ -49,8 +49,15 @@ class RigidDynamics:
 
     def torque(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Torque (samples, n) [N m] along a motion, each argument (samples, n)."""
-        rows = zip(q.tolist(), dq.tolist(), ddq.tolist(), strict=True)
-        return np.array([np.sum(self.parts(*row), axis=0) for row in rows])
+        model, data, out = self._model, self._data, np.zeros(np.shape(q))
+        position, speed, acceleration = data.qpos, data.qvel, data.qacc
+        for row, q_k, dq_k, ddq_k in zip(out, q, dq, ddq, strict=True):
+            position[:], speed[:], acceleration[:] = q_k, dq_k, ddq_k
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_comVel(model, data)
+            mujoco.mj_rne(model, data, 1, row)
+        return out
 
 
 def _postures(robot: RobotDescription, number: int) -> Array:
