@@ -94,6 +94,7 @@ class Stage(Generic[S, R]):
     checks: Callable[[R], tuple[Check, ...]] = lambda result: ()  # what compute found or mended
     onward: Callable[[R, Inputs], Inputs] = lambda result, inputs: inputs  # what `run` hands to the stages after it
     in_run: S | None = None  # settings within `run`, where they are others than by default
+    durations: Callable[[R], dict[str, float]] = lambda result: {}  # [s] of parts of compute, for provenance.json alone
 
 
 @dataclass(frozen=True)
@@ -201,7 +202,7 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     try:
         _fill(staging, stage, result, report, object_, series, request, hashes)
         _unchanged(hashes)
-        _provenance(staging, stage, settings, request, hashes, started)
+        _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
         replace_folder(staging, out)
     except EnvironmentFault as problem:
         problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
@@ -243,7 +244,8 @@ def _unchanged(hashes: dict[Path, str]) -> None:
                            remedy="wait until the recording is finished").as_error()
 
 
-def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request, hashes: dict[Path, str], started: float) -> None:
+def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request, hashes: dict[Path, str], started: float,
+                durations: dict[str, float]) -> None:
     outputs = {path.relative_to(folder).as_posix(): hash_file(path) for path in sorted(folder.rglob("*")) if path.is_file()}
     about = {
         "tool": "rrrid", "version": __version__, "command": stage.name,
@@ -254,7 +256,7 @@ def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request,
         "inputs": {str(path): value for path, value in hashes.items()}, "outputs": outputs,
         "python": platform.python_version(), "libraries": _libraries(),
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(started)), "duration": time.time() - started,
-    }
+    } | ({"durations": durations} if durations else {})
     write_file(folder / PROVENANCE, lambda draft: _text(draft, json_text(tilde(about))))
 
 

@@ -23,7 +23,8 @@ Average = Annotated[bool | None, typer.Option("--average/--no-average",
                                               help="Of a periodic log, take the mean of periods that are alike. [average]")]
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
-STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation")
+STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation",
+          "validate-writing")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
                   pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -226,6 +227,38 @@ def design_excitation(
         "symmetric": symmetric, "model": model, "bounds": bounds, "home": numbers(home, "--home"),
         "rest": False if no_rest else None, "periods": periods, "friction": friction, "tip_speed": tip_speed,
         "tip_box": numbers(tip_box, "--tip-box"), "recipe": recipe})
+
+
+@app.command("validate-writing", cls=StageCommand)
+@with_common
+def validate_writing(
+    common: Common,
+    logs: Annotated[list[Path] | None, typer.Argument(help="Logs, or folders of logs; none to design the task alone.",
+                                                      show_default=False, metavar="LOGS", readable=False)] = None,
+    model: Annotated[str | None, typer.Option(help="model.json to judge. [the folder's, else fitted to its logs]")] = None,
+    torque_gate: Annotated[float | None, typer.Option(help="Largest relative torque error of a joint. [0.1]")] = None,
+    draws: Annotated[int | None, typer.Option(help="Models that simulated control cases run on in turn. [5]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of those, and of via points. [1]")] = None,
+    no_simulation: Annotated[bool, typer.Option("--no-simulation", help="Judge by what was recorded alone.")] = False,
+    text: Annotated[str | None, typer.Option(help="Design this writing task instead: trajectory.h5 for the robot.")] = None,
+    plane_y: Annotated[float | None, typer.Option(help="Plane of the letters, y [m]. [-0.4]")] = None,
+    x: Annotated[float | None, typer.Option(help="Middle of the text, x [m]. [0]")] = None,
+    z: Annotated[float | None, typer.Option(help="Middle of the text, z [m]. [0.56]")] = None,
+    size: Annotated[float | None, typer.Option(help="Height of a letter [m]. [0.12]")] = None,
+    speed: Annotated[float | None, typer.Option(help="Speed of the tip in fast phases [m/s]. [0.6]")] = None,
+    slow: Annotated[float | None, typer.Option(help="In slow phases, from a line into an arc [m/s]. [0.05]")] = None,
+    elbow: Annotated[str | None, typer.Option(help="up or down, of the RRR arm. [up]")] = None,
+    posture: Annotated[list[str] | None, typer.Option(help="Posture near the task [rad], of any other arm.")] = None,
+    via_points: Annotated[int | None, typer.Option(help="Design so many moves between random postures instead.")] = None,
+    recipe: Annotated[str | None, typer.Option(help="Recipe of import: controller.csv in its order, units and rate.")] = None,
+) -> None:
+    """Validate the model on the writing task: torque, six control cases, simulation; or design the task."""
+    from pipelines.validate_writing import STAGE
+
+    _go(STAGE, tuple(logs or ()), common, {
+        "model": model, "torque_gate": torque_gate, "draws": draws, "seed": seed, "simulate": False if no_simulation else None,
+        "text": text, "plane_y": plane_y, "x": x, "z": z, "size": size, "speed": speed, "slow": slow, "elbow": elbow,
+        "posture": numbers(posture, "--posture"), "via_points": via_points, "recipe": recipe})
 
 
 @app.command()

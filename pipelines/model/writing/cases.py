@@ -1,7 +1,7 @@
 """The second validation: the writing task in six control cases, and how far the tip strays in each.
 
-    1  PD alone, eq. (23)
-    2  friction        3  friction, inertia        4  friction, Coriolis        5  friction, gravity        6  all    ahead of it, eq. (24)
+    1  PD alone, eq. (23); and with parts of the model's torque on the reference ahead of it, eq. (24):
+    2  friction   3  friction, inertia   4  friction, Coriolis   5  friction, gravity   6  all of it
 
 Kostić et al. 2004, Section IV.C.5, Table IV, Figs. 15 and 16: the standard deviation of the tip's error over the task, in x, y, z.
 """
@@ -18,7 +18,7 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
 
-__all__ = ["CASES", "Case", "TipStd", "TipTrack", "case_of", "measured_cases", "tip_std", "track"]
+__all__ = ["CASES", "Case", "TipStd", "TipTrack", "case_of", "measured_cases", "one_task", "tip_std", "track"]
 
 CASES: tuple[tuple[str, ...], ...] = (
     (), ("friction",), ("friction", "inertia"), ("friction", "coriolis"), ("friction", "gravity"),

@@ -20,7 +20,6 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import condition
-from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.online import OnlineModel
 from pipelines.model.rigid.body import Motion
@@ -82,6 +81,7 @@ class Online:
     observer: str  # whose motion: "the controller's" | "a Kalman observer after the fact"
     rms: Array  # [N m] (joints,)
     relative_error: Array  # (joints,)
+    relative_error_low_pass: Array  # after the low-pass of the first validation: an observer's acceleration is noisy
     differs: float  # [N m] largest difference from the same model on arrays
 
 
@@ -93,6 +93,7 @@ class FirstValidation:
     experiment: str
     role: str
     law: str  # of its controller
+    samples: int  # compared
     torque_units: tuple[str, ...]
     rms: Array  # [N m] measured minus model
     signal_rms: Array  # [N m] measured
@@ -108,10 +109,14 @@ class FirstValidation:
     course: Course | None
 
 
-def residual(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque) -> tuple[Array, float | None]:
-    """Measured minus modelled torque after a zero-phase low-pass (samples, joints) [N m], zero where nothing is known, and
-    its cut-off [Hz], five times the motion's highest frequency."""
-    left = np.where(_known(log, motion)[:, None], log.tau - parts.total, 0.0)
+def residual(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque) -> Array:
+    """Measured minus modelled torque (samples, joints) [N m] after a zero-phase low-pass, zero where nothing is known."""
+    return _low_passed(log, motion, log.tau - parts.total)[0]
+
+
+def _low_passed(log: ExperimentLog, motion: Reconstructed, torque: Array) -> tuple[Array, float | None]:
+    """`torque`, zero where nothing is known, below five times the motion's highest frequency, and that cut-off [Hz]."""
+    left = np.where(_known(log, motion)[:, None], torque, 0.0)
     how = condition(motion.motion, 1.0 / log.sample_time, None, None, np.zeros(log.n_joints))
     if how.low_pass is None or len(left) <= how.low_pass.padding:
         return left, None
@@ -123,21 +128,21 @@ def first_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts:
     """How far the model's torque is from the measured one, and where; `parts` are the model's (`outcome.torques`)."""
     known = _known(log, motion)
     left, measured = (log.tau - parts.total)[known], log.tau[known]
-    smooth, cutoff = residual(log, motion, parts)
-    whole = residual(log, motion, _nothing(parts))[0]
+    smooth, cutoff = _low_passed(log, motion, log.tau - parts.total)
+    whole, _ = _low_passed(log, motion, log.tau)
     wanted = reference_tip(log)
     marks, tip = marks_of(log, wanted), _tip(motion, arm)
     size = _rms(measured)
     return FirstValidation(
         log.name, log.experiment, log.role, "unknown" if log.controller is None else log.controller.law,
-        tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints),
+        int(known.sum()), tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints),
         _rms(left), size, _ratio(_rms(left), size), cutoff, _ratio(_rms(smooth[known]), _rms(whole[known])),
         {name: _rms(getattr(parts, name)[known]) for name in _PARTS}, marks.kind, marks.text,
         _letters(log, smooth, known, marks, _rms(whole[known])), _largest(log, smooth, known, marks, tip), online,
         _course(log, parts, tip, known) if draw else None)
 
 
-def online_validation(log: ExperimentLog, arm: Arm) -> tuple[Online, float]:
+def online_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> tuple[Online, float]:
     """The model as a controller evaluates it, sample by sample, and how long one sample took [s].
 
     The motion is what the log says the controller observed; without that, what a Kalman observer would have.
@@ -154,9 +159,10 @@ def online_validation(log: ExperimentLog, arm: Arm) -> tuple[Online, float]:
     seconds = (time.perf_counter() - begun) / len(rows)
     torque = np.array(one_by_one)
     arrays = arm.torque(Motion(log.t, np.array(q), np.array(dq), np.array(ddq)))
-    known = np.isfinite(log.tau).all(axis=1)
-    left = _rms((log.tau - torque)[known])
-    return Online("the controller's" if logged else "a Kalman observer after the fact", left, _ratio(left, _rms(log.tau[known])),
+    known = _known(log, motion)
+    left, smooth, whole = (log.tau - torque)[known], *(_low_passed(log, motion, x)[0][known] for x in (log.tau - torque, log.tau))
+    return Online("the controller's" if logged else "a Kalman observer after the fact", _rms(left),
+                  _ratio(_rms(left), _rms(log.tau[known])), _ratio(_rms(smooth), _rms(whole)),
                   float(np.abs(torque - arrays).max())), seconds
 
 
@@ -165,10 +171,6 @@ def _known(log: ExperimentLog, motion: Reconstructed) -> npt.NDArray[np.bool_]:
     good: npt.NDArray[np.bool_] = np.zeros(log.n_samples, dtype=bool)
     good[motion.good.kept] = motion.good.fit
     return np.asarray(good & np.isfinite(log.tau).all(axis=1))
-
-
-def _nothing(parts: ArmTorque) -> ArmTorque:
-    return ArmTorque(*(np.zeros_like(parts.inertia) for _ in _PARTS))
 
 
 def _tip(motion: Reconstructed, arm: Arm) -> Array:

@@ -9,6 +9,7 @@ tip's reference to the next are numbered; without a reference, or one that never
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -52,7 +53,7 @@ def marks_of(log: ExperimentLog, wanted: Array | None) -> Marks:
             return strokes
     edges = np.linspace(0.0, log.n_samples, _STRETCHES + 1).astype(int)
     ends = [float(log.t[min(k, log.n_samples - 1)] - log.t[0]) for k in edges]
-    labels = tuple(f"{a:.1f} to {b:.1f} s" for a, b in zip(ends[:-1], ends[1:], strict=True))
+    labels = tuple(f"{a:.1f} to {b:.1f} s" for a, b in pairwise(ends))
     return Marks("time", "", labels, np.repeat(np.arange(_STRETCHES), np.diff(edges)))
 
 

@@ -1,0 +1,178 @@
+"""Figures of the writing task: letters as wanted and executed (Fig. 16), torque and its split (Fig. 14), where it is missed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.model.simulation.course import Course as SimulatedCourse
+from pipelines.model.writing.cases import Case
+from pipelines.model.writing.design import Designed
+from pipelines.model.writing.first_validation import FirstValidation
+from pipelines.report import figures, style
+from pipelines.report.figures import Array
+from pipelines.report.report import Figure
+from pipelines.report.simulation_report import draw_compared
+from pipelines.report.style import format_unit, printable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["error_map_figure", "executed_figure", "simulated_figures", "split_figure", "task_figures"]
+
+_AXES = ("x", "y", "z")
+_LEFT = (1, 2, 3, 4)  # Fig. 16 has the first four cases on one side
+_PARTS = (("inertia", style.BLUE), ("coriolis", style.PURPLE), ("gravity", style.ORANGE), ("friction", style.GREEN),
+          ("left", style.VERMILLION))
+
+
+def plane(tip: Array) -> tuple[int, int]:
+    """The two axes in which a path (points, 3) is widest, the wider names first as x, y, z go."""
+    first, second = sorted(np.argsort(-np.ptp(tip, axis=0), kind="stable")[:2].tolist())
+    return int(first), int(second)
+
+
+def split_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None:
+    """Inertial, Coriolis, gravity and friction torque of the model over time, and what is left of the measured one."""
+    course = found.course
+    if course is None:
+        return None
+
+    def draw(drawing: Drawing) -> None:
+        axes = figures.joint_axes(drawing, course.model.shape[1])
+        for j, axis in enumerate(axes):
+            for name, color in _PARTS:
+                axis.plot(*figures.envelope(course.t, getattr(course, name)[:, j], 800), color=color, linewidth=0.9, label=name)
+            axis.set_title(printable(joints[j], 60), pad=3.0)
+            axis.margins(x=0.01, y=0.08)
+            axis.locator_params(axis="y", nbins=4)
+        axes[-1].set_xlabel("time [s]")
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderpad=0.0)
+        drawing.supylabel(f"torque [{found.torque_units[0]}]", fontsize="medium")
+
+    return Figure(f"split-{found.name}", "What the model's torque is made of, and what it leaves of the measured one.", draw,
+                  figures.joint_size(len(joints)))
+
+
+def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None:
+    """The path of the tip, darker where the model leaves more torque, one picture a joint."""
+    course = found.course
+    if course is None:
+        return None
+    a, b = plane(course.tip)
+
+    def draw(drawing: Drawing) -> None:
+        from matplotlib.collections import LineCollection
+
+        axes = drawing.subplots(len(joints), 1, sharex=True, squeeze=False)[:, 0]
+        points = course.tip[:, [a, b]]
+        lines = np.stack([points[:-1], points[1:]], axis=1)
+        for j, axis in enumerate(axes):
+            size = np.nan_to_num(np.abs(course.left[:, j]))
+            top = float(np.quantile(size, 0.995)) or 1.0
+            drawn = LineCollection(list(lines), cmap="magma_r", linewidths=2.0)
+            drawn.set_array(_spread(size)[:-1])
+            drawn.set_clim(-0.15 * top, top)  # the lightest colour is no colour on white
+            axis.add_collection(drawn)
+            axis.set_xlim(points[:, 0].min() - 0.01, points[:, 0].max() + 0.01)
+            axis.set_ylim(points[:, 1].min() - 0.01, points[:, 1].max() + 0.01)
+            axis.set_aspect("equal")
+            axis.set_title(printable(joints[j], 60), pad=3.0)
+            axis.locator_params(axis="y", nbins=3)
+            bar = drawing.colorbar(drawn, ax=axis, pad=0.02)
+            bar.ax.set_ylim(0.0, top)
+            bar.set_label(f"|left| [{found.torque_units[j]}]")
+        axes[-1].set_xlabel(f"{_AXES[a]} [m]")
+        drawing.supylabel(f"{_AXES[b]} [m]", fontsize="medium")
+
+    return Figure(f"where-{found.name}", "Where on its way the tip is when the model misses torque.", draw,
+                  (6.0, 0.7 + 1.35 * len(joints)))
+
+
+def _spread(size: Array, reach: int = 6) -> Array:
+    """The largest nearby: a peak of one sample would not be seen."""
+    wide = np.pad(size, reach, mode="edge")
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1))
+
+
+def executed_figure(cases: Sequence[Case]) -> Figure | None:
+    """The letters as executed in the control cases, cases 1 to 4 above, 5 and 6 below. Fig. 16."""
+    shown = [one for one in cases if one.track is not None]
+    panels = [part for part in ([c for c in shown if c.case in _LEFT], [c for c in shown if c.case not in _LEFT]) if part]
+    if not panels or shown[0].track is None:
+        return None
+    wanted = shown[0].track.wanted
+    a, b = plane(wanted)
+
+    def draw(drawing: Drawing) -> None:
+        for axis, part in zip(drawing.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0], panels, strict=True):
+            axis.plot(wanted[:, a], wanted[:, b], color=style.BLACK, linewidth=2.6, alpha=0.25, label="wanted")
+            for one in part:
+                assert one.track is not None
+                axis.plot(one.track.executed[:, a], one.track.executed[:, b], color=style.COLOURS[(one.case - 1) % 6],
+                          linewidth=0.8, label=f"case {one.case}")
+            axis.set_aspect("equal")
+            axis.margins(0.03)
+            axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderpad=0.0)
+            axis.set_ylabel(f"{_AXES[b]} [m]")
+            axis.set_xlabel(f"{_AXES[a]} [m]")
+
+    width, height = float(np.ptp(wanted[:, a])), float(np.ptp(wanted[:, b]))
+    return Figure("executed", "The letters as executed, on the wanted ones.", draw,
+                  (6.0, min(len(panels) * (0.9 + 5.2 * height / max(width, 1e-9)), 9.0)))
+
+
+def simulated_figures(name: str, course: SimulatedCourse, unit: str, torque_unit: str) -> list[Figure]:
+    """Position, speed and torque, measured and simulated."""
+    signals = [("position", course.position, course.position_simulated, unit),
+               ("speed", course.speed, course.speed_simulated, f"{unit}/s")]
+    if course.torque is not None and course.torque_simulated is not None:
+        signals.append(("torque", course.torque, course.torque_simulated, torque_unit))
+    return [_compared(f"simulated-{quantity}-{name}", f"{quantity.capitalize()}, measured and simulated.", course.t, one, two, own,
+                      quantity) for quantity, one, two, own in signals]
+
+
+def _compared(name: str, caption: str, t: Array, measured: Array, simulated: Array, unit: str, quantity: str) -> Figure:
+    joints = measured.shape[1]
+    return Figure(name, caption, lambda drawing: draw_compared(figures.joint_axes(drawing, joints), t, measured, simulated, unit,
+                                                               quantity), figures.joint_size(joints))
+
+
+def task_figures(task: Designed, joints: Sequence[str]) -> list[Figure]:
+    """The path and the speed of the tip (Fig. 2), position, speed and acceleration of the joints (Fig. 3)."""
+    a, b = plane(task.tip)
+    size = (6.0, min(1.0 + 5.2 * float(np.ptp(task.tip[:, b])) / max(float(np.ptp(task.tip[:, a])), 1e-9), 6.0))
+    found = [Figure("path", "The path of the tip; grey on the way between strokes.",
+                    lambda drawing: draw_path(drawing.subplots(), task, a, b), size),
+             Figure("tip-speed", "The speed of the tip: fast within a stroke, at rest in corners.",
+                    lambda drawing: draw_speed(drawing.subplots(), task), (6.0, 2.2))]
+    for name, values, power in (("position", task.q, ""), ("speed", task.dq, "/s"), ("acceleration", task.ddq, "/s^2")):
+        found.append(_signal(f"joint-{name}", f"{name.capitalize()} of the joints.", task.t, values, task.units[0] + power, name,
+                             joints))
+    return found
+
+
+def _signal(name: str, caption: str, t: Array, values: Array, unit: str, quantity: str, joints: Sequence[str]) -> Figure:
+    return Figure(name, caption, lambda drawing: figures.draw_joint_signals(
+        figures.joint_axes(drawing, len(joints)), t, values, unit, quantity=quantity, names=joints),
+        figures.joint_size(len(joints)))
+
+
+def draw_path(axes: Axes, task: Designed, a: int, b: int) -> None:
+    writing = task.drawn > 0.0
+    axes.plot(task.tip[:, a], task.tip[:, b], color=style.GREY, linewidth=0.7, alpha=0.6)
+    axes.plot(np.where(writing, task.tip[:, a], np.nan), np.where(writing, task.tip[:, b], np.nan), color=style.BLUE, linewidth=1.6)
+    axes.set_aspect("equal")
+    axes.margins(0.03)
+    axes.set_xlabel(f"{_AXES[a]} [m]")
+    axes.set_ylabel(f"{_AXES[b]} [m]")
+
+
+def draw_speed(axes: Axes, task: Designed) -> None:
+    axes.plot(*figures.envelope(task.t, task.tip_speed), color=style.BLUE)
+    axes.margins(x=0.01, y=0.08)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(f"speed of the tip [{format_unit('m/s')}]")
