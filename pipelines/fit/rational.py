@@ -1,6 +1,6 @@
 """A rational function through a frequency response: modes, plateaus and delay, each with its deviation.
 
-    H(s) = g s⁻ⁱ e^(-s delay) hold(s) · Π (1 + b s + a s²) [zeros] / Π (1 + b s + a s²) [poles]
+    H(s) = g s⁻ⁱ (held, sampled) e^(-s delay) · Π (1 + b s + a s²) [zeros] / Π (1 + b s + a s²) [poles]
 
     found = fit_rational(frequency, response, variance, integrators=2, hold=1e-3, ...)    # rational_search.py
     found.modes()                       resonances and antiresonances inside the band, by frequency
@@ -113,9 +113,19 @@ class Rational:
 
 
 def known_part(s: Complex, integrators: int, hold: float) -> Complex:
-    """s⁻ⁱ times the response of a hold, (1 - e^(-s hold)) / (s hold), at s [rad/s] (bins,)."""
-    held = -np.expm1(-s * hold) / (s * hold) if hold > 0.0 else np.ones_like(s)
-    return np.asarray(held / s**integrators)
+    """s⁻ⁱ at s [rad/s] (bins,) of an input that is held between samples; as it is for hold = 0.
+
+    One or two integrators are sampled exactly, T / (z - 1) and T² (z + 1) / (2 (z - 1)²): what lies above half the rate folds
+    back, 1.6 % at a fifth of the rate. Otherwise the hold alone, (1 - e^(-sT)) / (s T).
+    """
+    if hold <= 0.0:
+        return np.asarray(s ** -float(integrators))
+    step = np.expm1(s * hold)  # z - 1
+    if integrators == 1:
+        return np.asarray(hold / step)
+    if integrators == 2:
+        return np.asarray(0.5 * hold**2 * (step + 2.0) / step**2)
+    return np.asarray(-np.expm1(-s * hold) / (s * hold) * s ** -float(integrators))
 
 
 def product(parameters: Array, s: Complex, zeros: int, sign: float) -> tuple[Complex, Complex]:

@@ -25,8 +25,9 @@ __all__ = ["local_polynomial"]
 Indices = npt.NDArray[np.int64]
 
 _FREEDOM = 10  # least degrees of freedom of a noise estimate: its own deviation is then a third
+_LEAST_FREEDOM = 4  # where a width is asked for
 _AT_ONCE = 2000  # windows solved together
-_EMPTY = 1e-10  # of the strongest column: a regressor smaller than this is not there
+_EMPTY = 1e-10  # of the strongest amplitude: what is smaller is rounding, no source
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +54,8 @@ def local_polynomial(stretches: Sequence[Array], rate: float, frequency: Array, 
         rate: samples a second [Hz].
         frequency: [Hz] (frequencies,) evenly spaced, where the responses are wanted.
         order: of both polynomials.
-        width: [Hz] of the window; None for the narrowest that leaves ten degrees of freedom in each stretch. A periodic
-            source needs order + 2 of its lines in it.
+        width: [Hz] of the window; None for the narrowest that leaves ten degrees of freedom in each stretch, and holds
+            enough lines of a periodic source. That is wide: for a periodic source `multisine_responses` resolves more.
 
     Raises:
         InputRejected: T08, no stretch is long enough for the width; D09, no power of the source anywhere; D01, missing samples.
@@ -77,14 +78,34 @@ def _of_stretch(x: Array, rate: float, frequency: Array, source: int, outputs: l
         raise InputRejected("D01", "missing samples in a signal whose response is asked for", remedy="cut the log at its gaps")
     unknowns, bins = 2 * (order + 1), len(x) / rate
     half = (unknowns + _FREEDOM) // 2 if width is None else int(0.5 * width * bins)
-    if 2 * half + 1 - unknowns < min(_FREEDOM, 4) or 2 * half + 3 > len(x) // 2:
+    if 2 * half + 1 - unknowns < _LEAST_FREEDOM or 2 * half + 3 > len(x) // 2:
         return None
     transform = np.fft.rfft(x[:, [source, *outputs]], axis=0) / np.sqrt(len(x))
+    if width is None:
+        half = _holding_lines(np.abs(transform[:, 0]) ** 2, frequency * bins, half, order)
     middle = np.clip(np.rint(frequency * bins).astype(np.int64), half + 1, len(transform) - half - 2)
     parts = [_solve(transform, middle[a:a + _AT_ONCE], frequency[a:a + _AT_ONCE] * bins, half, order)
              for a in range(0, len(frequency), _AT_ONCE)]
     response, noise, weight, power = (np.concatenate(z) for z in zip(*parts, strict=True))
     return _Local(response, noise, weight, power, 2 * half + 1 - unknowns, bins, (2 * half + 1) / bins)
+
+
+def _holding_lines(power: Array, at: Array, half: int, order: int) -> int:
+    """The window, half or more bins to each side, in which the power of the source is that of lines enough.
+
+    (Σ power)² / Σ power² lines of equal power; half of the bins where the source is noise. Three quarters of the windows must
+    hold order + 3 of them; where no window does, as without excitation, it stays as it is.
+    """
+    sums = np.cumsum(np.concatenate([np.zeros((1, 2)), np.stack([power, power**2], axis=1)]), axis=0)
+    wide = half
+    while 2 * wide + 3 <= len(power) // 8:
+        middle = np.clip(np.rint(at).astype(np.int64), wide, len(power) - wide - 1)
+        first, second = (sums[middle + wide + 1] - sums[middle - wide]).T
+        lines = first**2 / np.where(second > 0.0, second, 1.0)
+        if np.quantile(lines, 0.25) >= order + 3:
+            return wide
+        wide += max(1, wide // 4)
+    return half
 
 
 def _solve(transform: Complex, middle: Indices, at: Array, half: int, order: int) -> tuple[Complex, Complex, Array, Array]:
@@ -96,7 +117,9 @@ def _solve(transform: Complex, middle: Indices, at: Array, half: int, order: int
     size = np.sqrt((np.abs(columns) ** 2).sum(axis=1))
     size[size == 0.0] = 1.0
     q, r = np.linalg.qr(columns / size[:, None, :])
-    there = np.abs(np.diagonal(r, axis1=1, axis2=2)).min(axis=1) > _EMPTY
+    power = (np.abs(local[:, :, 0]) ** 2).mean(axis=1)
+    strongest = np.abs(transform[1:, 0]).max()
+    there = (np.abs(np.diagonal(r, axis1=1, axis2=2)).min(axis=1) > _EMPTY) & (power > (_EMPTY * strongest) ** 2)
     r[~there] = np.eye(r.shape[-1])
     z = local[:, :, 1:]
     seen = np.conj(np.swapaxes(q, 1, 2)) @ z
@@ -105,7 +128,7 @@ def _solve(transform: Complex, middle: Indices, at: Array, half: int, order: int
     rest = z - q @ seen
     noise = np.swapaxes(np.swapaxes(np.conj(rest), 1, 2) @ rest, 1, 2) / (2 * half + 1 - columns.shape[2])
     weight = np.where(there, size[:, 0] ** 2 / (np.abs(inverse[:, 0]) ** 2).sum(axis=1), 0.0)
-    return response, noise, weight, (np.abs(local[:, :, 0]) ** 2).mean(axis=1)
+    return response, noise, weight, power
 
 
 def _together(found: list[_Local], frequency: Array) -> Responses:

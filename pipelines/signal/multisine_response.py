@@ -111,8 +111,9 @@ def multisine_responses(realisations: Sequence[Array], rate: float, period: int,
                          "multisine", rate / period, float(sum(periods)), 1.0, float(freedom))
 
     amplitude = np.mean([np.abs(one.mean[lines, 1:]) for one in found], axis=0)
-    return MultisineResponses(responses(noise.sum(axis=0) / m**2, m * _FREEDOM),
-                              None if total is None else responses(total, pooled * (m - 1)), _detection(found, lines, rate / period), amplitude, periods, m)
+    by_noise = responses(noise.sum(axis=0) / m**2, m * _FREEDOM)
+    by_all = None if total is None else responses(total, pooled * (m - 1))
+    return MultisineResponses(by_noise, by_all, _detection(found, lines, rate / period), amplitude, periods, m)
 
 
 def _pooled(covariance: Complex, size: Array, neighbours: int) -> Complex:
