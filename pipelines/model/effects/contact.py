@@ -10,9 +10,11 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, Values
-from pipelines.model.rigid.altered import tip_jacobian
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.rigid.altered import chain_of
 from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.geometry import SerialChain
+from pipelines.model.rigid.kinematics import jacobian
 
 __all__ = ["Contact"]
 
@@ -46,21 +48,27 @@ class Contact(Effect):
     per_log = ("start", "duration", "force", "force_x", "force_y", "force_z")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self._columns(motion, chain_of(arm.body))
+
+    def _columns(self, motion: Motion, chain: SerialChain) -> Array:
         table = np.zeros((*motion.q.shape, 3))
         during = np.flatnonzero(self.acting(motion))
         if len(during):
             window = np.sin(math.pi * (motion.t[during] - self.start) / self.duration)
-            table[during] = -window[:, None, None] * tip_jacobian(arm.body, motion.q[during]).transpose(0, 2, 1)
+            table[during] = -window[:, None, None] * jacobian(chain, motion.q[during])[:, :3].transpose(0, 2, 1)
         return table
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        shaped, chain, force = self.at(values), chain_of(arm.body), self.amplitudes(values)
+        return Hooks(load=lambda motion, _: np.asarray(shaped._columns(motion, chain) @ force))
 
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_]:
         return np.asarray((motion.t > self.start) & (motion.t < self.start + self.duration))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Windows of 0.1 and 0.3 s that overlap by half."""
-        for duration in (0.1, 0.3):
-            for start in np.arange(motion.t[0], motion.t[-1] - 0.5 * duration, 0.5 * duration).tolist():
-                yield replace(self, start=start, duration=duration)
+        """Windows of 0.2 s that overlap by half."""
+        for start in np.arange(motion.t[0], motion.t[-1] - 0.1, 0.1).tolist():
+            yield replace(self, start=start, duration=0.2)
 
     def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
         """Where the residual, every joint by its own median size, is largest over 0.15 s."""

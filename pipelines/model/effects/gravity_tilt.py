@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
-from pipelines.model.rigid.altered import carry_over, chain_of, gravity_regressor, standard_of, with_gravity
+from pipelines.model.rigid.altered import carry_over, chain_of, gravity_torque, standard_of, with_gravity
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["GravityTilt"]
@@ -45,8 +45,9 @@ class GravityTilt(Effect):
         phi = standard_of(arm.body, arm.p)
         table = np.zeros((*motion.q.shape, 4))
         for k, axis in enumerate((first, second)):
-            table[:, :, k] = gravity_regressor(arm.body, motion.q, size * axis) @ phi
-        table[:, 0, 2:] = _waist(motion, arm)
+            table[:, :, k] = gravity_torque(arm.body, motion.q, phi, size * axis)
+        if _upright(arm):
+            table[:, 0, 2:] = _waist(motion)
         return table
 
     def amplitudes(self, values: Values) -> Array:
@@ -60,16 +61,17 @@ class GravityTilt(Effect):
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         tilted = _tilted(arm, values["angle"], values["direction"]) if values["angle"] else arm
         tau = predict(motion, tilted) if predict is not None else tilted.torque(motion)
-        tau[:, 0] += _waist(motion, arm) @ [values["waist_sine"], values["waist_cosine"]]
+        if _upright(arm):
+            tau[:, 0] += _waist(motion) @ [values["waist_sine"], values["waist_cosine"]]
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         def load(motion: Motion, _: Array) -> Array:
             torque = np.zeros_like(motion.q)
-            torque[:, 0] = _waist(motion, arm) @ [values["waist_sine"], values["waist_cosine"]]
+            torque[:, 0] = _waist(motion) @ [values["waist_sine"], values["waist_cosine"]]
             return torque
 
-        return Hooks(load=load, arm=_tilted(arm, values["angle"], values["direction"]))
+        return Hooks(load=load if _upright(arm) else None, arm=_tilted(arm, values["angle"], values["direction"]))
 
 
 def _axes(arm: ArmModel) -> tuple[float, Array, Array, Array]:
@@ -92,10 +94,13 @@ def _tilted(arm: ArmModel, angle: float, direction: float) -> ArmModel:
     return arm.with_body(body, carry_over(arm.body, body) @ arm.p)
 
 
-def _waist(motion: Motion, arm: ArmModel) -> Array:
-    """(samples, 2) sin q1 and cos q1; zero where joint 1 feels gravity anyway, and its fit tells both."""
+def _upright(arm: ArmModel) -> bool:
+    """Whether joint 1 does not feel gravity on a level base; elsewhere a fit of the arm tells S and C."""
     chain = chain_of(arm.body)
-    axis = chain.before[0].rotation[:, 2]
-    if not chain.revolute[0] or np.linalg.norm(np.cross(axis, _axes(arm)[1])) > _UPRIGHT:
-        return np.zeros((len(motion.q), 2))
+    leaning = float(np.linalg.norm(np.cross(chain.before[0].rotation[:, 2], _axes(arm)[1])))
+    return chain.revolute[0] and leaning <= _UPRIGHT
+
+
+def _waist(motion: Motion) -> Array:
+    """(samples, 2)."""
     return np.stack([np.sin(motion.q[:, 0]), np.cos(motion.q[:, 0])], axis=1)

@@ -34,7 +34,7 @@ class LoadFriction(Effect):
     friction = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, np.abs(self.own(arm.torque(motion))) * np.tanh(self.sharpness * self.own(motion.dq)))
+        return self.on_own_row(arm, np.abs(self.own(self.predicted(motion, arm))) * np.tanh(self.sharpness * self.own(motion.dq)))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):

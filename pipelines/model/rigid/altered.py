@@ -16,12 +16,11 @@ import numpy as np
 
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, RigidBody
-from pipelines.model.rigid.chain import regressor
+from pipelines.model.rigid.chain import inverse_dynamics, regressor
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.rigid.geometry import Placement, SerialChain, serial_chain
-from pipelines.model.rigid.kinematics import jacobian
 
-__all__ = ["carry_over", "chain_of", "gravity_regressor", "standard_of", "tip_jacobian", "tip_parameters", "with_gravity",
+__all__ = ["carry_over", "chain_of", "gravity_torque", "standard_of", "tip_parameters", "with_gravity",
            "with_longer_link"]
 
 _STATES = 40
@@ -138,12 +137,7 @@ def tip_parameters(body: RigidBody) -> Array:
     return np.asarray(_standard_to_base(body)[:, -10:] @ _moved(chain.tip))
 
 
-def gravity_regressor(body: RigidBody, q: Array, direction: Array) -> Array:
-    """(samples, joints, 10 · joints): torque at rest of each standard parameter in the field `direction` (3,) [m/s^2]."""
+def gravity_torque(body: RigidBody, q: Array, phi: Array, field: Array) -> Array:
+    """(samples, joints) [N m] at rest of standard parameters phi (10 · joints,) in a gravity of `field` (3,) [m/s^2]."""
     still = np.zeros_like(q)
-    return regressor(replace(chain_of(body), gravity=direction), q, still, still)
-
-
-def tip_jacobian(body: RigidBody, q: Array) -> Array:
-    """J (samples, 3, joints) of the tip's velocity in the base frame."""
-    return np.asarray(jacobian(chain_of(body), q)[:, :3])
+    return inverse_dynamics(chain_of(body), q, still, still, phi, field)
