@@ -24,7 +24,7 @@ Average = Annotated[bool | None, typer.Option("--average/--no-average",
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
 STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation",
-          "validate-writing")
+          "validate-writing", "frf")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
                   pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -259,6 +259,26 @@ def validate_writing(
         "model": model, "torque_gate": torque_gate, "draws": draws, "seed": seed, "simulate": False if no_simulation else None,
         "text": text, "plane_y": plane_y, "x": x, "z": z, "size": size, "speed": speed, "slow": slow, "elbow": elbow,
         "posture": numbers(posture, "--posture"), "via_points": via_points, "recipe": recipe})
+
+
+@app.command(cls=StageCommand)
+@with_common
+def frf(
+    logs: LogPaths, common: Common,
+    estimator: Annotated[str | None, typer.Option(help="auto, multisine, local-polynomial or welch. [auto]")] = None,
+    resolution: Annotated[float | None, typer.Option(help="Of the spectra [Hz]. [0.25, or one over the period]")] = None,
+    low: Annotated[float | None, typer.Option(help="Modes are looked for from here [Hz]. [4]")] = None,
+    high: Annotated[float | None, typer.Option(help="To here [Hz]. [250, or 0.3 of the rate]")] = None,
+    model: Annotated[str | None, typer.Option(help="model.json whose inertia is expected. [the controller's own]")] = None,
+    posture: Annotated[list[str] | None, typer.Option(help="Postures to draw, by their numbers: 1,3. [the paper's two]")] = None,
+) -> None:
+    """Measure frequency responses, and say what gives way: base, joint, delay, or nothing."""
+    from pipelines.frf import STAGE
+    from rrrid_cli.options import whole_numbers
+
+    _go(STAGE, tuple(logs), common, {
+        "estimator": estimator, "resolution": resolution, "low": low, "high": high, "model": model,
+        "postures": whole_numbers(posture, "--posture")})
 
 
 @app.command()

@@ -62,6 +62,8 @@ def _run(module: str, tmp_path: Path, samples: Path) -> tuple[Any, Any]:
     if module == "simulate":
         write_log(tmp_path / "waving.h5", controlled_log(400))
         settings, paths = dataclasses.replace(settings, model="rrr"), (tmp_path / "waving.h5",)
+    if module == "frf":
+        settings, paths = dataclasses.replace(settings, high=60.0), (samples / "rrr-healthy/frf-1-1.h5",)
     if module == "design_excitation":
         settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out"), settings)
@@ -137,7 +139,7 @@ def _examined(folder: Path, out: Path) -> tuple[int, list[Check]]:
     return len(result.logs), [c for c in result.checks if c.level in ("reject", "repair")]
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m not in ("inspect", "run")])
+@pytest.mark.parametrize("module", [m for m in MODULES if m not in ("inspect", "run", "frf")])
 def test_every_log_a_stage_writes_is_in_order(module: str, tmp_path: Path, samples: Path) -> None:
     """`inspect` passes on every log that any stage writes; these stages write some."""
     _, outcome = _run(module, tmp_path, samples)

@@ -187,10 +187,10 @@ def _delay(joint: int, modes: Sequence[Modes], sample_time: float) -> tuple[list
     flat = max(m.flat for m in modes)
     if flat < _FLAT and mean.value > 0.0:
         words = (f"Beside its modes the magnitude is flat within {100.0 * (flat - 1.0):.2g} % and the phase falls in proportion to "
-                 f"the frequency: position comes {each} ms late in {_postures(modes)}, beyond the hold and the controller's own delay.")
+                 f"the frequency: position comes {each} ms late in {_postures(modes)}, beyond hold and controller.")
         return [Finding("delay", joint, words, "time_delay", None, None, {"delay": mean}, (joint,))], []
     return [], [Open(joint, None, ("drive_lag", "time_delay", "torque_lag"),
-                     f"The phase falls as with {each} ms of delay, but the magnitude is not flat: it changes by a factor of {flat:.3g}.",
+                     f"The phase falls as with {each} ms of delay, but the magnitude is not flat: a factor of {flat:.3g}.",
                      "the measured motor current beside the command")]
 
 

@@ -1,0 +1,152 @@
+"""Measure frequency responses, and say what gives way beside the rigid body.
+
+Reads    logs with experiment "frf": a joint turning slowly under an injected excitation v, with r (computed torque) or PD
+Writes   result.json, result.h5 (every response), report.html
+Source   Kostić et al. 2004, Section IV.D, eq. (25)-(29), Fig. 17
+
+Responses are those of v to input and position: no disturbance in the loop biases their quotient, and no controller has to be
+known. The direct and the indirect method stand beside it. Base, joint, delay and rigid are told apart across postures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.errors import Check, NothingMatched, UsageError
+from pipelines.log.derive import recording
+from pipelines.log.doctor.checks import Subject, check_log
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.model_file import read_model
+from pipelines.model.arm import Arm
+from pipelines.model.frf.findings import Findings, frf_findings
+from pipelines.model.frf.modes import BAND
+from pipelines.model.frf.responses import How
+from pipelines.model.frf.result import Classified, Method, Posture, Undecided, classified, methods_of, posture_of, undecided
+from pipelines.report.frf_report import frf_report
+from pipelines.report.report import Report
+from pipelines.stage import Inputs, Request, Stage, read_logs
+
+__all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
+
+_RECORD = "let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans it"
+_RELIABLE = 0.7
+_MOST_LOW = 0.9  # of the bins in the band under that coherence: low everywhere
+_SWING = 0.4  # of the turning speed: beyond it friction turns its sign
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How responses are estimated, where modes are looked for, and what is drawn."""
+
+    estimator: str = "auto"  # multisine where v repeats, else local-polynomial; or welch
+    resolution: float | None = None  # [Hz] of local polynomials and Welch's segments; None: 0.25 Hz, or one over the period
+    low: float = BAND[0]  # [Hz] modes are looked for from here
+    high: float = BAND[1]  # [Hz] to here, or 0.3 of the rate
+    model: str | None = None  # model.json whose inertia is expected; None: the controller's own
+    postures: tuple[int, ...] = ()  # of each joint, numbered as in the table: drawn as Bode plots; none: the paper's two
+
+
+@dataclass(frozen=True)
+class Result:
+    """Every response, and what they say together."""
+
+    robot: str
+    responses: tuple[Method, ...]
+    postures: tuple[Posture, ...]
+    classification: tuple[Classified, ...]
+    undecided: tuple[Undecided, ...]
+    drawn: tuple[int, ...]
+    doctor: tuple[Check, ...]
+
+
+def read(request: Request, settings: Settings) -> Inputs:
+    """The logs, and the model where one is named."""
+    inputs = read_logs(request, settings)
+    if settings.model is None:
+        return inputs
+    path = Path(settings.model).absolute()
+    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Responses by three methods, modes, grouping.
+
+    Raises:
+        NothingMatched: C06, no frf log.
+        UsageError: C02, settings that do not fit, or logs of several robots.
+        InputRejected: the doctor rejects a log, or no spectrum can be taken of it: S01, T05, T08, D09.
+    """
+    if not 0.1 <= settings.low < settings.high:
+        raise UsageError("C02", f"modes from {settings.low:g} to {settings.high:g} Hz", where="--low, --high",
+                         remedy="give two frequencies, the lower one first, from 0.1 Hz on")
+    logs = _chosen(inputs)
+    arm = inputs.material if isinstance(inputs.material, Arm) and inputs.material.n_joints == logs[0].n_joints else None
+    said = tuple(check for log in logs for check in _examined(log))
+    found = frf_findings(logs, arm, How(settings.estimator, settings.resolution), (settings.low, settings.high))
+    postures = tuple(posture_of(seen) for seen in found.seen)
+    return Result(logs[0].robot_name, tuple(m for seen in found.seen for m in methods_of(seen)), postures, classified(found),
+                  undecided(found), settings.postures, (*said, *_complaints(found, settings)))
+
+
+def _chosen(inputs: Inputs) -> list[ExperimentLog]:
+    """The "frf" logs that were measured; those of role "reference" only where there are no others."""
+    logs = [recording(o.log) for o in inputs.logs if o.log.experiment == "frf" and o.log.origin != "planned"]
+    now = [log for log in logs if log.role != "reference"] or logs
+    if not now:
+        kinds = ", ".join(sorted({o.log.experiment for o in inputs.logs})) or "none"
+        raise NothingMatched("C06", f"no frf log; there are: {kinds}", where=inputs.label, remedy=_RECORD)
+    if len({log.robot_text for log in now}) > 1:
+        raise UsageError("C02", "logs of several robots", where=inputs.label,
+                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+    return now
+
+
+def _examined(log: ExperimentLog) -> list[Check]:
+    checks = [check for check in check_log(Subject(log)) if check.level != "ok"]
+    if reject := next((check for check in checks if check.level == "reject"), None):
+        raise reject.as_error()
+    return checks
+
+
+def _complaints(found: Findings, settings: Settings) -> list[Check]:
+    """D13, coherence too low; D09, friction that turns its sign."""
+    said = []
+    for seen in found.seen:
+        m, where = seen.measured, ", ".join(t.name for t in seen.measured.turned)
+        inside = m.plant.within(settings.low, settings.high)
+        low = float(np.mean(inside.coherence < _RELIABLE)) if len(inside.frequency) else 1.0
+        if low > _MOST_LOW:
+            said.append(Check.of("D13", "warn", f"the coherence of joint {m.joint} is under {_RELIABLE:g} nearly everywhere: no "
+                                 "frequency can be relied on", where=where, gate=True,
+                                 remedy="excite more strongly, record longer, or look for what disturbs the joint"))
+        elif low > 0.0:
+            said.append(Check.of("D13", "warn", f"the coherence of joint {m.joint} is under {_RELIABLE:g} at {100.0 * low:.2g} % "
+                                 "of the frequencies; they are shaded and hardly weigh", where=where,
+                                 remedy="excite these frequencies more strongly, or record longer"))
+        said += _turning(seen.measured.joint, m.first.speed, max(t.swing for t in m.turned), where)
+    return said
+
+
+def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Check]:
+    if speed == 0.0:
+        return [Check.of("D09", "warn", f"joint {joint} did not turn: friction sticks, and stands in the response like a spring",
+                         where=where, remedy="let it turn slowly while it is excited")]
+    if swing > _SWING * speed:
+        return [Check.of("D09", "warn", f"the excitation swings the speed of joint {joint} by {swing:.2g} about {speed:.2g} rad/s: "
+                         "friction now and then turns its sign, which adds damping", where=where,
+                         remedy="turn faster, or excite more weakly")]
+    return []
+
+
+def report(result: Result) -> Report:
+    """The verdict, Fig. 17's Bode plots with coherence, modes, rigid body, grouping."""
+    return frf_report(result.responses, result.postures, result.classification, result.undecided, result.doctor, result.drawn)
+
+
+STAGE = Stage("frf", "Measure frequency responses and what gives way", Settings, compute, report, read, None,
+              lambda result, check: int(check and any(found.gate for found in result.doctor)), lambda result: result.doctor)

@@ -1,0 +1,187 @@
+"""Figures of frequency responses: Fig. 17's Bode plots with coherence, the rest beside a rigid body, compliance, friction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.model.frf.result import COHERENCE, Curve, Method, ModeFound, Posture
+from pipelines.report import style
+from pipelines.report.figures import Array
+from pipelines.report.report import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["bode_figure", "compliance_figure", "friction_figure", "posture_words", "relative_figure"]
+
+_CONFIDENCE = np.sqrt(-np.log(0.05))  # radius of the disc that holds the response with 95 %, in standard deviations
+_LOW = 10.0  # [Hz] up to which friction and reversal are shown
+_LOOKS = {"indirect": (style.GREEN, 1.6, (0, (4, 2))), "direct": (style.ORANGE, 0.9, "-"), "closed-loop": (style.BLUE, 1.1, "-")}
+
+
+def posture_words(posture: Array, joint: int) -> str:
+    """The angles of the held joints: "q2, q3 = 0, 1.57 rad"."""
+    held = [k for k in range(len(posture)) if k != joint - 1]
+    names = ", ".join(f"q{k + 1}" for k in held)
+    return f"{names} = {', '.join(f'{posture[k]:.3g}' for k in held)} rad" if held else "the only joint"
+
+
+def bode_figure(joint: int, drawn: Sequence[tuple[Posture, Mapping[str, Method]]]) -> Figure:
+    """Magnitude, phase and coherence, one column a posture; Fig. 17."""
+    unit = "rad/(rad/s²)" if drawn[0][0].input == "r" else "rad/(N m)"
+
+    def draw(drawing: Drawing) -> None:
+        grid = drawing.subplots(3, len(drawn), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 2, 1.2))
+        for column, (posture, methods) in zip(grid.T, drawn, strict=True):
+            draw_bode(column, posture, methods)
+            column[0].set_title(posture_words(posture.posture, joint), pad=3.0)
+            column[2].set_xlabel("frequency [Hz]")
+        grid[0, 0].set_ylabel(f"|P| [{unit}]")
+        grid[1, 0].set_ylabel("phase [°]")
+        grid[2, 0].set_ylabel("coherence")
+        grid[0, -1].legend(loc="lower left", fontsize="small")
+
+    return Figure(f"bode-{joint}", f"Joint {joint}: input to position (Fig. 17), with 95 % bands. Vertical lines: resonances "
+                  f"(solid) and antiresonances (dashed). Grey: coherence under {COHERENCE:g}, not reliable.", draw, (6.4, 5.6))
+
+
+def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Method]) -> None:
+    """Into magnitude, phase and coherence axes."""
+    size, phase, coherence = axes
+    default = methods["closed-loop"]
+    f, value = default.curve.frequency, default.curve.value
+    reliable = default.curve.coherence >= 0.3
+    rigid = np.abs(value) / np.maximum(np.abs(posture.relative.value), 1e-300) * abs(posture.expected_level or posture.level.value)
+    size.loglog(f, rigid, color=style.GREY, linewidth=1.0, linestyle=":", label="rigid body")
+    phase.semilogx(f, _phase(value / posture.relative.value), color=style.GREY, linewidth=1.0, linestyle=":")
+    for name in ("direct", "indirect", "closed-loop"):
+        if (method := methods.get(name)) is not None:
+            color, width, line = _LOOKS[name]
+            curve = method.curve
+            size.loglog(curve.frequency, np.abs(curve.value), color=color, linewidth=width, linestyle=line, label=_label(name))
+            phase.semilogx(curve.frequency, _phase(curve.value), color=color, linewidth=width, linestyle=line)
+            coherence.semilogx(curve.frequency, curve.coherence, color=color, linewidth=min(width, 1.0), linestyle=line)
+    band = _CONFIDENCE * default.curve.std
+    size.fill_between(f, np.maximum(np.abs(value) - band, 1e-3 * np.abs(value)), np.abs(value) + band, color=style.SKY, alpha=0.5,
+                      linewidth=0.0)
+    low, high = np.quantile(np.abs(value[reliable]) if reliable.any() else np.abs(value), (0.0, 1.0))
+    size.set_ylim(0.3 * low, 2.0 * high)
+    phase.set_ylim(-370.0, 10.0)
+    phase.set_yticks((-360, -270, -180, -90, 0))
+    coherence.set_ylim(0.0, 1.05)
+    coherence.axhline(COHERENCE, color=style.GREY, linewidth=0.8)
+    half = 0.5 * default.resolution
+    for low, high in default.coherence_below_0_7_hz:
+        for axis in axes:
+            axis.axvspan(low - half, high + half, color=style.GREY, alpha=0.15, linewidth=0.0)
+    mark_modes(axes[:2], default.modes)
+    for axis in axes:
+        style.log_ticks(axis.xaxis)
+    style.log_ticks(size.yaxis)
+    coherence.set_xlim(f[0], f[-1])
+
+
+def _label(name: str) -> str:
+    return {"closed-loop": "Φvq/Φvu (default)", "indirect": "indirect, (29)", "direct": "direct"}[name]
+
+
+def _phase(value: np.ndarray) -> Array:  # type: ignore[type-arg]
+    """[°] between -360 and 0: a double integrator lies in the middle."""
+    return np.asarray(np.rad2deg(np.angle(-value)) - 180.0)
+
+
+def mark_modes(axes: Sequence[Axes], modes: Sequence[ModeFound]) -> None:
+    for mode in modes:
+        for axis in axes:
+            axis.axvline(mode.frequency.value, color=style.VERMILLION, linewidth=0.8,
+                         linestyle="-" if mode.kind == "resonance" else "--", zorder=0.5)
+
+
+def relative_figure(joint: int, postures: Sequence[Posture]) -> Figure:
+    """Acceleration per input: a rigid body is flat. Measured points, the rational function over them."""
+
+    def draw(drawing: Drawing) -> None:
+        size, phase = drawing.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        for k, posture in enumerate(postures):
+            color, measured, fit = style.COLOURS[k % len(style.COLOURS)], posture.relative, posture.fit
+            good = (measured.coherence >= 0.5) & (measured.frequency <= posture.band[1])
+            size.loglog(measured.frequency[good], np.abs(measured.value[good]), ".", markersize=2.0, color=color, alpha=0.5)
+            size.loglog(fit.frequency, np.abs(fit.value), color=color, label=posture_words(posture.posture, joint))
+            phase.semilogx(measured.frequency[good], np.rad2deg(np.angle(measured.value[good])), ".", markersize=2.0, color=color,
+                           alpha=0.5)
+            phase.semilogx(fit.frequency, np.rad2deg(np.angle(fit.value)), color=color)
+        size.set_ylabel("acceleration per input")
+        phase.set_ylabel("phase [°]")
+        phase.set_xlabel("frequency [Hz]")
+        phase.set_ylim(-190.0, 190.0)
+        phase.set_yticks((-180, -90, 0, 90, 180))
+        size.legend(loc="best", fontsize="small")
+        style.log_ticks(phase.xaxis)
+        style.log_ticks(size.yaxis)
+
+    return Figure(f"relative-{joint}", f"Joint {joint}: the response over that of a double integrator (points) and the rational "
+                  "function of the modes (lines). A rigid body is flat, a delay turns the phase alone.", draw, (6.0, 4.0))
+
+
+def compliance_figure(joint: int, postures: Sequence[Posture]) -> Figure:
+    """Compliance q/τ and accelerance q̈/τ, with those of the rigid body."""
+    units = ("rad/(N m)", "1/(kg m²)") if postures[0].revolute else ("m/N", "1/kg")
+
+    def draw(drawing: Drawing) -> None:
+        axes = drawing.subplots(1, 2)
+        for k, posture in enumerate(postures):
+            color, curve = style.COLOURS[k % len(style.COLOURS)], posture.compliance
+            good = curve.coherence >= 0.5
+            f = curve.frequency[good]
+            square = (2.0 * np.pi * f) ** 2
+            axes[0].loglog(f, np.abs(curve.value[good]), color=color, label=posture_words(posture.posture, joint))
+            axes[1].loglog(f, np.abs(curve.value[good]) * square, color=color)
+            if posture.expected_inertia is not None:
+                axes[0].loglog(f, 1.0 / (posture.expected_inertia * square), color=color, linestyle=":", linewidth=0.9)
+                axes[1].axhline(1.0 / posture.expected_inertia, color=color, linestyle=":", linewidth=0.9)
+        for axis, name, unit in zip(axes, ("compliance", "accelerance"), units, strict=True):
+            axis.set_title(f"{name} [{unit}]", pad=3.0)
+            axis.set_xlabel("frequency [Hz]")
+            style.log_ticks(axis.xaxis)
+            style.log_ticks(axis.yaxis)
+        axes[0].legend(loc="lower left", fontsize="small")
+
+    return Figure(f"compliance-{joint}", f"Joint {joint}: compliance and accelerance by torque. Dotted: the model's rigid body.",
+                  draw, (6.4, 3.2))
+
+
+def friction_figure(joint: int, postures: Sequence[Posture], methods: Sequence[Method]) -> Figure:
+    """Low frequencies: at constant speed, and of the whole log with its reversal."""
+
+    def draw(drawing: Drawing) -> None:
+        axis = drawing.subplots()
+        for k, (posture, method) in enumerate(zip(postures, methods, strict=True)):
+            color = style.COLOURS[k % len(style.COLOURS)]
+            relative = posture.relative
+            low = relative.frequency <= _LOW
+            draw_low(axis, relative, low, color, posture_words(posture.posture, joint))
+            if posture.with_reversal is not None:
+                other = posture.with_reversal
+                part = other.frequency <= _LOW
+                unit = np.interp(other.frequency[part], relative.frequency, np.abs(method.curve.value) / np.abs(relative.value))
+                axis.semilogx(other.frequency[part], np.abs(other.value[part]) / unit, color=color, linewidth=0.9, linestyle="--")
+            axis.axhline(posture.level.value, color=color, linewidth=0.7, linestyle=":")
+        axis.set_xlabel("frequency [Hz]")
+        axis.set_ylabel("acceleration per input")
+        axis.set_ylim(bottom=0.0)
+        axis.legend(loc="lower right", fontsize="small")
+        style.log_ticks(axis.xaxis)
+
+    return Figure(f"friction-{joint}", f"Joint {joint}: what friction leaves at low frequencies. Solid: at constant speed, ± 2 "
+                  "std. Dashed: the whole log, its reversal included. Dotted: the rigid body measured above friction.", draw,
+                  (6.0, 2.8))
+
+
+def draw_low(axis: Axes, curve: Curve, low: np.ndarray, color: str, label: str) -> None:  # type: ignore[type-arg]
+    f, size, band = curve.frequency[low], np.abs(curve.value[low]), np.sqrt(2.0) * curve.std[low]
+    axis.fill_between(f, np.maximum(size - band, 0.0), size + band, color=color, alpha=0.2, linewidth=0.0)
+    axis.semilogx(f, size, color=color, label=label)
