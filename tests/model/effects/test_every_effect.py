@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,11 @@ from sample_logs.make_model import synthetic_arm
 
 UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "kg m^2", "N", "N m", "N m s/rad",
          "N m/rad", "N m/rad^2", "N m/rad^3", "N m s^2/rad^2"}
+REPO = Path(__file__).resolve().parents[3]
+# Where names of effects stand all the same: the laws among which friction is fitted, the nominal model, and what a frequency
+# response tells apart without any motion.
+MAY_NAME = ("pipelines/model/friction/", "pipelines/model/estimation/nominal.py", "pipelines/model/frf/")
+NOMINAL = {"coulomb", "viscous", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
 
 every_effect = pytest.mark.parametrize("kind", all_effects(), ids=lambda kind: kind.name)
@@ -65,6 +72,27 @@ def test_every_file_is_an_effect() -> None:
     assert set(effect_names()) == files
     assert [kind.name for kind in all_effects()] == sorted(files)
     assert {"coulomb", "viscous", "three_sigmoid"} <= files
+
+
+def _named_in(path: Path, names: set[str]) -> Iterator[str]:
+    """Each of `names` that a Python file has as a text or imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and node.value in names:
+            yield str(node.value)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("pipelines.model.effects."):
+            yield from {str(node.module).rpartition(".")[2]} & names
+
+
+def test_no_effect_is_named_elsewhere(tmp_path: Path) -> None:
+    """What an effect needs is in its file: no stage, no report and no diagnosis knows one by name."""
+    names = set(effect_names()) - NOMINAL
+    for path in [file for top in ("pipelines", "rrrid_cli") for file in sorted((REPO / top).rglob("*.py"))]:
+        place = path.relative_to(REPO).as_posix()
+        if not place.startswith(("pipelines/model/effects/", "pipelines/bench/", *MAY_NAME)):
+            assert not list(_named_in(path, names)), place
+    breach = tmp_path / "breach.py"
+    breach.write_text('from pipelines.model.effects.spring import Spring\nx = "cogging"\n')
+    assert sorted(_named_in(breach, names)) == ["cogging", "spring"]
 
 
 def test_an_unknown_name_is_answered_with_the_nearest() -> None:
