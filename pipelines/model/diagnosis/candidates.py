@@ -38,6 +38,12 @@ class Family:
     joint: int | None
     shapes: tuple[Effect, ...]
 
+    @property
+    def event(self) -> bool:
+        """Whether it happens once, in one log: its non-linear numbers belong to that."""
+        one = self.shapes[0]
+        return any(q.shape and q.name in one.per_log for q in one.parameters)
+
 
 @dataclass(frozen=True, eq=False)
 class Laid:
@@ -63,7 +69,7 @@ def families(laws: Sequence[Effect], motion: Motion, arm: Arm, without: Sequence
     nominal = {law.name for law in laws}
     found = []
     for kind in all_effects():
-        if kind.name in nominal or kind.name in without:
+        if kind.name in nominal or kind.name in without or kind.evidence in ("none", "base parameters"):
             continue
         for effect in kind.everywhere(arm.n_joints):
             found.append(Family(kind.name, effect.joint, _shapes(effect, laws, motion, arm)))
@@ -88,8 +94,8 @@ def whole_motion(data: Data) -> Motion:
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     """The columns of every shape, a few shapes at a time."""
-    count = sum(not q.shape for q in family.shapes[0].parameters)
-    size = max(1, _AT_ONCE // max(count, 1))
+    width = family.shapes[0].columns(_first_samples(data), arm).shape[2]
+    size = max(1, _AT_ONCE // max(width, 1))
     for first in range(0, len(family.shapes), size):
         some = family.shapes[first:first + size]
         tables = [[shape.columns(one.motion, arm) for shape in some] for one in data.logs]
@@ -104,6 +110,11 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
         if not data.counts.all():
             found = np.where(data.counts[rows], found, 0.0)
         yield Laid(first, found, rows)
+
+
+def _first_samples(data: Data) -> Motion:
+    motion = data.logs[0].motion
+    return Motion(motion.t[:8], motion.q[:8], motion.dq[:8], motion.ddq[:8], None if motion.tau is None else motion.tau[:8])
 
 
 def lay_one(data: Data, effect: Effect, arm: Arm) -> Array:

@@ -139,6 +139,7 @@ class Data:
     """Rows of several logs. A row that does not count is zero in everything."""
 
     logs: tuple[LogData, ...]
+    first: int = 0  # number of the first log among all that are diagnosed: of what happens in one log only
 
     @property
     def n_joints(self) -> int:
@@ -173,7 +174,11 @@ class Data:
 
     def lay(self, torque: Callable[[Motion], Array]) -> Array:
         """`torque` of the motion of each log, (samples, joints) or (samples, joints, k), as (rows,) or (k, rows)."""
-        laid = [one.lay(torque(one.motion)) for one in self.logs]
+        return self.lay_each(lambda _, motion: torque(motion))
+
+    def lay_each(self, torque: Callable[[int, Motion], Array]) -> Array:
+        """The same of a torque that may differ from log to log: of each log's number and motion."""
+        laid = [one.lay(torque(self.first + k, one.motion)) for k, one in enumerate(self.logs)]
         return self._counted(np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1))
 
     def blocks(self, count: int) -> Indices:
@@ -203,23 +208,25 @@ class Data:
         return x if self.counts.all() else np.where(self.counts, x, 0.0)
 
 
-def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Rows] | None = None) -> Data:
+def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Rows] | None = None, first: int = 0) -> Data:
     """The rows of the logs; `recipe` with its cut-off.
 
     Args:
         rows: of each log which samples may be rows; its own choice where left out.
+        first: number of the first log.
 
     Raises:
         InputRejected: T04, every stretch of a log is too short for the low-pass, or spoilt.
     """
     logs = zip(motions, equations_of(motions, recipe, columns, rows), strict=True)
-    return Data(tuple(_of_log(log, equations) for (log, _), equations in logs))
+    return Data(tuple(_of_log(log, equations) for (log, _), equations in logs), first)
 
 
 def _of_log(log: ExperimentLog, equations: LogEquations) -> LogData:
     stretches = [equations.stretch(run) for run in equations.runs]
     tau = np.concatenate([tau for _, tau in stretches])
-    motion = Motion(*(np.concatenate([getattr(m, name) for m, _ in stretches]) for name in ("t", "q", "dq", "ddq")), tau)
+    t, q, dq, ddq = (np.concatenate([getattr(m, name) for m, _ in stretches]) for name in ("t", "q", "dq", "ddq"))
+    motion = Motion(t, q, dq, ddq, tau)
     ends = np.cumsum([0, *(len(tau) for _, tau in stretches)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     return LogData(log, equations, motion, tau, pieces,
@@ -253,8 +260,3 @@ def _quick(n: int) -> int:
             if n <= size < best:
                 best = size
     return best
-
-
-def joined(parts: Sequence[Data]) -> Data:
-    """The rows of several, one behind the other."""
-    return Data(tuple(one for part in parts for one in part.logs))

@@ -21,7 +21,8 @@ from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
 
-__all__ = ["Fit", "fit_columns", "fit_nominal", "nominal_arm", "orthonormal", "polish", "rigid_rows", "rows_of"]
+__all__ = ["Fit", "fit_columns", "fit_nominal", "law_rows", "law_slopes", "nominal_arm", "orthonormal", "polish", "rigid_rows",
+           "rows_of"]
 
 _RANK = 1e-12  # of the largest: smaller eigenvalues of the Gram matrix of unit columns are rounding
 _ROUNDS = 6  # of weights
@@ -150,7 +151,7 @@ def fit_nominal(data: Data, columns: Columns) -> tuple[Columns, Fit]:
 def polish(data: Data, columns: Columns, rigid: Array, fit: Fit) -> tuple[Columns, Fit]:
     """Gauss-Newton over the shapes of the laws, Golub & Pereyra 2003: each step solves for shapes and amplitudes together."""
     for _ in range(_STEPS):
-        slopes, names = _slopes(data, columns, fit)
+        slopes, names = law_slopes(data, columns, fit.beta)
         tables = [law_rows(data, law, columns) for law in columns.laws]
         base = np.concatenate([rigid, *tables])
         fit = fit_columns(data, np.concatenate([base, *slopes]), fit.y) if slopes else fit_columns(data, base, fit.y)
@@ -175,12 +176,12 @@ def _moved(law: Effect, name: str, factor: float) -> Effect:
     return replace(law, **shape)
 
 
-def _slopes(data: Data, columns: Columns, fit: Fit) -> tuple[list[Array], list[tuple[int, str]]]:
+def law_slopes(data: Data, columns: Columns, all_beta: Array) -> tuple[list[Array], list[tuple[int, str]]]:
     """(1, rows) of each shape: the slope of the torque by its logarithm; and which shapes they are."""
     slopes, names, first = [], [], len(columns.kept)
     for place, law in enumerate(columns.laws):
         count = sum(not q.shape for q in law.parameters)
-        beta = fit.beta[first:first + count]
+        beta = all_beta[first:first + count]
         first += count
         for quantity in _free(law) if beta.any() else []:
             up, down = (law_rows(data, _moved(law, quantity.name, factor), columns) for factor in (1.0 + _STEP, 1.0 - _STEP))

@@ -10,7 +10,7 @@ g = c⊥ᵀ r. Several residuals at once: those of a log and of the twin's repli
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from pipelines.model.effects.base import Effect
 __all__ = ["Screened", "screen", "screen_family"]
 
 _INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
+_EVENTS = 4  # residuals that an event is looked for in
 _SPREAD = 1e-4  # of the largest: directions of c⊥ that are left alone
 
 
@@ -36,6 +37,7 @@ class Screened:
     shape: tuple[Effect, ...]  # the best one for each residual
     visibility: Array  # η of it
     best_visibility: float  # the largest η of any shape
+    logs: tuple[int | None, ...] = ()  # of an event: number of the log it happened in
 
     @property
     def cause(self) -> str:
@@ -48,7 +50,30 @@ class Screened:
 
 def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm, residuals: Array | None = None) -> list[Screened]:
     """Every family; `residuals` (m, rows), weighted and orthogonal to the fit, that of the fit where left out."""
-    return [screen_family(data, fit, family, arm, residuals) for family in candidates]
+    return [screen_event(data, fit, family, arm, residuals) if family.event else screen_family(data, fit, family, arm, residuals)
+            for family in candidates]
+
+
+def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Array | None = None) -> Screened:
+    """What happens once: looked for in each log apart, where the residual is largest."""
+    wanted = fit.residual[None] if residuals is None else residuals[:_EVENTS]
+    best: list[tuple[float, Effect, float, int | None]] = [(0.0, family.shapes[0], 1.0, None)] * len(wanted)
+    for k, residual in enumerate(wanted):
+        left = list(data.split(residual / fit.weights))
+        for place, one in enumerate(data.logs):
+            full = np.stack([np.interp(one.motion.t, one.t, row) for row in left[place]], axis=1)
+            shapes = tuple(family.shapes[0].promising(one.motion, arm, full))
+            if not shapes:
+                continue
+            for laid in lay_family(data, replace(family, shapes=shapes), arm):
+                only = data.log_of[laid.rows] == place
+                gains, seen = _gains(replace(laid, table=np.where(only, laid.table, 0.0)), fit, residual[None])
+                top = int(np.argmax(gains[:, 0]))
+                if gains[top, 0] > best[k][0]:
+                    best[k] = (float(gains[top, 0]), shapes[laid.first + top], float(seen[top]), data.first + place)
+    eta = [one[2] for one in best]
+    return Screened(family, np.array([one[0] for one in best]), tuple(one[1] for one in best), np.array(eta), max(eta),
+                    tuple(one[3] for one in best))
 
 
 def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Array | None = None) -> Screened:

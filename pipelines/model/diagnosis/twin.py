@@ -2,7 +2,7 @@
 
     noise = drive_noise(...)                       of the drives, from what the log shows at rest from everything else
     twin = make_twin(arm, data, fit, recipe, ...)  replicas of every log whose controller is known
-    twin.residuals                                 (replicas, rows) of the log's own rows
+    twin.weighted(weight)                          residuals (replicas, rows) of the log's own rows
 
 What the twin shows too is an artefact of sampling, smoothing and friction at reversals, no fault: its residual is the floor,
 and what a cause gains on it is what that cause has to exceed on the log. Twins of logs that cannot be simulated do not exist.
@@ -10,7 +10,7 @@ and what a cause gains on it is what that cause has to exceed on the log. Twins 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,16 +19,19 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
-from pipelines.model.diagnosis.nominal import Fit, fit_columns, rows_of
+from pipelines.model.diagnosis.imperfections import small_loads
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, law_slopes, rows_of
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed, reconstruct
+from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
 
 __all__ = ["Twin", "drive_noise", "make_twin", "replayable"]
 
 _WINDOW = 0.4  # [s] in which the noise is looked at
 _QUIET = 0.3  # of the windows are taken for quiet
+_NUISANCE = 20040509
 _SMOOTH = 5  # rows of the moving average whose remainder is noise
 
 
@@ -36,17 +39,24 @@ _SMOOTH = 5  # rows of the moving average whose remainder is noise
 class Twin:
     """Replicas of the logs that can be simulated."""
 
-    data: Data  # motion and rows of the first replica
-    fit: Fit  # of the first replica, weights those of the log's fit
-    residuals: Array  # (replicas, rows) weighted, each orthogonal to its own fit
+    fits: tuple[Fit, ...]  # of each replica
     places: tuple[int, ...]  # which of the logs
     noise: Array  # (joints,) [N m] of the drives
 
     @property
+    def data(self) -> Data:
+        """Motion and rows of the first replica, which stands for all: they differ by noise."""
+        return self.fits[0].data
+
+    @property
     def rms(self) -> Array:
         """(joints,) [N m] over all replicas: the floor."""
-        each = [self.data.rms(one / self.fit.weights) for one in self.residuals]
-        return np.asarray(np.sqrt(np.mean(np.square(each), axis=0)))
+        return np.asarray(np.sqrt(np.mean(np.square([one.rms for one in self.fits]), axis=0)))
+
+    def weighted(self, weight: Array) -> tuple[Fit, Array]:
+        """The fit of the first replica and the residuals (replicas, rows) of all, weighted, joints weighted like this."""
+        fits = [fit_columns(one.data, one.table, one.y, weight) for one in self.fits]
+        return fits[0], np.array([one.residual for one in fits])
 
 
 def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
@@ -61,13 +71,16 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
     return tuple(found)
 
 
-def drive_noise(arm: Arm, data: Data, fit: Fit, columns: Columns, motions: Motions, recipe: Recipe, place: int, seed: int) -> Array:
+def drive_noise(arm: Arm, data: Data, left: Array, columns: Columns, motions: Motions, recipe: Recipe, place: int, seed: int) -> Array:
     """(joints,) [N m] white torque noise of the drives: as much as makes a replica as rough as log number `place`.
 
     Rough: quick changes of the residual in its quietest windows, where neither reversals nor any fault are. Two replicas,
     without noise and with a guess of it, tell what of it is counting of the encoders and how noise shows.
+
+    Args:
+        left: (rows,) [N m] the residual, as far as possible without what a fault makes.
     """
-    mine = list(data.split(fit.left))[place]
+    mine = list(data.split(left))[place]
     step = float(np.median(np.diff(data.logs[place].t)))
     log = motions[place][0]
     rough = _roughness(mine, step)
@@ -108,8 +121,19 @@ def make_twin(arm: Arm, data: Data, fit: Fit, columns: Columns, motions: Motions
         parts = [_motion(motions[place][0], done, k, recipe) for place, done in runs.items()]
         rows = [data.logs[place].equations.rows for place in places]
         own = gather(tuple(parts), columns, recipe, rows)
-        found.append(fit_columns(own, rows_of(own, columns), weight=fit.weight))
-    return Twin(found[0].data, found[0], np.array([one.residual for one in found]), places, noise)
+        small = own.lay_each(_imperfect(arm, noise, own, seed + k))
+        slopes, _ = law_slopes(own, columns, fit.beta)
+        found.append(fit_columns(own, np.concatenate([rows_of(own, columns), *slopes]), own.y + small, fit.weight))
+    return Twin(tuple(found), places, noise)
+
+
+def _imperfect(arm: Arm, noise: Array, own: Data, seed: int) -> Callable[[int, Motion], Array]:
+    def loads(log: int, motion: Motion) -> Array:
+        step = own.logs[log].log.sample_time
+        return small_loads(motion, arm, noise, step, np.random.default_rng([_NUISANCE, seed]),
+                           np.random.default_rng([_NUISANCE, seed, log]))
+
+    return loads
 
 
 def _analysed(log: ExperimentLog, done: Simulated, k: int, recipe: Recipe, columns: Columns, data: Data,

@@ -1,0 +1,259 @@
+"""Fit an arm with its effects exactly: every number at once, the torque computed as the effects act, not to first order.
+
+    model = Exact.start(columns, fit)                     the nominal model
+    tried = model.with_effect(effect, amplitudes)         a cause more
+    done = refine(tried, data)                            Gauss-Newton over everything
+    done.residual, done.basis                             what is left, and what the model can imitate
+
+The numbers are the base parameters, amplitudes and shapes of the friction laws, amplitudes and free shapes of the effects. Slopes
+by what is linear in the nominal model are its columns; those by an effect's numbers are differences of the whole torque.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.nominal import Fit, law_rows, law_slopes, nominal_arm, rigid_rows
+from pipelines.model.effects.base import Effect, Quantity
+from pipelines.model.estimation.regression import Columns
+
+__all__ = ["Exact", "Named", "Refined", "refine"]
+
+_STEPS, _HALVES = 8, 5
+_GAIN = 1e-5  # of the squared residual: less is no progress
+_DIFFERENCE = 1e-3  # of a number, for slopes
+_FARTHEST = 0.5  # of ln shape, a step
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect with its amplitudes."""
+
+    effect: Effect
+    amplitudes: tuple[float, ...]
+    log: int | None = None  # number of the log it belongs to, where it happened once; None: it acts in all
+
+    @property
+    def values(self) -> dict[str, float]:
+        return self.effect.values(np.array(self.amplitudes))
+
+    @property
+    def free_shapes(self) -> list[Quantity]:
+        return [q for q in self.effect.parameters if q.name in self.effect.free]
+
+    @property
+    def free_amplitudes(self) -> bool:
+        return self.effect.fixed_amplitudes is None
+
+    @property
+    def count(self) -> int:
+        """Numbers that are fitted."""
+        return len(self.free_shapes) + (len(self.amplitudes) if self.free_amplitudes else 0)
+
+    @property
+    def possible(self) -> bool:
+        """Whether every number lies in its range, amplitudes of derived sign apart."""
+        return self.effect.possible(self.values)
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """A model with all its numbers."""
+
+    columns: Columns  # laws in their shapes
+    beta: Array  # of the rigid body and the laws
+    effects: tuple[Named, ...]
+
+    @classmethod
+    def start(cls, columns: Columns, fit: Fit) -> Exact:
+        count = len(columns.kept) + sum(not q.shape for law in columns.laws for q in law.parameters)
+        return cls(columns, fit.beta[:count].copy(), ())
+
+    def with_effect(self, effect: Effect, amplitudes: Array, log: int | None = None) -> Exact:
+        given = amplitudes if effect.fixed_amplitudes is None else effect.fixed_amplitudes
+        return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log)))
+
+    def without(self, place: int) -> Exact:
+        return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
+
+    @cached_property
+    def nominal(self) -> Arm:
+        return nominal_arm(self.columns, self.beta)
+
+    @cached_property
+    def arm(self) -> Arm:
+        """With every effect that does not belong to one log."""
+        return self.arm_in(-1)
+
+    def arm_in(self, log: int) -> Arm:
+        """As it was in log number `log`."""
+        turning = self.columns.body.robot.revolute
+        acting = [Acting.of(one.effect, one.values, revolute=one.effect.joint is None or turning[one.effect.joint - 1])
+                  for one in self.effects if one.log in (None, log)]
+        return self.nominal.extended(*acting)
+
+    def torque(self, data: Data) -> Array:
+        """(rows,)"""
+        return data.lay_each(lambda log, motion: self.arm_in(log).torque(motion))
+
+    def moved(self, shift: Array, names: list[tuple[int, int, str]]) -> Exact:
+        """Every number moved: base first, then what `names` says: shapes of laws, numbers of effects."""
+        first = len(self.beta)
+        laws, effects = list(self.columns.laws), list(self.effects)
+        for (kind, place, name), by in zip(names, shift[first:].tolist(), strict=True):
+            if kind == 0:
+                laws[place] = _shape_moved(laws[place], name, by)
+            else:
+                effects[place] = _number_moved(effects[place], name, by)
+        return Exact(replace(self.columns, laws=tuple(laws)), self.beta + shift[:first], tuple(effects))
+
+
+def _shape_moved(effect: Effect, name: str, by: float) -> Effect:
+    """A shape of positive range moves by its logarithm, any other by itself."""
+    quantity = next(q for q in effect.parameters if q.name == name)
+    here = float(getattr(effect, name))
+    there = here * float(np.exp(np.clip(by, -_FARTHEST, _FARTHEST))) if quantity.low > 0.0 else here + by
+    shape: dict[str, Any] = {name: float(np.clip(there, quantity.low, quantity.high))}
+    return replace(effect, **shape)
+
+
+def _number_moved(one: Named, name: str, by: float) -> Named:
+    if name.isdigit():
+        amplitudes = list(one.amplitudes)
+        amplitudes[int(name)] += by
+        return replace(one, amplitudes=tuple(amplitudes))
+    return replace(one, effect=_shape_moved(one.effect, name, by))
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A model fitted exactly."""
+
+    model: Exact
+    data: Data
+    weight: Array  # (joints,)
+    left: Array  # (rows,) [N m]
+    slopes: Array  # (numbers, rows) unweighted
+    names: tuple[tuple[int, int, str], ...]  # of the slopes behind those of the base
+
+    @cached_property
+    def weights(self) -> Array:
+        return np.asarray(self.weight[self.data.joint])
+
+    @property
+    def residual(self) -> Array:
+        """(rows,) weighted."""
+        return np.asarray(self.left * self.weights)
+
+    @cached_property
+    def fit(self) -> Fit:
+        """As a linear fit around the solution: what is orthogonal to it, the model cannot imitate by moving a little."""
+        return Fit(self.data, self.slopes, self.left, self.weight, np.zeros(len(self.slopes)))
+
+    @cached_property
+    def rss(self) -> float:
+        return float(self.residual @ self.residual)
+
+    @property
+    def rms(self) -> Array:
+        return self.data.rms(self.left)
+
+    def of_effect(self, place: int) -> list[int]:
+        """Which slopes belong to effect number `place`."""
+        first = len(self.model.beta)
+        return [first + k for k, (kind, which, _) in enumerate(self.names) if kind == 1 and which == place]
+
+    def covariance(self) -> Array:
+        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for."""
+        return _covariance(self)
+
+
+def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target: Array | None = None) -> Refined:
+    """Gauss-Newton with halved steps until the squared weighted residual no longer falls."""
+    y = data.y if target is None else target
+    weights = weight[data.joint]
+    rigid = rigid_rows(data, model.columns)
+    left = y - model.torque(data)
+    now = float(np.sum(np.square(left * weights)))
+    slopes, names = _slopes(model, data, rigid, y - left)
+    for _ in range(steps):
+        shift = _solved(slopes * weights, left * weights)
+        share, better = 1.0, False
+        for _ in range(_HALVES):
+            there = model.moved(share * shift, names)
+            other = y - there.torque(data)
+            power = float(np.sum(np.square(other * weights)))
+            if power < now:
+                better = True
+                break
+            share *= 0.4
+        if not better:
+            break
+        gained, model, left, now = 1.0 - power / now, there, other, power
+        slopes, names = _slopes(model, data, rigid, y - left)
+        if gained < _GAIN:
+            break
+    return Refined(model, data, weight, left, slopes, tuple(names))
+
+
+def _slopes(model: Exact, data: Data, rigid: Array, torque: Array) -> tuple[Array, list[tuple[int, int, str]]]:
+    laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
+    bent, which = law_slopes(data, model.columns, model.beta)
+    names = [(0, place, name) for place, name in which]
+    more = list(bent)
+    for place, one in enumerate(model.effects):
+        for name, step in _steps(one):
+            names.append((1, place, name))
+            effects = list(model.effects)
+            effects[place] = _number_moved(one, name, step)
+            more.append((replace(model, effects=tuple(effects)).torque(data) - torque)[None] / step)
+    return np.concatenate([rigid, *laws, *more]), names
+
+
+def _steps(one: Named) -> list[tuple[str, float]]:
+    """Numbers of an effect and how far each is moved for its slope."""
+    found = []
+    if one.free_amplitudes:
+        size = max((abs(a) for a in one.amplitudes), default=0.0) or 1e-3
+        found = [(str(k), _DIFFERENCE * max(abs(a), 0.1 * size)) for k, a in enumerate(one.amplitudes)]
+    for q in one.free_shapes:
+        here = abs(float(getattr(one.effect, q.name)))
+        wide = min(q.high - q.low, 1e2)
+        step = _DIFFERENCE if q.low > 0.0 else _DIFFERENCE * max(here, 1e-2 * wide)
+        top = float(getattr(one.effect, q.name)) >= q.high
+        found.append((q.name, -step if top else step))
+    return found
+
+
+def _solved(table: Array, y: Array) -> Array:
+    size = np.linalg.norm(table, axis=1)
+    size = np.where(size > 0.0, size, 1.0)
+    unit = table / size[:, None]
+    values, vectors = np.linalg.eigh(unit @ unit.T)
+    keep = values > 1e-11 * values[-1]
+    return np.asarray((vectors[:, keep] / values[keep]) @ (vectors[:, keep].T @ (unit @ y)) / size)
+
+
+def _covariance(done: Refined) -> Array:
+    """Newey & West 1987 over the rows of each joint, 20 lags: neighbouring rows share the noise of the low-pass."""
+    table = done.slopes * done.weights
+    size = np.linalg.norm(table, axis=1)
+    size = np.where(size > 0.0, size, 1.0)
+    unit = table / size[:, None]
+    values, vectors = np.linalg.eigh(unit @ unit.T)
+    keep = values > 1e-11 * values[-1]
+    bread = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
+    scores = unit * done.residual
+    meat = scores @ scores.T
+    for lag in range(1, 21):
+        cross = scores[:, lag:] @ scores[:, :-lag].T
+        meat += (1.0 - lag / 21.0) * (cross + cross.T)
+    return np.asarray(bread @ meat @ bread / size / size[:, None])
+

@@ -1,0 +1,227 @@
+"""Find the causes one after the other: screen, refit the best and its rivals exactly, keep the best, look at what is left.
+
+    found = search(case, settings)
+    found.model                     the nominal model with every cause that paid
+    found.steps                     what each step tried
+
+A step ends the search where no cause exceeds its threshold, or where the best, fitted exactly, brings nothing on what was held
+out. Rivals are ranked by the error they leave on held-out rows; of those that leave nearly the same, the one with fewest numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import Family, lay_family
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact, Refined, refine
+from pipelines.model.diagnosis.nominal import Fit, orthonormal
+from pipelines.model.diagnosis.result import Trial
+from pipelines.model.diagnosis.screen import Screened, screen
+from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
+from pipelines.model.diagnosis.twin import Twin
+from pipelines.model.effects.base import Effect
+
+__all__ = ["Case", "Found", "Step", "clean", "cross_validated", "held_out", "search"]
+
+_RIVALS = 6  # fitted exactly
+_CLOSE = 0.25  # of the best gain: weaker ones are no rivals
+_PARSIMONY = 0.02  # of what the best takes away
+_SETTLED = 0.02  # of a weight
+_ROUNDS = 3  # of weights
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is diagnosed."""
+
+    data: Data  # that is fitted
+    judge: Data | None  # that judges; None: blocks of the fitted
+    model: Exact  # nominal
+    weight: Array  # (joints,)
+    families: tuple[Family, ...]
+    twin: Twin | None
+    floor: Array  # (joints,) [N m]; NaN where unknown
+    blocks: int
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A hypothesis fitted exactly."""
+
+    screened: Screened
+    effect: Effect
+    log: int | None
+    done: Refined
+    error: float  # squared weighted, held out
+    visibility: float
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One search for one cause."""
+
+    before: Refined
+    error_before: float
+    best: Tried | None  # accepted
+    rivals: tuple[Tried, ...]  # best first
+    screened: tuple[Screened, ...]
+    thresholds: Thresholds
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    nominal: Refined
+    steps: tuple[Step, ...]
+    final: Refined
+
+
+def search(case: Case, most: int) -> Found:
+    """Up to `most` causes."""
+    now = refine(case.model, case.data, case.weight)
+    nominal, steps = now, []
+    for number in range(1, most + 2):
+        step = _step(case, now, number, number <= most)
+        steps.append(step)
+        if step.best is None:
+            break
+        now = _reweighted(step.best.done)
+    return Found(nominal, tuple(steps), now)
+
+
+def _step(case: Case, now: Refined, number: int, more: bool) -> Step:
+    arm = now.model.arm
+    screened = screen(case.data, now.fit, case.families, arm)
+    thresholds = (without_twin(screened, now.rss) if case.twin is None else
+                  Thresholds.of_twin(case.twin, case.families, case.model.arm, now.weight))
+    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
+    passing = [k for k, one in enumerate(screened) if one.gain[0] > thresholds.gain[k]
+               and (one.family.event or (one.cause, one.joint) not in taken)]
+    passing.sort(key=lambda k: -screened[k].gain[0])
+    error = held_out(now, case)
+    tried: list[Tried] = []
+    for k in passing[:_RIVALS] if more else []:
+        if screened[k].gain[0] >= _CLOSE * screened[passing[0]].gain[0]:
+            tried.append(_fitted(case, now, screened[k]))
+    tried.sort(key=lambda one: one.error)
+    best = _fewest(tried, error)
+    trials = _ledger(screened, thresholds, tried, best, now, error, number)
+    return Step(now, error, best, tuple(tried), tuple(screened), thresholds, trials)
+
+
+def _fewest(tried: Sequence[Tried], before: float) -> Tried | None:
+    """Of those that leave nearly as little as the best, the one with fewest numbers; none where the best leaves no less."""
+    possible = [one for one in tried if one.error < before and one.done.model.effects[-1].possible]
+    if not possible:
+        return None
+    least = possible[0].error
+    near = [one for one in possible if one.error - least <= _PARSIMONY * (before - least)
+            and one.screened.joint == possible[0].screened.joint]
+    return min(near, key=lambda one: (one.done.model.effects[-1].count, one.error))
+
+
+def _fitted(case: Case, now: Refined, one: Screened) -> Tried:
+    """A cause fitted exactly beside everything that was found before."""
+    log = one.logs[0] if one.family.event else None
+    effect = one.shape[0].full()
+    table = _table(case.data, effect, now, log)
+    amplitudes = _amplitudes(now.fit, table)
+    done = refine(now.model.with_effect(effect, amplitudes, log), case.data, now.weight)
+    seen = now.fit.project(table)
+    share = float(np.linalg.norm(seen)) / max(float(np.linalg.norm(table * now.weights)), 1e-300)
+    return Tried(one, effect, log, done, held_out(done, case), share)
+
+
+def clean(data: Data, fit: Fit, arm: Arm, found: Sequence[Screened], most: int = 8) -> Array:
+    """(rows,) [N m] what is left when everything that the most promising causes could explain is taken away, right or wrong.
+
+    Noise is in it, and hardly any fault: a fault would pass for noise, and the twin would be too noisy to show anything.
+    """
+    best = sorted((one for one in found if not one.family.event), key=lambda one: -one.gain[0])[:most]
+    tables = [_laid(data, one.shape[0].full(), arm) for one in best]
+    basis = orthonormal(np.concatenate([fit.project(table) for table in tables]))
+    residual = fit.residual - (basis @ fit.residual) @ basis
+    return np.asarray(residual / fit.weights)
+
+
+def _laid(data: Data, effect: Effect, arm: Arm) -> Array:
+    laid = next(iter(lay_family(data, Family(effect.name, effect.joint, (effect,)), arm)))
+    out = np.zeros((laid.table.shape[1], data.rows))
+    out[:, laid.rows] = laid.table[0]
+    return out
+
+
+def _table(data: Data, effect: Effect, now: Refined, log: int | None) -> Array:
+    out = _laid(data, effect, now.model.arm)
+    return out if log is None else np.where(data.log_of == log - data.first, out, 0.0)
+
+
+def _amplitudes(fit: Fit, table: Array) -> Array:
+    c = fit.project(table)
+    size = np.linalg.norm(c, axis=1)
+    size = np.where(size > 0.0, size, np.inf)
+    unit = c / size[:, None]
+    solved, *_ = np.linalg.lstsq(unit @ unit.T, unit @ fit.residual, rcond=1e-8)
+    return np.asarray(solved / size)
+
+
+def held_out(done: Refined, case: Case) -> float:
+    """Squared weighted error on what the model was not fitted to."""
+    if case.judge is None:
+        return cross_validated(done, case.blocks)
+    left = case.judge.y - done.model.torque(case.judge)
+    return float(np.sum(np.square(left * done.weight[case.judge.joint])))
+
+
+def cross_validated(done: Refined, blocks: int) -> float:
+    """Every stretch of time explained by the numbers that the rest asks for, to first order around the solution."""
+    table, residual = done.slopes * done.weights, done.residual
+    size = np.linalg.norm(table, axis=1)
+    unit = table / np.where(size > 0.0, size, 1.0)[:, None]
+    place = done.data.blocks(blocks)
+    total, gram, moment = 0.0, unit @ unit.T, unit @ residual
+    ridge = 1e-9 * np.eye(len(gram))
+    for block in range(int(place.max()) + 1):
+        held = place == block
+        own = unit[:, held]
+        shift = np.linalg.solve(gram - own @ own.T + ridge, moment - own @ residual[held])
+        total += float(np.sum(np.square(residual[held] - shift @ own)))
+    return total
+
+
+def _reweighted(done: Refined) -> Refined:
+    """Joints weighted by what this model leaves of them."""
+    for _ in range(_ROUNDS):
+        weight = 1.0 / np.maximum(done.rms, 1e-12)
+        settled = np.abs(weight / done.weight - 1.0).max() < _SETTLED
+        done = refine(done.model, done.data, weight)
+        if settled:
+            break
+    return done
+
+
+def _ledger(screened: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried], best: Tried | None, now: Refined,
+            error: float, number: int) -> tuple[Trial, ...]:
+    exact = {id(one.screened): one for one in tried}
+    rows: list[Trial] = []
+    order = sorted(range(len(screened)), key=lambda k: -screened[k].gain[0])
+    for k in order:
+        one = screened[k]
+        fitted = exact.get(id(one))
+        accepted = best is not None and fitted is best
+        if fitted is None and one.gain[0] <= thresholds.gain[k] and len(rows) >= 12:
+            continue
+        reason = ("accepted" if accepted else "below its threshold" if one.gain[0] <= thresholds.gain[k] else
+                  "weaker than others" if fitted is None else
+                  "impossible numbers" if not fitted.done.model.effects[-1].possible else
+                  "held-out error does not fall" if fitted.error >= error else "explains less than the one accepted")
+        gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
+        rows.append(Trial(number, one.cause, one.joint, float(one.gain[0] / now.rss), float(thresholds.gain[k] / now.rss),
+                          float(one.visibility[0]), gained, accepted, reason))
+    return tuple(rows)
