@@ -21,6 +21,9 @@ __all__ = ["fit_rational"]
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # tried for a new pair of poles
 _FREQUENCIES = 150  # tried for it
 _REFINED = 3  # of the trials
+_DELAYS = 100  # tried, in eighths of a period of the highest frequency, early and late
+_LEAP = 3.0  # of the logarithm of the gain
+_ROUGH = (12, 1e-3)  # steps and relative decrease of a trial
 _STEPS = 60  # of Gauss and Newton at most
 _STOP = 1e-7  # relative decrease of the sum of squares below which they end
 _PATIENCE = 2  # sections more that do not pay before the search ends
@@ -69,7 +72,7 @@ def fit_rational(frequency: Array, response: Complex, variance: Array, *, integr
     frequency, data = _prepare(frequency, response, variance, integrators, hold, with_delay, correlated, freedom, floor)
     shell = Rational(np.zeros(2), np.zeros((2, 2)), data.sign, 0, 0, integrators, hold, data.unit,
                      (float(frequency[0]), float(frequency[-1])), np.inf, np.inf)
-    current = _refine(data, replace(shell, parameters=np.array([_log_gain(data), 0.0])))
+    current = _rigid(data, shell)
     best, waited = (current if fewest == 0 else shell), 0
     for order in range(1, most + 1):
         if 2 + 4 * order > data.independent:
@@ -106,8 +109,18 @@ def _prepare(frequency: Array, response: Complex, variance: Array, integrators: 
     return frequency, _Data(s / unit, target, np.sqrt(2.0 / spread), unit, with_delay, sign, correlated, freedom)
 
 
-def _log_gain(data: _Data) -> float:
-    return float(np.median(np.log(np.abs(data.target))))
+def _rigid(data: _Data, shell: Rational) -> Rational:
+    """Gain and delay alone, from no delay and from the one that brings most phases to zero: 2π is soon gone round."""
+    gain = float(np.median(np.log(np.abs(data.target))))
+    delays = [0.0]
+    if data.with_delay:
+        omega, turned = data.s.imag, data.sign * data.target / np.abs(data.target)
+        grid = np.arange(-_DELAYS, _DELAYS + 1) * (0.25 * np.pi / omega[-1])
+        delays.append(float(grid[np.argmax((np.exp(1j * np.outer(grid, omega)) @ turned).real)]))
+    starts = [replace(shell, parameters=np.array([gain, delay])) for delay in delays]
+    found = [*(_refine(data, one) for one in starts), *(_judged(data, one) for one in starts)]
+    # where modes tower over everything, the most likely gain alone is none at all: no place to go on from
+    return min((one for one in found if abs(one.parameters[0] - gain) < _LEAP), key=lambda one: one.description)
 
 
 def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Complex, Complex]:
@@ -141,13 +154,13 @@ def _refine(data: _Data, start: Rational) -> Rational:
                                  _descend(data, replace(start, parameters=p), data.freedom)))
 
 
-def _descend(data: _Data, start: Rational, freedom: float) -> Array:
+def _descend(data: _Data, start: Rational, freedom: float, steps: int = _STEPS, stop: float = _STOP) -> Array:
     """Gauss-Newton steps, shortened until the cost decreases."""
     p, damping = start.parameters, 1e-3
     with np.errstate(all="ignore"):
         rest, slope = _residual(data, p, start.zeros)
         cost, w = _cost(rest, freedom)
-        for _ in range(_STEPS):
+        for _ in range(steps):
             normal, gradient = _normal(slope, w), (np.conj(slope) @ (w * rest)).real
             scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
             matrix = normal / scale / scale[:, None]
@@ -160,7 +173,7 @@ def _descend(data: _Data, start: Rational, freedom: float) -> Array:
                     p, rest, slope, cost, w, damping = p - step, tried, its_slope, its_cost, its_w, max(damping / 10.0, 1e-12)
                     break
                 damping *= 4.0
-            if not before - cost > _STOP * before:
+            if not before - cost > stop * before:
                 break
     return p
 
@@ -206,8 +219,8 @@ def _grow(data: _Data, model: Rational, with_zeros: bool) -> Rational:
         between = 2 + 2 * model.zeros
         p = np.concatenate([base, model.parameters[2:between], zero[k], model.parameters[between:], [b[k], a[k]]])
         started = replace(model, parameters=p, zeros=model.zeros + int(with_zeros), poles=model.poles + 1)
-        found.append(_refine(data, started))
-    return min(found, key=lambda one: one.description)
+        found.append(_judged(data, replace(started, parameters=_descend(data, started, np.inf, *_ROUGH))))
+    return _refine(data, min(found, key=lambda one: one.description))
 
 
 def _numerators(omega: Array, weight: Array, ratio: Complex, a: Array, b: Array, with_zeros: bool) -> tuple[Array, Array, Array]:

@@ -25,7 +25,7 @@ __all__ = ["local_polynomial"]
 Indices = npt.NDArray[np.int64]
 
 _FREEDOM = 10  # least degrees of freedom of a noise estimate: its own deviation is then a third
-_LEAST_FREEDOM = 4  # where a width is asked for
+_LEAST_FREEDOM = 4  # in one stretch
 _AT_ONCE = 2000  # windows solved together
 _EMPTY = 1e-10  # of the strongest amplitude: what is smaller is rounding, no source
 
@@ -54,7 +54,7 @@ def local_polynomial(stretches: Sequence[Array], rate: float, frequency: Array, 
         rate: samples a second [Hz].
         frequency: [Hz] (frequencies,) evenly spaced, where the responses are wanted.
         order: of both polynomials.
-        width: [Hz] of the window; None for the narrowest that leaves ten degrees of freedom in each stretch, and holds
+        width: [Hz] of the window; None for the narrowest that leaves ten degrees of freedom in all stretches, and holds
             enough lines of a periodic source. That is wide: for a periodic source `multisine_responses` resolves more.
 
     Raises:
@@ -63,7 +63,9 @@ def local_polynomial(stretches: Sequence[Array], rate: float, frequency: Array, 
     if order < 0 or not ((frequency > 0.0) & (frequency < 0.5 * rate)).all():
         raise UsageError("C02", f"order {order}, frequencies {frequency.min():g} to {frequency.max():g} Hz at {rate:g} Hz",
                          remedy="ask for frequencies between 0 and half the rate")
-    found = [one for x in stretches if (one := _of_stretch(x, rate, frequency, source, list(outputs), order, width)) is not None]
+    least = max(_LEAST_FREEDOM, -(-_FREEDOM // max(len(stretches), 1)))
+    found = [one for x in stretches
+             if (one := _of_stretch(x, rate, frequency, [source, *outputs], order, width, least)) is not None]
     if not found:
         longest = max((len(x) for x in stretches), default=0) / rate
         raise InputRejected("T08", f"{longest:.3g} s at most are too short for local polynomials of order {order}"
@@ -71,16 +73,16 @@ def local_polynomial(stretches: Sequence[Array], rate: float, frequency: Array, 
     return _together(found, frequency)
 
 
-def _of_stretch(x: Array, rate: float, frequency: Array, source: int, outputs: list[int], order: int,
-                width: float | None) -> _Local | None:
+def _of_stretch(x: Array, rate: float, frequency: Array, channels: list[int], order: int, width: float | None,
+                least: int) -> _Local | None:
     """None for a stretch in which a window holds too few bins."""
     if not np.isfinite(x).all():
         raise InputRejected("D01", "missing samples in a signal whose response is asked for", remedy="cut the log at its gaps")
     unknowns, bins = 2 * (order + 1), len(x) / rate
-    half = (unknowns + _FREEDOM) // 2 if width is None else int(0.5 * width * bins)
+    half = (unknowns + least) // 2 if width is None else int(0.5 * width * bins)
     if 2 * half + 1 - unknowns < _LEAST_FREEDOM or 2 * half + 3 > len(x) // 2:
         return None
-    transform = np.fft.rfft(x[:, [source, *outputs]], axis=0) / np.sqrt(len(x))
+    transform = np.fft.rfft(x[:, channels], axis=0) / np.sqrt(len(x))
     if width is None:
         half = _holding_lines(np.abs(transform[:, 0]) ** 2, frequency * bins, half, order)
     middle = np.clip(np.rint(frequency * bins).astype(np.int64), half + 1, len(transform) - half - 2)
