@@ -84,6 +84,13 @@ class SeparableFit:
     def rms(self) -> float:
         return float(np.sqrt(np.mean(np.square(self.residual))))
 
+    @classmethod
+    def rough(cls, theta: Array, now: Linear) -> SeparableFit:
+        """An end of a search, of which no covariance is asked: that holds NaN."""
+        size = len(now.beta) + len(theta)
+        return cls(theta, now.beta, np.full((size, size), np.nan), np.zeros(size), now.residual, np.zeros((0, size)),
+                   (False,) * len(theta))
+
 
 def linear_part(columns: Array, y: Array) -> Linear:
     """Least squares with columns of unit length, cut off below `_RANK`."""

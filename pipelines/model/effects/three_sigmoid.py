@@ -47,7 +47,7 @@ class ThreeSigmoid(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)
-        return self.on_own_row(arm, *np.tanh(np.multiply.outer([self.w1, self.w2, self.w3], v)), v)
+        return self.on_own_row(arm, np.tanh(self.w1 * v), np.tanh(self.w2 * v), np.tanh(self.w3 * v), v)
 
     def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array:
         """∂τ/∂ln w_k = f_k w_k v (1 - tanh²(w_k v))."""

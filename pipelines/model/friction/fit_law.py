@@ -22,9 +22,7 @@ _OTHERS = 8
 _ROUGH = 240  # rows of a rough fit
 _GLANCED = 80  # rows that its starts are ranked by
 _SPARSE = 3  # of the starts it looks at every third
-_TRIED = 2  # of those it tries the best two,
-_FIRST = 2  # each for two steps,
-_FURTHER = 5  # and goes on with the better one
+_STEPS = 3  # that it goes from the best one
 _ROUNDED = 1e-12  # of θ: less is what exp and log make of it
 _CARRIED = 3  # rounds in which a law that depends on the load sees the load of the fit before
 
@@ -55,9 +53,8 @@ def roughly(equations: Equations, law: Law) -> LawFit:
     few, arms = equations.thinned(_ROUGH), equations.arms()
     problem = few.problem(law, arms)
     starts = list(law.starts(equations.nodes, arms[0]))[::_SPARSE]
-    tried = (search(problem, theta, _FIRST) for theta in _ranked(equations.thinned(_GLANCED), law, arms, starts)[:_TRIED])
-    theta, _ = min(tried, key=lambda end: end[1].rss)
-    return LawFit(law, arms[0], equations.postures, fit_separable(problem, [theta], 0, _FURTHER), equations.width)
+    best = _ranked(equations.thinned(_GLANCED), law, arms, starts)[0]
+    return LawFit(law, arms[0], equations.postures, SeparableFit.rough(*search(problem, best, _STEPS)), equations.width)
 
 
 def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableFit) -> bool:

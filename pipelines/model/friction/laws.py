@@ -62,9 +62,14 @@ class Law:
         return tuple(found.values())
 
     @cached_property
+    def _counts(self) -> tuple[int, ...]:
+        """Columns of every effect."""
+        return tuple(sum(not q.shape for q in effect.parameters) for effect in self.effects)
+
+    @property
     def amplitudes(self) -> int:
         """Number of columns."""
-        return sum(sum(not q.shape for q in effect.parameters) for effect in self.effects)
+        return sum(self._counts)
 
     @cached_property
     def pointwise(self) -> bool:
@@ -86,7 +91,7 @@ class Law:
         """Numbers to be fitted."""
         return self.amplitudes + len(self.places)
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Of θ."""
         pairs = np.log([(place.quantity.low, place.quantity.high) for place in self.places]).reshape(-1, 2)
@@ -94,16 +99,20 @@ class Law:
 
     def shaped(self, theta: Array) -> tuple[Effect, ...]:
         """The effects with their non-linear numbers out of θ."""
-        numbers: list[dict[str, float]] = [{q.name: getattr(effect, q.name) for q in effect.parameters if q.shape}
-                                           for effect in self.effects]
+        numbers = [dict(fixed) for fixed in self._defaults]
         for place, value in zip(self.places, theta, strict=True):
             for k in place.effects:
                 numbers[k][place.name] = math.exp(value)
-        return tuple(effect.at(values) for effect, values in zip(self.effects, numbers, strict=True))
+        return tuple(effect.at(values) if values else effect for effect, values in zip(self.effects, numbers, strict=True))
+
+    @cached_property
+    def _defaults(self) -> tuple[dict[str, float], ...]:
+        """Non-linear numbers of every effect as they are where θ says nothing of them."""
+        return tuple({q.name: getattr(effect, q.name) for q in effect.parameters if q.shape} for effect in self.effects)
 
     def theta(self, effects: tuple[Effect, ...]) -> Array:
         """The inverse of `shaped`."""
-        return np.log([float(getattr(effects[place.effects[0]], place.name)) for place in self.places])
+        return np.array([math.log(getattr(effects[place.effects[0]], place.name)) for place in self.places])
 
     def canonical(self, theta: Array) -> Array:
         """The one of several equal θ that its effects name, such as w1 > w2 > w3."""
@@ -120,17 +129,18 @@ class Law:
 
     def slopes(self, motion: Motion, theta: Array, amplitudes: Array) -> Array | None:
         """∂τ/∂θ (samples, numbers of θ) on the joint's own row; None where an effect does not say it."""
-        total, first = np.zeros((len(motion.dq), len(self.places))), 0
+        total, first = np.zeros((len(self.places), len(motion.dq))), 0
         for k, effect in enumerate(self.shaped(theta)):
-            count = sum(not q.shape for q in effect.parameters)
+            count = self._counts[k]
             own = [i for i, place in enumerate(self.places) if k in place.effects]
             if own:
                 part = effect.shape_slopes(motion, amplitudes[first:first + count])
                 if part is None:
                     return None
-                total[:, own] += part
+                for i, column in zip(own, part.T, strict=True):
+                    total[i] += column
             first += count
-        return total
+        return total.T
 
     @cached_property
     def sloped(self) -> bool:
@@ -145,16 +155,14 @@ class Law:
         shared = [place for place in self.places if place.name == _SHARED]
         widths = (sharpness,) if sharpness is not None else _SHARP
         for effects in itertools.product(*grids):
-            theta = self.theta(effects)
             for width in widths if shared else (1.0,):
-                yield np.array([math.log(width) if place.name == _SHARED else value
-                                for place, value in zip(self.places, theta, strict=True)])
+                yield np.array([math.log(width if place.name == _SHARED else getattr(effects[place.effects[0]], place.name))
+                                for place in self.places])
 
     def values(self, theta: Array, amplitudes: Array) -> tuple[dict[str, float], ...]:
         """Every parameter of every effect, by name."""
         found, first = [], 0
-        for effect in self.shaped(theta):
-            count = sum(not q.shape for q in effect.parameters)
+        for effect, count in zip(self.shaped(theta), self._counts, strict=True):
             found.append(effect.values(amplitudes[first:first + count]))
             first += count
         return tuple(found)

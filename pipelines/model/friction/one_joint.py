@@ -52,6 +52,10 @@ class OneJoint:
         """J ddq + c sin q + c' cos q, (samples, 1) [N m]."""
         return np.asarray(self.inertia * motion.ddq + (gravity_columns(motion.q[:, 0], self.revolute) @ self.p[1:])[:, None])
 
+    def friction_torque(self, motion: Motion) -> Array:
+        """None: its law of friction is what is fitted."""
+        return np.zeros_like(motion.dq)
+
     def with_body(self, body: RigidBody, p: Array) -> NoReturn:
         raise TypeError("a joint on its own has no links")
 

@@ -6,8 +6,7 @@ Integrated over a window [a, b], eq. (11) of Kostić et al. 2004 reads
 
 No acceleration has to be reconstructed, a held command is integrated exactly, and a sign change of friction, which smears
 an acceleration over the reach of every filter, is a kink of the speed at a known instant. Divided by its length, a row is a
-mean torque [N m]. The integrals are sums over nodes: one a sample's interval, several where speed passes zero within it, one
-for a few samples where speed hardly changes.
+mean torque [N m]. The integrals are sums over nodes (nodes.py).
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.friction.nodes import Nodes, lay_nodes
 from pipelines.model.friction.one_joint import gravity_columns
 from pipelines.model.friction.sway import Sway, sway_columns
 from pipelines.model.motion import Reconstructed, encoder_resolution
@@ -31,12 +31,6 @@ from pipelines.signal.tuning import tune_jerk
 
 __all__ = ["Stretch", "Windows", "stretches_of", "swaying"]
 
-_PARTS = 8  # of an interval in which speed passes zero
-_NEAR = 2.0  # changes of speed within a sample: nearer to zero, the sign of friction may turn over inside
-_LITTLE = 1e-4  # of the fastest speed: what creeps more slowly does not need its every sample
-_STEADY = 20.0  # a speed that changes by less than a twentieth: one node for several samples
-_MOST = 5  # of them
-_COARSEST = 5e-3  # [s]
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
 _SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
 _FEWEST = 10  # windows of a stretch that is worth using
@@ -132,50 +126,23 @@ class Stretch:
         return np.hstack(columns)
 
     @cached_property
-    def ends(self) -> Array:
-        """Times between the nodes [s] (nodes + 1,): fine where friction may change its sign, coarse where speed hardly changes."""
-        v, t = self.dq, self.t
-        fast, change = np.abs(v), np.abs(np.diff(v))
-        nearest = np.minimum(fast[1:], fast[:-1])
-        nearest[v[1:] * v[:-1] <= 0.0] = 0.0
-        little = _LITTLE * float(fast.max())
-        fine = (nearest < _NEAR * change) & (change > little)
-        parts = np.where(fine, _PARTS, 1)
-        size = self._group
-        if size > 1:
-            whole = len(fine) // size * size
-            group = np.stack([v[k:whole + k:size] for k in range(size + 1)])
-            low, high = group.min(axis=0), group.max(axis=0)
-            alone = (low > 0.0) | (high < 0.0)  # all of one sign
-            slowest, fastest = np.minimum(np.abs(low), np.abs(high)), np.maximum(np.abs(low), np.abs(high))
-            steady = (fastest < little) | (alone & (slowest > _STEADY * (fastest - slowest)))
-            parts[:whole].reshape(-1, size)[steady, 1:] = 0  # the node before reaches over them
-        at = np.repeat(np.arange(len(parts)), parts)
-        ends = np.append(t[at], t[-1])
-        inner = np.flatnonzero(fine[at])
-        step = np.arange(len(inner)) % _PARTS / _PARTS
-        ends[inner] += step * (t[at[inner] + 1] - t[at[inner]])
-        return ends
+    def laid(self) -> Nodes:
+        """Where the integrals are summed."""
+        return lay_nodes(self.t, self.q, self.dq, self.window)
 
     @property
-    def _group(self) -> int:
-        """Samples that one node may stand for: a divisor of the window."""
-        most = max(1, min(_MOST, int(_COARSEST * (len(self.t) - 1) / float(self.t[-1] - self.t[0]) + 1e-9)))
-        return max(size for size in range(1, most + 1) if self.window % size == 0)
+    def ends(self) -> Array:
+        """Times between the nodes [s] (nodes + 1,)."""
+        return self.laid.ends
 
-    @cached_property
+    @property
     def nodes(self) -> Motion:
-        """Motion (nodes, 1) in the middle of every part; speed runs straight from sample to sample."""
-        ends = self.ends
-        middle = 0.5 * (ends[1:] + ends[:-1])
-        v = np.interp(ends, self.t, self.dq)
-        return Motion(middle, np.interp(middle, self.t, self.q)[:, None], np.interp(middle, self.t, self.dq)[:, None],
-                      (np.diff(v) / np.diff(ends))[:, None])
+        return self.laid.motion
 
     @cached_property
     def windows(self) -> Windows:
         """Where the nodes lie in the windows that are kept."""
-        first = np.searchsorted(self.ends[:-1], self.t[self.edges])
+        first = np.searchsorted(self.laid.sample, self.edges)
         length = np.full(len(self.ends) - 1, np.inf)
         length[:first[-1]] = np.repeat(self.length, np.diff(first))
         return Windows(self.nodes, np.diff(self.ends) / length, first[:-1], self.kept)
