@@ -18,7 +18,7 @@ from pipelines.errors import InputRejected, UsageError, did_you_mean
 from pipelines.log.model_file import ModelFile, Source, StoredEffect, StoredParameter, StoredValue, Validity
 from pipelines.log.robot import RobotDescription, format_robot, parse_robot
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.effects.base import ArmModel, Effect
+from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve
 from pipelines.model.parameter import Origin, Parameter, Uncertainty
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
@@ -131,6 +131,12 @@ class Arm:
         for law in self.friction:
             torque += law.effect.torque(motion, rigid, law.values)
         return torque
+
+    def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
+        """The friction laws at a joint (1-based) as curves of its speed; None where one of them is more than that."""
+        curves = [law.effect.speed_curve(law.values) for law in self.friction if law.effect.joint in (joint, None)]
+        known = tuple(curve for curve in curves if curve is not None)
+        return known if len(known) == len(curves) else None
 
     def torque_parts(self, motion: Motion) -> ArmTorque:
         """The torque of the model, split into what it is made of."""

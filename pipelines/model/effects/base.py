@@ -45,7 +45,7 @@ import numpy.typing as npt
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["ArmModel", "Effect", "Hooks", "Predict", "Quantity", "SpeedCurve", "Values"]
+__all__ = ["ArmModel", "Effect", "Hooks", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
 
 Values = Mapping[str, float]
 
@@ -73,6 +73,10 @@ class ArmModel(Protocol):
 
     def friction_torque(self, motion: Motion) -> Array:
         """The part of it (samples, joints) [N m] that the friction laws make."""
+        ...
+
+    def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
+        """The friction laws at a joint (1-based) as curves of its speed; None where one of them is more than that."""
         ...
 
     def with_body(self, body: RigidBody, p: Array) -> ArmModel:
@@ -114,6 +118,13 @@ class SpeedCurve:
     viscous: float = 0.0  # [N m s/rad]
     heights: tuple[float, ...] = ()  # [N m]
     sharpnesses: tuple[float, ...] = ()  # [s/rad]
+
+    def torque(self, speed: Array) -> Array:
+        """[N m] at each speed [rad/s]."""
+        tau = self.constant + self.viscous * speed
+        for height, sharpness in zip(self.heights, self.sharpnesses, strict=True):
+            tau += height * np.tanh(sharpness * speed)
+        return tau
 
 
 @dataclass(frozen=True)
@@ -276,6 +287,24 @@ class Effect(ABC):
         if self.joint is None:
             raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
         return self.joint - 1
+
+
+def friction_at(arm: ArmModel, joint: int) -> Callable[[Motion, Array], Array]:
+    """Friction [N m] (samples,) of a joint (1-based) whose drive turns at a speed of its own: friction(motion, speed).
+
+    Made once for a simulation, which asks it at every step.
+    """
+    curves = arm.friction_curves(joint)
+
+    def by_curves(motion: Motion, speed: Array) -> Array:
+        return np.asarray(sum((curve.torque(speed) for curve in curves or ()), np.zeros(len(speed))))
+
+    def by_laws(motion: Motion, speed: Array) -> Array:
+        dq = motion.dq.copy()
+        dq[:, joint - 1] = speed
+        return np.asarray(arm.friction_torque(replace(motion, dq=dq))[:, joint - 1])
+
+    return by_laws if curves is None else by_curves
 
 
 _KEPT: list[tuple[ArmModel, Motion, Array]] = []  # the last few, newest first; compared by identity, for a motion is its arrays

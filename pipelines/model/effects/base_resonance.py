@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, friction_at
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_torque, shifted
 
@@ -74,11 +74,7 @@ class BaseResonance(Effect):
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm's first angle is the true one, against the ground; angle and speed of the base are two states."""
         inertia, ratio, w = values["inertia"], values["damping_ratio"], 2.0 * pi * values["frequency"]
-
-        def friction(motion: Motion, speed: Array) -> Array:
-            dq = motion.dq.copy()
-            dq[:, _FIRST] = speed
-            return np.asarray(arm.friction_torque(replace(motion, dq=dq))[:, _FIRST])
+        friction = friction_at(arm, _FIRST + 1)
 
         def actuator(command: Array, motion: Motion, states: Array) -> Array:
             """Friction is that of the speed against the base."""

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, friction_at
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import deflection, perturbed_torque, rate_of, shifted
 
@@ -98,13 +98,8 @@ class JointElasticity(Effect):
         j, k, d = self._index, values["stiffness"], values["damping"]
         light = 0.01 * _felt(arm, np.zeros((1, arm.n_joints)), j)  # of a motor without inertia nothing can be integrated
         motor = max(values["motor_inertia"], light)
-        without = np.zeros((arm.n_joints, arm.n_joints))
+        friction, without = friction_at(arm, j + 1), np.zeros((arm.n_joints, arm.n_joints))
         without[j, j] = -motor
-
-        def friction(motion: Motion, speed: Array) -> Array:
-            dq = motion.dq.copy()
-            dq[:, j] = speed
-            return self.own(arm.friction_torque(replace(motion, dq=dq)))
 
         def spring(motion: Motion, states: Array) -> Array:
             return np.asarray(k * (states[:, 0] - self.own(motion.q)) + d * (states[:, 1] - self.own(motion.dq)))
