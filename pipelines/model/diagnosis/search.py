@@ -1,7 +1,8 @@
 """Find the causes one after the other: screen, refit the best and its rivals exactly, keep the best, look at what is left.
 
-    found = search(case, settings)
-    found.model                     the nominal model with every cause that paid
+    rough = provisional(case)       the greatest causes, without thresholds: the twin is then made of the model beside them
+    found = search(case, most, rough)
+    found.final                     the nominal model with every cause that paid
     found.steps                     what each step tried
 
 A step ends the search where no cause exceeds its threshold, or where the best, fitted exactly, brings nothing on what was held
@@ -27,10 +28,12 @@ from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Case", "Found", "Step", "clean", "cross_validated", "held_out", "search"]
+__all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "held_out", "provisional", "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
+_LEAST = 2e-3  # of the squared residual: no cause is fitted for less
+_GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
 _PARSIMONY = 0.02  # of what the best takes away
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
@@ -63,13 +66,23 @@ class Tried:
 
 
 @dataclass(frozen=True, eq=False)
+class Explored:
+    """Every cause on what one model leaves, and the greatest of them fitted exactly."""
+
+    before: Refined
+    error: float  # held out
+    screened: tuple[Screened, ...]
+    tried: tuple[Tried, ...]  # best first
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One search for one cause."""
 
     before: Refined
     error_before: float
     best: Tried | None  # accepted
-    rivals: tuple[Tried, ...]  # best first
+    rivals: tuple[Tried, ...]  # above their thresholds, best first
     screened: tuple[Screened, ...]
     thresholds: Thresholds
     trials: tuple[Trial, ...]
@@ -77,42 +90,65 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Found:
+    """The outcome of a search."""
+
     nominal: Refined
     steps: tuple[Step, ...]
     final: Refined
 
 
-def search(case: Case, most: int) -> Found:
-    """Up to `most` causes."""
-    now = refine(case.model, case.data, case.weight)
+def provisional(case: Case) -> tuple[Explored, ...]:
+    """The causes that explain the most of what a joint leaves, right or wrong, until none explains a third of it."""
+    now, found = refine(case.model, case.data, case.weight), []
+    for _ in range(_GREAT):
+        one = _explored(case, now)
+        found.append(one)
+        best = _fewest(one.tried, one.error)
+        if best is None or _share(best.screened, now) < _LARGE:
+            break
+        now = _reweighted(best.done)
+    return tuple(found)
+
+
+def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
+    """Up to `most` causes; what `rough` explored already is not done again, as long as it leads the same way."""
+    now = rough[0].before if rough else refine(case.model, case.data, case.weight)
     nominal, steps = now, []
     for number in range(1, most + 2):
-        step = _step(case, now, number, number <= most)
+        same = number <= len(rough) and rough[number - 1].before is now
+        step = _step(case, rough[number - 1] if same else _explored(case, now), number, number <= most)
         steps.append(step)
         if step.best is None:
             break
-        now = _reweighted(step.best.done)
+        follows = number < len(rough) and same and step.best is _fewest(rough[number - 1].tried, rough[number - 1].error)
+        now = rough[number].before if follows else _reweighted(step.best.done)
     return Found(nominal, tuple(steps), now)
 
 
-def _step(case: Case, now: Refined, number: int, more: bool) -> Step:
-    arm = now.model.arm
-    screened = screen(case.data, now.fit, case.families, arm)
+def _share(one: Screened, now: Refined) -> float:
+    """Gain as a share of the squared residual of the cause's own joint, or of all."""
+    own = now.residual if one.joint is None else now.residual[now.data.joint == one.joint - 1]
+    return float(one.gain[0] / max(float(own @ own), 1e-300))
+
+
+def _explored(case: Case, now: Refined) -> Explored:
+    screened = screen(case.data, now.fit, case.families, now.model.arm)
+    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
+    order = sorted((one for one in screened if one.gain[0] >= _LEAST * now.rss
+                    and (one.family.event or (one.cause, one.joint) not in taken)), key=lambda one: -one.gain[0])
+    tried = [_fitted(case, now, one) for one in order[:_RIVALS] if one.gain[0] >= _CLOSE * order[0].gain[0]]
+    return Explored(now, held_out(now, case), tuple(screened), tuple(sorted(tried, key=lambda one: one.error)))
+
+
+def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
+    now, screened = explored.before, explored.screened
     thresholds = (without_twin(screened, now.rss) if case.twin is None else
                   Thresholds.of_twin(case.twin, case.families, case.model.arm, now.weight))
-    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
-    passing = [k for k, one in enumerate(screened) if one.gain[0] > thresholds.gain[k]
-               and (one.family.event or (one.cause, one.joint) not in taken)]
-    passing.sort(key=lambda k: -screened[k].gain[0])
-    error = held_out(now, case)
-    tried: list[Tried] = []
-    for k in passing[:_RIVALS] if more else []:
-        if screened[k].gain[0] >= _CLOSE * screened[passing[0]].gain[0]:
-            tried.append(_fitted(case, now, screened[k]))
-    tried.sort(key=lambda one: one.error)
-    best = _fewest(tried, error)
-    trials = _ledger(screened, thresholds, tried, best, now, error, number)
-    return Step(now, error, best, tuple(tried), tuple(screened), thresholds, trials)
+    passes = {id(one) for one, bound in zip(screened, thresholds.gain, strict=True) if one.gain[0] > bound}
+    tried = [one for one in explored.tried if id(one.screened) in passes]
+    best = _fewest(tried, explored.error) if more else None
+    trials = _ledger(screened, thresholds, explored.tried, best, now, explored.error, number)
+    return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials)
 
 
 def _fewest(tried: Sequence[Tried], before: float) -> Tried | None:
@@ -138,13 +174,14 @@ def _fitted(case: Case, now: Refined, one: Screened) -> Tried:
     return Tried(one, effect, log, done, held_out(done, case), share)
 
 
-def clean(data: Data, fit: Fit, arm: Arm, found: Sequence[Screened], most: int = 8) -> Array:
+def clean(explored: Explored, most: int = 8) -> Array:
     """(rows,) [N m] what is left when everything that the most promising causes could explain is taken away, right or wrong.
 
     Noise is in it, and hardly any fault: a fault would pass for noise, and the twin would be too noisy to show anything.
     """
-    best = sorted((one for one in found if not one.family.event), key=lambda one: -one.gain[0])[:most]
-    tables = [_laid(data, one.shape[0].full(), arm) for one in best]
+    now, fit = explored.before, explored.before.fit
+    best = sorted((one for one in explored.screened if not one.family.event), key=lambda one: -one.gain[0])[:most]
+    tables = [_laid(now.data, one.shape[0].full(), now.model.arm) for one in best]
     basis = orthonormal(np.concatenate([fit.project(table) for table in tables]))
     residual = fit.residual - (basis @ fit.residual) @ basis
     return np.asarray(residual / fit.weights)

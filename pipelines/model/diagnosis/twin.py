@@ -71,7 +71,8 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
     return tuple(found)
 
 
-def drive_noise(arm: Arm, data: Data, left: Array, columns: Columns, motions: Motions, recipe: Recipe, place: int, seed: int) -> Array:
+def drive_noise(arm: Arm, data: Data, left: Array, columns: Columns, motions: Motions, recipe: Recipe, place: int,
+                seed: int) -> Array:
     """(joints,) [N m] white torque noise of the drives: as much as makes a replica as rough as log number `place`.
 
     Rough: quick changes of the residual in its quietest windows, where neither reversals nor any fault are. Two replicas,
