@@ -34,6 +34,10 @@ class EncoderCrosstalk(Effect):
     experiment = "Hold this joint still against a stop or a level and move the other over its range."
     twins = ("link_length", "transmission_coupling")
 
+    @classmethod
+    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
+        return super().everywhere(n_joints) if n_joints > 1 else ()
+
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return perturbed_torque(arm.torque, motion, self._index, *self._error(motion))[..., None]
 
