@@ -11,6 +11,7 @@ import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, friction_at
 from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.drive_apart import DriveApart
 from pipelines.model.rigid.perturbation import deflection, perturbed_torque, rate_of, shifted
 
 __all__ = ["JointElasticity"]
@@ -91,42 +92,13 @@ class JointElasticity(Effect):
         return np.asarray(without + more)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        """The arm is the links; angle and speed of the motor are two states. Friction acts on the motor.
-
-        J_m θ̈ = τ - τ_friction(θ̇) - k (θ - q) - d (θ̇ - q̇)
-        """
-        j, k, d = self._index, values["stiffness"], values["damping"]
-        light = 0.01 * _felt(arm, np.zeros((1, arm.n_joints)), j)  # of a motor without inertia nothing can be integrated
-        motor = max(values["motor_inertia"], light)
-        friction, without = friction_at(arm, j + 1), np.zeros((arm.n_joints, arm.n_joints))
-        without[j, j] = -motor
-
-        def spring(motion: Motion, states: Array) -> Array:
-            return np.asarray(k * (states[:, 0] - self.own(motion.q)) + d * (states[:, 1] - self.own(motion.dq)))
-
-        def actuator(command: Array, motion: Motion, states: Array) -> Array:
-            passed = command.copy()
-            passed[:, j] = spring(motion, states) + friction(motion, self.own(motion.dq))
-            return passed
-
-        def rate(motion: Motion, command: Array, states: Array) -> Array:
-            left = self.own(command) - friction(motion, states[:, 1]) - spring(motion, states)
-            return np.stack([states[:, 1], left / motor], axis=-1)
-
-        def sensor(q: Array, states: Array) -> Array:
-            seen = q.copy()
-            seen[:, j] = states[:, 0]
-            return seen
-
-        def settled(motion: Motion, tau: Array) -> Array:
-            q = motion.q.copy()
-            q[:, j] -= self.own(tau) / k
-            return q
-
-        def start(motion: Motion, tau: Array) -> Array:
-            return np.stack([self.own(motion.q) + self.own(tau) / k, self.own(motion.dq)], axis=-1)
-
-        return Hooks(actuator=actuator, sensor=sensor, inertia=without, states=2, settled=settled, start=start, rate=rate)
+        """The arm is the links; angle and speed of the motor are two states, and friction acts on the motor."""
+        k, d = values["stiffness"], values["damping"]
+        light = 0.01 * _felt(arm, np.zeros((1, arm.n_joints)), self._index)  # of a motor without inertia nothing can be integrated
+        drive = DriveApart(self._index, max(values["motor_inertia"], light), friction_at(arm, self._index + 1),
+                           lambda angle, speed: k * angle + d * speed, lambda tau: tau / k)
+        return Hooks(actuator=drive.actuator, sensor=drive.sensor, inertia=drive.taken_out(arm.n_joints), states=2,
+                     settled=drive.settled, start=drive.start, rate=drive.rate)
 
 
 def _rigid(arm: ArmModel) -> Callable[[Motion], Array]:

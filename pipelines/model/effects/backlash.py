@@ -1,0 +1,125 @@
+"""A gap between a motor and its link."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, friction_at
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.drive_apart import DriveApart
+from pipelines.model.rigid.perturbation import rate_of, shifted
+
+__all__ = ["Backlash"]
+
+_FLANK_HZ = 80.0  # of the link on a closed flank, the motor locked: stiff beside what an arm is moved at
+_LINK = 0.1  # of the inertia that the joint feels: what stays with the link at least
+_CROSSING = 3e-3  # [s] that the joint's usual torque needs to carry the link through the gap's lubricant
+
+
+@dataclass(frozen=True)
+class Backlash(Effect):
+    """With x = q_link - q, the link's angle against the motor's, torque passes only where |x| > gap/2.
+
+        (D - J_m) ẍ = -(τ_j - J_m q̈_j) - c ẋ - flank,    flank = k (|x| - gap/2) sign x + d ẋ, never pulling
+
+    Torque, friction and encoder sit on the motor's side. x follows from the measured motion and the rigid torque, and with it
+    τ = τ_rigid(q + x) - τ_rigid(q), J_m ẍ less on its own row. Where the gap is crossed in no time, x = -gap/2 sign(τ_j). The
+    flank is 80 Hz stiff and critically damped: what rings on a stiffer one depends on the tooth and not on the gap.
+    """
+
+    gap: float = 1e-3  # [rad]
+    film: float = 1.0  # c [N m s/rad]
+    motor_inertia: float = 1e-3  # J_m [kg m^2]
+
+    name = "backlash"
+    title = "Backlash"
+    parameters = (
+        Quantity("gap", "rad", 0.0, 0.1, "free play, from flank to flank", shape=True),
+        Quantity("film", "N m s/rad", 0.0, 1e3, "drag of the lubricant in the open gap", shape=True),
+        Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
+        Quantity("coefficient", "1", 0.0, 2.0, "share of its torque: 1 where the model of the gap is right"),
+    )
+    signature = "A burst of torque each time the torque changes sign, whatever the speed, and a jump of the link by the gap."
+    explanation = "Worn teeth, keys or couplings leave free play: motor and link part when the torque turns round, and meet again."
+    remedy = "Adjust or replace the gear; a preload, by gravity or a spring, keeps one flank closed."
+    experiment = "Move the joint to and fro over small angles, once where gravity loads it and once where it does not."
+    twins = ("joint_elasticity", "presliding")
+    needs = ("reversals of torque, or frequency responses at two amplitudes",)
+    fixed_amplitudes = (1.0,)
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        j, motor, mass = self._index, self.motor_inertia, self._link_inertia(motion, arm)
+        tau = _rigid(arm, motion)
+        x = self._followed(motion.t, mass, motor * self.own(motion.ddq) - tau[:, j])
+        rate = rate_of(x, motion.t)
+        second = rate_of(rate, motion.t)
+        more = _rigid(arm, shifted(motion, j, x, rate, second)) - tau
+        more[:, j] -= motor * second
+        return np.asarray(more[..., None])
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """Gaps a good third apart, for too small a gap explains nothing; a motor of a tenth of what the joint feels."""
+        motor = 0.1 * float(np.mean(_felt(arm, motion.q, self._index)))
+        usual = float(np.median(np.abs(self.own(_rigid(arm, motion))))) or 1.0
+        for gap in np.geomspace(3e-4, 6.6e-3, 10).tolist():
+            yield replace(self, gap=gap, film=float(np.clip(_CROSSING * usual / gap, 0.0, 1e3)), motor_inertia=min(motor, 10.0))
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """The arm is the links; angle and speed of the motor are two states, and friction acts on the motor."""
+        still = np.zeros((1, arm.n_joints))
+        felt = float(_felt(arm, still, self._index)[0])
+        motor = max(values["motor_inertia"], 0.01 * felt)  # of a motor without inertia nothing can be integrated
+        half, film = 0.5 * values["gap"], values["film"]
+        k, d = _flank(max(felt - motor, _LINK * felt), motor)
+
+        def passed(angle: Array, speed: Array) -> Array:
+            over = angle - np.clip(angle, -half, half)
+            push = np.where(over > 0.0, np.maximum(k * over + d * speed, 0.0), np.minimum(k * over + d * speed, 0.0))
+            return np.asarray(film * speed + np.where(over == 0.0, 0.0, push))
+
+        drive = DriveApart(self._index, motor, friction_at(arm, self._index + 1), passed,
+                           lambda tau: half * np.sign(tau) + tau / k)
+        return Hooks(actuator=drive.actuator, sensor=drive.sensor, inertia=drive.taken_out(arm.n_joints), states=2,
+                     settled=drive.settled, start=drive.start, rate=drive.rate)
+
+    def _link_inertia(self, motion: Motion, arm: ArmModel) -> Array:
+        felt = _felt(arm, motion.q, self._index)
+        return np.asarray(np.maximum(felt - self.motor_inertia, _LINK * felt))
+
+    def _followed(self, t: Array, mass: Array, force: Array) -> Array:
+        """x (samples,) from one flank to the other; over a sample, trapezoids, flank and film implicit."""
+        k, d = _flank(float(np.mean(mass)), self.motor_inertia)
+        half, film = 0.5 * self.gap, self.film
+        x, v = half * float(np.sign(force[0])) + float(force[0]) / k, 0.0
+        found = [x]
+        for h, m, f in zip(np.diff(t).tolist(), (0.5 * (mass[1:] + mass[:-1])).tolist(),
+                           (0.5 * (force[1:] + force[:-1])).tolist(), strict=True):
+            over = x - half if x > half else x + half if x < -half else 0.0
+            closed = (k * over + d * v) * over > 0.0
+            c, spring = (0.5 * h * (film + d), 0.25 * h * h * k) if closed else (0.5 * h * film, 0.0)
+            after = (v * (m - c - spring) + h * (f - (k * over if closed else 0.0))) / (m + c + spring)
+            x += 0.5 * h * (v + after)
+            v = after
+            found.append(x)
+        return np.array(found)
+
+
+def _flank(link: float, motor: float) -> tuple[float, float]:
+    """Stiffness [N m/rad] and critical damping [N m s/rad] of a closed flank between two inertias [kg m^2]."""
+    k = link * (2.0 * pi * _FLANK_HZ) ** 2
+    return k, 2.0 * sqrt(k * motor * link / (motor + link))
+
+
+def _rigid(arm: ArmModel, motion: Motion) -> Array:
+    """Torque of the rigid arm alone."""
+    return arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)
+
+
+def _felt(arm: ArmModel, q: Array, index: int) -> Array:
+    """Inertia (samples,) [kg m^2] that the joint feels, the others held."""
+    return arm.body.mass_matrix(q, arm.p)[:, index, index]

@@ -1,0 +1,62 @@
+"""A drive that turns apart from its link: what elastic and loose joints have in common in the forward simulation.
+
+    J_m θ̈ = τ - τ_friction(θ̇) - τ_passed(θ - q, θ̇ - q̇)
+
+The arm that is simulated is the links, q; angle θ and speed θ̇ of the drive are two memories. Encoder and friction sit on the
+drive. All arrays have replicas first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["DriveApart"]
+
+
+@dataclass(frozen=True)
+class DriveApart:
+    """The drive of one joint."""
+
+    index: int  # joint, from 0
+    inertia: float  # J_m [kg m^2], which the rigid arm counts with the link
+    friction: Callable[[Motion, Array], Array]  # motion and speed of the drive -> its friction [N m]
+    passed: Callable[[Array, Array], Array]  # angle and speed of the drive ahead of its link -> torque on the link [N m]
+    ahead: Callable[[Array], Array]  # that torque -> angle by which the drive then rests ahead
+
+    def taken_out(self, n_joints: int) -> Array:
+        """What the links' inertia matrix has less than the rigid arm's, as an addition to it."""
+        less = np.zeros((n_joints, n_joints))
+        less[self.index, self.index] = -self.inertia
+        return less
+
+    def actuator(self, command: Array, motion: Motion, states: Array) -> Array:
+        """What reaches the link: friction is given back that the plant will take off at the link's speed."""
+        reached, speed = command.copy(), motion.dq[:, self.index]
+        reached[:, self.index] = self.passed(*self._apart(motion, states)) + self.friction(motion, speed)
+        return reached
+
+    def rate(self, motion: Motion, command: Array, states: Array) -> Array:
+        left = command[:, self.index] - self.friction(motion, states[:, 1]) - self.passed(*self._apart(motion, states))
+        return np.stack([states[:, 1], left / self.inertia], axis=-1)
+
+    def sensor(self, q: Array, states: Array) -> Array:
+        seen = q.copy()
+        seen[:, self.index] = states[:, 0]
+        return seen
+
+    def settled(self, motion: Motion, tau: Array) -> Array:
+        """Where the links are when the drive rests at the first position under `tau`."""
+        q = motion.q.copy()
+        q[:, self.index] -= self.ahead(tau[:, self.index])
+        return q
+
+    def start(self, motion: Motion, tau: Array) -> Array:
+        return np.stack([motion.q[:, self.index] + self.ahead(tau[:, self.index]), motion.dq[:, self.index]], axis=-1)
+
+    def _apart(self, motion: Motion, states: Array) -> tuple[Array, Array]:
+        return states[:, 0] - motion.q[:, self.index], states[:, 1] - motion.dq[:, self.index]
