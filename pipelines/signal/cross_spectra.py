@@ -92,8 +92,7 @@ def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> Cros
     """
     channels = _checked(stretches, segment)
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(segment) / segment)
-    total = np.zeros((channels, channels, segment // 2 + 1), dtype=np.complex128)
-    segments = 0
+    sums = _Sums(channels, segment // 2 + 1)
     for stretch in stretches:
         if len(stretch) < segment:
             continue
@@ -101,27 +100,45 @@ def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> Cros
         pieces = np.lib.stride_tricks.sliding_window_view(rows, segment, axis=1)[:, ::segment - segment // 2]
         at_once = max(1, _CACHE // (channels * segment))
         for first in range(0, pieces.shape[1], at_once):
-            _add(total, pieces[:, first:first + at_once], window)
-        segments += pieces.shape[1]
-    total *= 2.0 / (segments * rate * (window**2).sum())
-    total[..., 0] *= 0.5
+            piece = pieces[:, first:first + at_once]
+            piece = piece - piece.mean(axis=-1, keepdims=True)
+            piece *= window
+            sums.add(np.fft.rfft(piece, axis=-1))
+    total = sums.matrix() * (2.0 / (sums.segments * rate * (window**2).sum()))
+    total[0] *= 0.5
     if segment % 2 == 0:
-        total[..., -1] *= 0.5
-    frequency = np.asarray(np.fft.rfftfreq(segment, 1.0 / rate), dtype=np.float64)
-    return CrossSpectra(frequency, np.moveaxis(total, -1, 0), segments)
+        total[-1] *= 0.5
+    return CrossSpectra(np.asarray(np.fft.rfftfreq(segment, 1.0 / rate), dtype=np.float64), total, sums.segments)
 
 
-def _add(total: Complex, pieces: Array, window: Array) -> None:
-    """Add conj(X_a) X_b of every segment of `pieces` (channels, segments, samples)."""
-    x = np.fft.rfft((pieces - pieces.mean(axis=-1, keepdims=True)) * window, axis=-1)
-    real, imaginary = x.real, x.imag
-    for a in range(len(x)):
-        own = np.einsum("sf,sf->f", real[a], real[a]) + np.einsum("sf,sf->f", imaginary[a], imaginary[a])
-        total[a, a] += own
-        for b in range(a + 1, len(x)):
-            cross = np.einsum("sf,sf->f", np.conj(x[a]), x[b])
-            total[a, b] += cross
-            total[b, a] += np.conj(cross)
+class _Sums:
+    """Σ conj(X_a) X_b over segments: real on the diagonal, and each pair once."""
+
+    def __init__(self, channels: int, bins: int) -> None:
+        self.segments = 0
+        self.pairs = [(a, b) for a in range(channels) for b in range(a + 1, channels)]
+        self.own = np.zeros((channels, bins, 2))  # of real and imaginary part
+        self.cross = np.zeros((len(self.pairs), bins), dtype=np.complex128)
+
+    def add(self, x: Complex) -> None:
+        """Those of x (channels, segments, bins)."""
+        parts = x.view(np.float64).reshape(*x.shape, 2)
+        self.own += np.einsum("csfp,csfp->cfp", parts, parts)
+        for k, (a, b) in enumerate(self.pairs):
+            product = np.conj(x[a])
+            product *= x[b]
+            self.cross[k] += product.sum(axis=0)
+        self.segments += x.shape[1]
+
+    def matrix(self) -> Complex:
+        """(bins, channels, channels)."""
+        channels, bins = self.own.shape[:2]
+        whole = np.zeros((bins, channels, channels), dtype=np.complex128)
+        whole[:, np.arange(channels), np.arange(channels)] = self.own.sum(axis=2).T
+        for k, (a, b) in enumerate(self.pairs):
+            whole[:, a, b] = self.cross[k]
+            whole[:, b, a] = np.conj(self.cross[k])
+        return whole
 
 
 def welch_responses(stretches: Sequence[Array], rate: float, segment: int, source: int = 0,
