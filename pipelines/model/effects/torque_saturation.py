@@ -19,7 +19,8 @@ class TorqueSaturation(Effect):
     """Applied torque = u - e, e = sign(u) max(|u| - L, 0), u the logged torque: the log shows e more than the arm feels.
 
     The arm's motion tells the torque that came out, never what was asked for above L: u is `Motion.tau`, or where there is none
-    the predicted torque. As other torques are, e is centred: ½ (e_k + e_{k-1}), for u is held over each sample.
+    the predicted torque. Held over each sample, e_k is the average of e over it; the column is e itself at t_k:
+    (7 (e_k + e_{k-1}) - e_{k+1} - e_{k-2})/12, Colella & Woodward 1984, eq. (1.9) with even steps.
     """
 
     limit: float = 10.0  # L [N m]
@@ -65,9 +66,11 @@ class TorqueSaturation(Effect):
 
     def _excess(self, motion: Motion, asked: Array, limit: float) -> Array:
         excess = _above(asked, limit)
-        if motion.tau is not None:
-            excess[1:] = 0.5 * (excess[1:] + excess[:-1])
-        return excess
+        if motion.tau is None or len(excess) < 4:
+            return excess
+        between = 0.5 * (excess[1:] + excess[:-1])
+        between[1:-1] = (7.0 * (excess[2:-1] + excess[1:-2]) - excess[3:] - excess[:-3]) / 12.0
+        return np.concatenate([excess[:1], between])
 
 
 def _above(torque: Array, limit: float) -> Array:
