@@ -60,7 +60,13 @@ class Contact(Effect):
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         shaped, chain, force = self.at(values), chain_of(arm.body), self.amplitudes(values)
-        return Hooks(load=lambda motion, _: np.asarray(shaped._columns(motion, chain) @ force))
+
+        def load(motion: Motion, _: Array) -> Array:
+            if not shaped.acting(motion).any():
+                return np.zeros_like(motion.q)
+            return np.asarray(shaped._columns(motion, chain) @ force)
+
+        return Hooks(load=load)
 
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_]:
         return np.asarray((motion.t > self.start) & (motion.t < self.start + self.duration))
