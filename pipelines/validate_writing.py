@@ -171,12 +171,15 @@ def _model(inputs: Inputs, logs: list[ExperimentLog], judges: list[ExperimentLog
                                                                                        given.model.base_parameters)):
         return given_model(given.model, judges, given.said), given.said
     return (model_fitted_here(logs, judges, inputs.label),
-            "fitted here to the logs of role identify, as fit-friction and estimate-bps do by default")
+            "fitted here to the logs of role identify: friction first, then the base parameters")
 
 
 def _drawn_from(arm: Arm) -> str:
-    return "the covariance of the fit" if arm.uncertainty is not None else \
-        "the standard deviations of the model file's base parameters, as if independent"
+    if arm.uncertainty is not None:
+        return "the covariance of the fit"
+    if any(p.std for p in arm.base):
+        return "the standard deviations of the model file's base parameters, as if independent"
+    return "nothing, for the model file states no uncertainty: they equal the plant's, and case 6 errs by what is replayed alone"
 
 
 def _refuse_strange(settings: Settings) -> None:

@@ -23,14 +23,16 @@ def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Outcome[ru
 
 
 def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result]) -> None:
-    """inspect, fit-friction, reconstruct, estimate-bps; each with its result and a folder of its name."""
+    """inspect, fit-friction, reconstruct, estimate-bps, validate-writing; each with its result and a folder of its name."""
     stages = json.loads((whole.folder / "result.json").read_text())["stages"]
     assert [(stage["name"], stage["exit"]) for stage in stages] == [
-        ("inspect", 0), ("fit-friction", 0), ("reconstruct", 0), ("estimate-bps", 0)]
+        ("inspect", 0), ("fit-friction", 0), ("reconstruct", 0), ("estimate-bps", 0),
+        ("validate-writing", 0)]
     assert {p.name for p in (whole.folder / "reconstruct/logs").iterdir()} == {p.name for p in (
         whole.folder / "estimate-bps/logs").iterdir()} | {f"{n}.h5" for n in ("friction-1", "friction-2", "friction-3", "hold-1")}
     assert (whole.folder / "estimate-bps/model.json").is_file()
-    assert "parameters are clearly visible" in whole.report.verdict
+    assert "The model holds on the held-out log" in whole.report.verdict
+    assert stages[4]["result"]["model"].startswith("estimate-bps")
 
 
 def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
@@ -49,7 +51,7 @@ def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path:
         (tmp_path / "logs").mkdir(exist_ok=True)
         shutil.copy(samples / f"rrr-closed-form/friction-{number}.h5", tmp_path / "logs")
     outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", check=True, no_report=True), run.Settings())
-    last = outcome.result.stages[-1]
+    last = next(step for step in outcome.result.stages if step.name == "estimate-bps")
     assert (last.name, last.exit, last.result, outcome.exit_code) == ("estimate-bps", 5, None, 0)
     assert "no excitation or free log" in last.report.verdict
     assert "ecord an excitation" in last.report.verdict

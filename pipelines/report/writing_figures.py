@@ -82,11 +82,11 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
             axis.set_aspect("equal")
             axis.set_title(printable(joints[j], 60), pad=3.0)
             axis.locator_params(axis="y", nbins=3)
+            axis.set_ylabel(f"{_AXES[b]} [m]")
             bar = drawing.colorbar(drawn, ax=axis, pad=0.02)
             bar.ax.set_ylim(0.0, top)
             bar.set_label(f"|left| [{found.torque_units[j]}]")
         axes[-1].set_xlabel(f"{_AXES[a]} [m]")
-        drawing.supylabel(f"{_AXES[b]} [m]", fontsize="medium")
 
     return Figure(f"where-{found.name}", "Where on its way the tip is when the model misses torque.", draw,
                   (6.0, 0.7 + 1.35 * len(joints)))

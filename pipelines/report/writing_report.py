@@ -60,14 +60,23 @@ def _verdict(result: Result) -> str:
 
 
 def _mm(case: Case) -> str:
-    return ", ".join(format_number(1e3 * x, 2) for x in case.tip_error_std.values)
+    return ", ".join(f"{1e3 * x:.2f}" if x >= 1e-4 else format_number(1e3 * x, 2) for x in case.tip_error_std.values)
+
+
+def _short(value: float) -> float:
+    """Three digits are all that a table can use."""
+    return float(f"{value:.3g}")
+
+
+def _list(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+    return ", ".join(format_number(float(x), 2) for x in values)
 
 
 def _key_figures(result: Result) -> Table | None:
     if (torque := result.torque) is None:
         return None
     log = next(one for one in result.logs if one.experiment == "writing" or torque.of != "writing")
-    rows = tuple((name, float(torque.signal_rms[j]), float(torque.rms[j]), 100 * float(torque.relative_error[j]),
+    rows = tuple((name, _short(torque.signal_rms[j]), _short(torque.rms[j]), _short(100 * torque.relative_error[j]),
                   "yes" if torque.relative_error[j] < result.gates.torque_limit else "no",
                   *((None, None) if result.simulation is None or result.simulation.position_rms is None else
                     (float(f"{result.simulation.position_rms[j]:.3g}"),
@@ -81,28 +90,31 @@ def _key_figures(result: Result) -> Table | None:
 
 
 def _torque_section(result: Result) -> Section:
-    rows: list[tuple[Cell, ...]] = [(log.name, log.experiment, result.joints[j], float(log.signal_rms[j]), float(log.rms[j]),
-             100 * float(log.relative_error[j]), 100 * float(log.relative_error_low_pass[j]),
-             *(float(f"{log.parts_rms[name][j]:.3g}") for name in _PARTS))
-            for log in result.logs for j in range(len(result.joints))]
-    columns = ("log", "experiment", "joint", "torque", "left", "left [%]", "left, low-passed [%]", "inertia", "Coriolis", "gravity",
-               "friction", "effects")
-    cutoffs = sorted({format_number(log.low_pass_hz, 3) for log in result.logs if log.low_pass_hz is not None})
-    filtered = f" Low-passed: both after the same zero-phase low-pass at {' or '.join(cutoffs)} Hz." if cutoffs else ""
+    felt = any((log.parts_rms["effects"] > 1e-2 * log.rms).any() for log in result.logs)
+    parts = [name for name in _PARTS if felt or name != "effects"]
+    rows: list[tuple[Cell, ...]] = [
+        (f"{log.name}, {result.joints[j]}", *map(_short, (log.signal_rms[j], log.rms[j], 100 * log.relative_error[j],
+                                                          100 * log.relative_error_low_pass[j],
+                                                          *(log.parts_rms[name][j] for name in parts))))
+        for log in result.logs for j in range(len(result.joints))]
+    columns = ("log, joint", "torque", "left", "left [%]", "low-passed [%]", *(name.capitalize() if name == "coriolis" else name
+                                                                              for name in parts))
+    cutoffs = [format_number(hz, 2) for hz in sorted({log.low_pass_hz for log in result.logs if log.low_pass_hz is not None})]
+    span = " to ".join(dict.fromkeys((cutoffs[0], cutoffs[-1]))) if cutoffs else ""
+    filtered = f" Low-passed: both after the same zero-phase low-pass, at {span} Hz." if cutoffs else ""
     table = Table(columns, tuple(rows), "Root mean squares in N m (N of a joint that slides): the measured torque, what the model "
                   "leaves of it, and the parts of the model.")
     text = ("The torque that the controller commanded, beside the torque of the model on the motion that was realised (Fig. 14 of "
             "the paper). A command also holds what the controller makes of encoder steps and noise, which no model has."
             f"{filtered}",)
     drawn: list[Figure] = []
-    for log in [one for one in result.logs if one.course is not None][:2]:
+    for log in [one for one in result.logs if one.course is not None][:1]:
         c = log.course
         assert c is not None
         drawn.append(torque_figure(f"torque-{log.name}", f"{log.name}: torque measured and of the model, the friction in it, and "
                                    "what is left.", c.t, c.measured, c.model, c.friction, c.left, result.joints,
                                    log.torque_units[0]))
-        if len(drawn) == 1 and (split := split_figure(log, result.joints)) is not None:
-            drawn.append(split)
+        drawn += [split for split in (split_figure(log, result.joints),) if split is not None]
     return Section("Torque: the first validation", text, (table,), tuple(drawn))
 
 
@@ -115,7 +127,7 @@ def _where_section(result: Result) -> Section:
              f"({', '.join(f'{x:.3f}' for x in one.tip)}) m." for one in log.largest]
     text = (f"By {kinds[log.marks]}. Log {log.name}, after the low-pass.", *worst)
     rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (one.label, one.start, one.end, *(100 * x for x in one.relative_error)) for one in log.letters[:_MOST_LETTERS])
+        (one.label, one.start, one.end, *(_short(100 * x) for x in one.relative_error)) for one in log.letters[:_MOST_LETTERS])
     table = Table(("where", "from [s]", "to [s]", *(f"{name} [%]" for name in result.joints)), rows,
                   "What the model leaves in each, rms, over the torque of the whole log.")
     figure = error_map_figure(log, result.joints)
@@ -123,15 +135,15 @@ def _where_section(result: Result) -> Section:
 
 
 def _online_section(result: Result) -> Section:
-    rows = [(log.name, result.joints[j], log.online.observer, 100 * float(log.online.relative_error[j]),
-             100 * float(log.online.relative_error_low_pass[j]), float(f"{log.online.differs:.2g}"))
-            for log in result.logs if log.online is not None for j in range(len(result.joints))]
-    table = Table(("log", "joint", "motion of", "left [%]", "left, low-passed [%]", "differs from arrays [N m]"), tuple(rows),
-                  "Relative errors as above, with the motion that an observer sees while the arm moves.")
+    rows: list[tuple[Cell, ...]] = [
+        (log.name, log.online.observer, _list(100 * log.online.relative_error), _list(100 * log.online.relative_error_low_pass),
+         float(f"{log.online.differs:.2g}")) for log in result.logs if log.online is not None]
+    table = Table(("log", "motion of", "left [%]", "left, low-passed [%]", "differs from arrays [N m]"), tuple(rows),
+                  f"Relative errors as above ({', '.join(result.joints)}), with the motion that an observer sees meanwhile.")
     return Section("Sample by sample, as it would run online", (
         "The complete model was also evaluated one sample at a time, as a controller would. An observer's acceleration is noisier "
         "than a smoother's, which sees what comes after; the low-passed error leaves that noise out. How long one sample took "
-        "stands in provenance.json.",), (table,))
+        "is in provenance.json.",), (table,))
 
 
 def _cases_section(result: Result) -> Section:

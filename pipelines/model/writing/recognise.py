@@ -35,12 +35,11 @@ _LONGEST = 200  # letters
 
 @dataclass(frozen=True)
 class Letter:
-    """One letter and the samples from which on the tip is on its way to it, and until which it writes."""
+    """One letter, from the sample at which the tip sets out for it to the last that writes it."""
 
     character: str
     first: int
-    drawn: int  # the first sample of its first stroke
-    last: int  # inclusive
+    last: int
     spaces: int  # before it
 
 
@@ -122,18 +121,18 @@ def read_letters(tip: Array) -> tuple[Letter, ...]:
     path = _Path(tip[:, [0, 2]] / height)
     if path.length > 10.0 * _LONGEST:
         return ()
-    found = _parse(path, 0.0, None, frozenset())
+    found = _parse(path)
     return () if found is None else tuple(_in_samples(path, found))
 
 
 _Found = tuple[_Form, float, int]  # letter, where it starts, spaces before it
 
 
-def _parse(path: _Path, start: float, before: _Found | None, dead: frozenset[float]) -> list[_Found] | None:
-    """Letters from the end of `before` on, by depth first; None where there is no reading of the rest."""
-    stack: list[Iterator[_Found]] = [_next(path, start, before)]
+def _parse(path: _Path) -> list[_Found] | None:
+    """All letters, depth first; None where there is no reading of the path."""
+    stack: list[Iterator[_Found]] = [_next(path, 0.0, None)]
     chosen: list[_Found] = []
-    tried = set(dead)
+    tried: set[float] = set()  # ends from which the rest has no reading
     while stack:
         one = next(stack[-1], None)
         if one is None:
@@ -187,7 +186,7 @@ def _in_samples(path: _Path, found: list[_Found]) -> Iterator[Letter]:
     """From arc length to samples: a letter's begin where the one before it ended, the last one's end where all is at rest."""
     first = 0
     for k, (form, start, spaces) in enumerate(found):
-        end = path.length if k == len(found) - 1 else start + form.length
-        last = len(path.s) - 1 if k == len(found) - 1 else int(np.searchsorted(path.s, end - 1e-4))
-        yield Letter(form.character, first, int(np.searchsorted(path.s, start + 1e-4)), last, spaces)
+        end = path.snapped(start + form.length)
+        last = len(path.s) - 1 if k == len(found) - 1 else int(np.searchsorted(path.s, end - 1e-12))
+        yield Letter(form.character, first, last, spaces)
         first = last + 1
