@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["bode_figure", "compliance_figure", "friction_figure", "posture_words", "relative_figure"]
 
-_CONFIDENCE = np.sqrt(-np.log(0.05))  # radius of the disc that holds the response with 95 %, in standard deviations
+_CONFIDENCE = float(np.sqrt(-np.log(0.05)))  # radius of the disc that holds the response with 95 %, in standard deviations
+_DECADE = 5.0  # values that span more are drawn on a logarithmic axis
 _LOW = 10.0  # [Hz] up to which friction and reversal are shown
 _LOOKS = {"indirect": (style.GREEN, 1.6, (0, (4, 2))), "direct": (style.ORANGE, 0.9, "-"), "closed-loop": (style.BLUE, 1.1, "-")}
 
@@ -109,11 +110,12 @@ def relative_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         for k, posture in enumerate(postures):
             color, measured, fit = style.COLOURS[k % len(style.COLOURS)], posture.relative, posture.fit
             good = (measured.coherence >= 0.5) & (measured.frequency <= posture.band[1])
-            size.loglog(measured.frequency[good], np.abs(measured.value[good]), ".", markersize=2.0, color=color, alpha=0.5)
-            size.loglog(fit.frequency, np.abs(fit.value), color=color, label=posture_words(posture.posture, joint))
+            size.semilogx(measured.frequency[good], np.abs(measured.value[good]), ".", markersize=2.0, color=color, alpha=0.5)
+            size.semilogx(fit.frequency, np.abs(fit.value), color=color, label=posture_words(posture.posture, joint))
             phase.semilogx(measured.frequency[good], np.rad2deg(np.angle(measured.value[good])), ".", markersize=2.0, color=color,
                            alpha=0.5)
             phase.semilogx(fit.frequency, np.rad2deg(np.angle(fit.value)), color=color)
+        fitted_scale(size, np.concatenate([np.abs(p.fit.value) for p in postures]))
         size.set_ylabel("acceleration per input")
         phase.set_ylabel("phase [°]")
         phase.set_xlabel("frequency [Hz]")
@@ -121,10 +123,20 @@ def relative_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         phase.set_yticks((-180, -90, 0, 90, 180))
         size.legend(loc="best", fontsize="small")
         style.log_ticks(phase.xaxis)
-        style.log_ticks(size.yaxis)
 
     return Figure(f"relative-{joint}", f"Joint {joint}: the response over that of a double integrator (points) and the rational "
                   "function of the modes (lines). A rigid body is flat, a delay turns the phase alone.", draw, (6.0, 4.0))
+
+
+def fitted_scale(axis: Axes, values: Array) -> None:
+    """The range of `values` with room about it; logarithmic where they span more than a factor of five."""
+    low, high = float(values.min()), float(values.max())
+    if high < _DECADE * low:
+        axis.set_ylim(0.7 * low, 1.3 * high)
+        return
+    axis.set_yscale("log")
+    axis.set_ylim(0.6 * low, 1.7 * high)
+    style.log_ticks(axis.yaxis)
 
 
 def compliance_figure(joint: int, postures: Sequence[Posture]) -> Figure:
@@ -135,11 +147,11 @@ def compliance_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         axes = drawing.subplots(1, 2)
         for k, posture in enumerate(postures):
             color, curve = style.COLOURS[k % len(style.COLOURS)], posture.compliance
-            good = curve.coherence >= 0.5
+            good = (curve.coherence >= 0.5) & (curve.frequency <= posture.band[1])
             f = curve.frequency[good]
             square = (2.0 * np.pi * f) ** 2
             axes[0].loglog(f, np.abs(curve.value[good]), color=color, label=posture_words(posture.posture, joint))
-            axes[1].loglog(f, np.abs(curve.value[good]) * square, color=color)
+            axes[1].semilogx(f, np.abs(curve.value[good]) * square, color=color)
             if posture.expected_inertia is not None:
                 axes[0].loglog(f, 1.0 / (posture.expected_inertia * square), color=color, linestyle=":", linewidth=0.9)
                 axes[1].axhline(1.0 / posture.expected_inertia, color=color, linestyle=":", linewidth=0.9)
@@ -147,7 +159,10 @@ def compliance_figure(joint: int, postures: Sequence[Posture]) -> Figure:
             axis.set_title(f"{name} [{unit}]", pad=3.0)
             axis.set_xlabel("frequency [Hz]")
             style.log_ticks(axis.xaxis)
-            style.log_ticks(axis.yaxis)
+        style.log_ticks(axes[0].yaxis)
+        per_torque = [np.abs(p.fit.value) / (p.level.value * p.inertia.value) for p in postures if p.inertia is not None]
+        if per_torque:
+            fitted_scale(axes[1], np.concatenate(per_torque))
         axes[0].legend(loc="lower left", fontsize="small")
 
     return Figure(f"compliance-{joint}", f"Joint {joint}: compliance and accelerance by torque. Dotted: the model's rigid body.",

@@ -10,7 +10,7 @@ are left out, and so are the first after them, until the loop has settled. The r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -103,6 +103,8 @@ def turned_joint(log: ExperimentLog) -> Turned:
     speed = mended["dq_ref"][:, j] if "dq_ref" in mended else _speed(mended.q[:, j], log.sample_time)
     width = _PLATEAU if "dq_ref" in mended else _WANDERING
     stretches = tuple(_stretches(good, signals, speed, width, log.sample_time))
+    if "q_ref" not in mended:
+        stretches = tuple(replace(s, signals=_levelled(s.signals, mended.q[s.start:s.stop, j])) for s in stretches)
     if not stretches:
         raise InputRejected("T08", f"joint {joint} never turns at constant speed for {_SETTLE + _SHORTEST:g} s",
                             where=log.source or log.name,
@@ -133,13 +135,21 @@ def _described(log: ExperimentLog) -> tuple[int, str]:
 
 
 def _straight(q: Array) -> Array:
-    """The slow part of a position: without a reference, what the excitation cannot have done."""
+    """The slow part of a position where no reference is known: for the whole log with its reversal alone."""
     width = max(3, len(q) // 50)
     known = np.where(np.isfinite(q), q, np.nanmean(q))
     padded = np.concatenate([np.full(width, known[0]), known, np.full(width, known[-1])])
     total = np.cumsum(padded)
     middle = (total[2 * width:] - total[:-2 * width]) / (2.0 * width)
     return np.asarray(middle)
+
+
+def _levelled(signals: Array, q: Array) -> Array:
+    """With the position less the straight line through it: a filter would take of the excitation as well."""
+    t = np.linspace(-1.0, 1.0, len(q))
+    out = signals.copy()
+    out[:, POSITION] = q - q.mean() - t * float(t @ q / (t @ t))
+    return out
 
 
 def _speed(q: Array, sample_time: float) -> Array:

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import Array, ExperimentLog
@@ -120,8 +121,7 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     sampled = sampled_controller(first.controller, first.joint, plant.frequency, first.sample_time)
     smooth = continuous_controller(first.controller, first.joint, plant.frequency) if first.controller else None
     both = [None if c is None else indirect(sensitivity.times(shift), c / shift) for c in (sampled, smooth)]
-    segment = _segment(turned, stretches, how)
-    return Measured(turned, plant, _direct([s.signals for s in stretches], first.rate, segment), both[0], both[1],
+    return Measured(turned, plant, _direct([s.signals for s in stretches], turned, how), both[0], both[1],
                     closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion)
 
 
@@ -140,8 +140,7 @@ def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch], how: How)
         assert first.period is not None
         return _of_multisine(multisine_responses(whole, first.rate, first.period, V, outputs))
     if how.estimator == "welch":
-        segment = _segment(turned, stretches, how)
-        return _in_band(_excited_bins(cross_spectra(signals, first.rate, segment), V).responses(V, outputs), first.rate), None
+        return _welch(signals, turned, how, V, outputs), None
     spacing = how.resolution or 0.25
     frequency = np.arange(np.ceil(_LOWEST / spacing), np.floor(_HIGHEST * first.rate / spacing) + 1) * spacing
     return _known(local_polynomial(signals, first.rate, frequency, V, outputs)), None
@@ -165,17 +164,14 @@ def _of_multisine(found: MultisineResponses) -> tuple[Responses, float | None]:
     return replace(noise, covariance=noise.covariance * raised[:, None, None]), float(np.median(local))
 
 
-def _in_band(several: Responses, rate: float) -> Responses:
-    kept = (several.frequency >= _LOWEST) & (several.frequency <= _HIGHEST * rate)
+def _where(several: Responses, kept: npt.NDArray[np.bool_]) -> Responses:
     return replace(several, frequency=several.frequency[kept], response=several.response[kept],
                    covariance=several.covariance[kept], coherence=several.coherence[kept])
 
 
 def _known(several: Responses) -> Responses:
     """The bins where the excitation had power."""
-    kept = np.isfinite(several.response).all(axis=1)
-    return replace(several, frequency=several.frequency[kept], response=several.response[kept],
-                   covariance=several.covariance[kept], coherence=several.coherence[kept])
+    return _where(several, np.asarray(np.isfinite(several.response).all(axis=1)))
 
 
 def _reliable(response: FrequencyResponse) -> FrequencyResponse:
@@ -184,43 +180,58 @@ def _reliable(response: FrequencyResponse) -> FrequencyResponse:
     return response
 
 
-def _segment(turned: tuple[Turned, ...], stretches: Sequence[Stretch], how: How) -> int:
-    """Samples of Welch's segments: the period, or what the resolution asks, so many that four of them are averaged.
+@dataclass(frozen=True)
+class _Segments:
+    """Of Welch's method. A periodic v has lines: two periods to a segment, and Hann's window keeps its lines apart."""
+
+    samples: int
+    every: int  # bins that count: each, or each second one
+
+
+def _segments(turned: tuple[Turned, ...], lengths: Sequence[int], how: How) -> _Segments:
+    """Two periods, or what the resolution asks, so many that four of them are averaged.
 
     Raises:
-        InputRejected: T08, the record is too short for the resolution.
+        InputRejected: T08, the record is too short for the resolution that was asked for.
     """
-    first, lengths = turned[0], [s.stop - s.start for s in stretches]
-    wanted = first.period if how.resolution is None and first.period else round(first.rate / (how.resolution or 0.25))
+    first = turned[0]
 
     def count(segment: int) -> int:
         return sum(1 + 2 * (length - segment) // segment for length in lengths if length >= segment)
 
-    if count(wanted) >= _SEGMENTS:
-        return wanted
-    if how.resolution is not None:
+    if how.resolution is None and first.period and count(2 * first.period) >= _SEGMENTS:
+        return _Segments(2 * first.period, 2)
+    wanted = round(first.rate / (how.resolution or 0.25))
+    if how.resolution is not None and count(wanted) < _SEGMENTS:
         raise InputRejected("T08", f"{sum(lengths) / first.rate:.3g} s at constant speed are too short for {how.resolution:g} Hz",
                             where=first.name,
                             remedy=f"record {_SEGMENTS / how.resolution:.3g} s each way, or ask for a coarser one")
     while wanted > 64 and count(wanted) < _SEGMENTS:
         wanted //= 2
-    return wanted
+    return _Segments(wanted, 1)
 
 
-def _direct(signals: Sequence[Array], rate: float, segment: int) -> FrequencyResponse:
-    spectra = _excited_bins(cross_spectra([x[:, [INPUT, POSITION]] for x in signals], rate, segment), 0)
-    return _in_band(spectra.responses(0, (1,)), rate).of(0)
+def _welch(stretches: Sequence[Array], turned: tuple[Turned, ...], how: How, source: int, outputs: Sequence[int]) -> Responses:
+    first = turned[0]
+    segments = _segments(turned, [len(x) for x in stretches], how)
+    spectra = _excited_bins(cross_spectra(stretches, first.rate, segments.samples), source)
+    found = spectra.responses(source, outputs)
+    number = np.rint(found.frequency * segments.samples * first.sample_time)
+    inside = (found.frequency >= _LOWEST) & (found.frequency <= _HIGHEST * first.rate)
+    return _where(found, inside & (number % segments.every == 0))
+
+
+def _direct(signals: Sequence[Array], turned: tuple[Turned, ...], how: How) -> FrequencyResponse:
+    """What the paper's (26) gives, by averaged spectra of input and position."""
+    return _welch([x[:, [INPUT, POSITION]] for x in signals], turned, how, 0, (1,)).of(0)
 
 
 def _with_reversal(turned: tuple[Turned, ...], how: How) -> FrequencyResponse | None:
-    """From the whole log by Welch's method: what it would have been had nothing been left out."""
+    """From the whole log: what it would have been had nothing been left out."""
     known = [one.whole[np.isfinite(one.whole).all(axis=1)] for one in turned]
-    first = turned[0]
-    segment = first.period or round(first.rate / (how.resolution or 0.25))
-    if sum(2 * len(x) // segment for x in known) < _SEGMENTS or not any(len(x) >= segment for x in known):
+    if sum(len(x) for x in known) < _SEGMENTS * round(turned[0].rate / (how.resolution or 0.25)):
         return None
-    several = _excited_bins(cross_spectra(known, first.rate, segment), V).responses(V, (INPUT, POSITION))
-    return closed_loop(_in_band(several, first.rate))
+    return closed_loop(_welch(known, turned, how, V, (INPUT, POSITION)))
 
 
 def _excited_bins(spectra: CrossSpectra, source: int) -> CrossSpectra:
