@@ -18,6 +18,7 @@ __all__ = ["Backlash"]
 
 _FLANK_HZ = 80.0  # of the link on a closed flank, the motor locked: stiff beside what an arm is moved at
 _LINK = 0.1  # of the inertia that the joint feels: what stays with the link at least
+_NOTHING = 1e-6  # [N m] that leave the link in the middle of the gap at first
 _CROSSING = 3e-3  # [s] that the joint's usual torque needs to carry the link through the gap's lubricant
 
 
@@ -83,7 +84,7 @@ class Backlash(Effect):
             return np.asarray(film * speed + np.where(over == 0.0, 0.0, push))
 
         drive = DriveApart(self._index, motor, friction_at(arm, self._index + 1), passed,
-                           lambda tau: half * np.sign(tau) + tau / k)
+                           lambda tau: half * np.clip(tau / _NOTHING, -1.0, 1.0) + tau / k)
         return Hooks(actuator=drive.actuator, sensor=drive.sensor, inertia=drive.taken_out(arm.n_joints), states=2,
                      settled=drive.settled, start=drive.start, rate=drive.rate)
 

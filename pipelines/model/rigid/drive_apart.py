@@ -3,7 +3,8 @@
     J_m θ̈ = τ - τ_friction(θ̇) - τ_passed(θ - q, θ̇ - q̇)
 
 The arm that is simulated is the links, q; angle θ and speed θ̇ of the drive are two memories. Encoder and friction sit on the
-drive. All arrays have replicas first.
+drive. Its inertia is that of a geared rotor: it feels its own joint's acceleration, not that of the joints before it, which a
+disc of J_m on a parallel axis would feel too. All arrays have replicas first.
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ _LEAST = 0.1  # of the inertia that a joint feels: what stays beyond its spring 
 
 
 def rate_of(x: Array, t: Array) -> Array:
-    """dx/dt (samples, …) by central differences; zero of a single sample."""
-    return np.asarray(np.gradient(x, t, axis=0)) if len(t) > 1 else np.zeros_like(x)
+    """dx/dt (samples, …) by central differences; zero of one or two samples."""
+    return np.asarray(np.gradient(x, t, axis=0, edge_order=2)) if len(t) > 2 else np.zeros_like(x)
 
 
 def shifted(motion: Motion, index: int, d: Array, rate: Array, second: Array) -> Motion:
