@@ -124,18 +124,23 @@ def fit_separable(problem: Separable, starts: Iterable[Array], lags: int | None 
         lags: rows over which noise may remember itself; by default Newey and West's rule.
         most: steps of each search.
     """
-    found = min((search(problem, start, most) for start in starts), key=lambda pair: pair[1].rss)
-    return _with_covariance(problem, *found, lags)
+    theta, now, slope = min((_search(problem, start, most) for start in starts), key=lambda end: end[1].rss)
+    return _with_covariance(problem, theta, now, _slopes(problem, theta, now) if slope is None else slope, lags)
 
 
 def search(problem: Separable, start: Array, most: int = _MOST) -> tuple[Array, Linear]:
     """Levenberg-Marquardt over θ from one start, within the bounds; `most` steps."""
+    return _search(problem, start, most)[:2]
+
+
+def _search(problem: Separable, start: Array, most: int) -> tuple[Array, Linear, Array | None]:
+    """The same, and the slopes at its end (m, p) where it took them last."""
     theta = np.clip(start, problem.lower, problem.upper)
     now = linear_part(problem.columns(theta), problem.y)
     damping = _DAMPING
     for _ in range(most if theta.size else 0):
-        slope = _slopes(problem, theta, now)
-        slope = now.beside(slope)
+        steep = _slopes(problem, theta, now)
+        slope = now.beside(steep)
         normal, downhill = slope.T @ slope, slope.T @ now.residual
         size = np.diag(normal)
         if not size.any():  # no row shows any of θ
@@ -145,7 +150,7 @@ def search(problem: Separable, start: Array, most: int = _MOST) -> tuple[Array, 
         while damping < 1e8:
             shift = np.linalg.solve(normal + damping * weight, downhill)
             if downhill @ shift < _GAIN * now.rss:  # twice what the step would gain were the problem linear
-                return theta, now
+                return theta, now, steep
             there = np.clip(theta + np.clip(shift, -1.0, 1.0), problem.lower, problem.upper)
             other = linear_part(problem.columns(there), problem.y)
             if other.rss <= now.rss:
@@ -155,7 +160,7 @@ def search(problem: Separable, start: Array, most: int = _MOST) -> tuple[Array, 
             damping *= 5.0
         if gain < _GAIN:
             break
-    return theta, now
+    return theta, now, None
 
 
 def _slopes(problem: Separable, theta: Array, now: Linear) -> Array:
@@ -173,14 +178,14 @@ def _slopes(problem: Separable, theta: Array, now: Linear) -> Array:
     return slopes
 
 
-def _with_covariance(problem: Separable, theta: Array, now: Linear, lags: int | None) -> SeparableFit:
+def _with_covariance(problem: Separable, theta: Array, now: Linear, slopes: Array, lags: int | None) -> SeparableFit:
     """The sandwich B M B with B = (FᵀF)⁻¹ over what the rows show, and M allowing for rows that depend on one another.
 
     Newey & West 1987: M = Σ_l w_l Σ_i (f_i r_i)(f_{i+l} r_{i+l})ᵀ with falling weights w_l keeps M positive. A row that alone
     shows a number draws the fit to itself; r_i / (1 - h_i), h_i its leverage, is what it leaves when it is left out: HC3 of
     MacKinnon & White 1985, J. Econometrics 29, p. 305. Inertia hangs on the few rows in which a joint is sped up.
     """
-    jacobian = np.hstack([now.columns, _slopes(problem, theta, now)])
+    jacobian = np.hstack([now.columns, slopes])
     scale = np.linalg.norm(jacobian, axis=0)
     scale = np.where(scale > 0.0, scale, np.inf)  # a number that no row shows
     unit = jacobian / scale

@@ -62,7 +62,8 @@ def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, 
                    _spoilt(t, q, tau), held, size, joint.revolute, ())
     for _ in range(rounds):
         fine = refined(fine, fit, resolution, _FREEDOM)
-        fit = fit_law(LawEquations.of((fine,), joint), law, [fit.theta])
+        equations = LawEquations.of((fine,), joint)
+        fit = fit_law(equations, law, [roughly(equations, law, fit.theta).theta])
     return fit
 
 

@@ -22,7 +22,8 @@ _OTHERS = 8
 _ROUGH = 240  # rows of a rough fit
 _GLANCED = 80  # rows that its starts are ranked by
 _SPARSE = 3  # of the starts it looks at every third
-_STEPS = 3  # that it goes from the best one
+_STEPS = 3  # of a rough fit,
+_FIRST = 1  # and of the first one, from the best of its starts
 _ROUNDED = 1e-12  # of θ: less is what exp and log make of it
 _CARRIED = 3  # rounds in which a law that depends on the load sees the load of the fit before
 
@@ -48,13 +49,16 @@ def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = Non
     return LawFit(law, arms[0], equations.postures, found, equations.width)
 
 
-def roughly(equations: Equations, law: Law) -> LawFit:
-    """A fit of few rows and few steps: good enough for a motion to be refined about it, which is then fitted in earnest."""
+def roughly(equations: Equations, law: Law, start: Array | None = None) -> LawFit:
+    """A fit of few rows and few steps, from `start` or of many the best: to refine a motion about, or to begin in earnest from."""
     few, arms = equations.thinned(_ROUGH), equations.arms()
     problem = few.problem(law, arms)
-    starts = list(law.starts(equations.nodes, arms[0]))[::_SPARSE]
-    best = _ranked(equations.thinned(_GLANCED), law, arms, starts)[0]
-    return LawFit(law, arms[0], equations.postures, SeparableFit.rough(*search(problem, best, _STEPS)), equations.width)
+    if start is None:
+        starts = list(law.starts(equations.nodes, arms[0]))[::_SPARSE]
+        end = search(problem, _ranked(equations.thinned(_GLANCED), law, arms, starts)[0], _FIRST)
+    else:
+        end = search(problem, start, _STEPS)
+    return LawFit(law, arms[0], equations.postures, SeparableFit.rough(*end), equations.width)
 
 
 def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableFit) -> bool:
@@ -63,7 +67,8 @@ def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableF
     Two sigmoids nearly alike, one up and one down, fit the speeds there are and may do anything between them and zero.
     """
     speed = float(np.abs(equations.nodes.dq).max()) * np.geomspace(1e-6, 1.0, 200)
-    forth, back = (law.curve(side * speed, arm, found.theta, found.beta[-law.amplitudes:]) for side in (1.0, -1.0))
+    both = law.curve(np.concatenate([speed, -speed]), arm, found.theta, found.beta[-law.amplitudes:])
+    forth, back = np.split(both, 2)
     odd = bool(np.allclose(forth, -back, rtol=1e-9, atol=1e-12))
     return not odd or bool(np.all(forth >= -1e-9 * np.abs(forth).max()))
 

@@ -41,7 +41,7 @@ def lay_nodes(t: Array, q: Array, dq: Array, window: int) -> Nodes:
     """
     change, middle = np.diff(dq), 0.5 * (dq[1:] + dq[:-1])
     size = _group(t, window)
-    parts, span = np.ones(len(change), dtype=np.intp), np.ones(len(change), dtype=np.intp)
+    parts, span = np.ones(len(change), dtype=np.int8), np.ones(len(change), dtype=np.int8)
     little = _LITTLE * float(np.abs(dq).max())
     mean, spread = np.zeros(0), np.zeros(0)
     if size > 2:
@@ -53,13 +53,14 @@ def lay_nodes(t: Array, q: Array, dq: Array, window: int) -> Nodes:
     size_of, there = np.abs(change[alone]), middle[alone]
     turning = (np.abs(there) < (_NEAR + 0.5) * size_of) & (size_of > little)
     parts[alone[turning]] = _PARTS
-    first = np.flatnonzero(parts)
-    count = parts[first]
+    first = np.flatnonzero(parts > 0)
+    count = parts[first].astype(np.intp)
     at = np.repeat(first, count)
     step = np.arange(len(at)) - np.repeat(np.cumsum(count) - count, count)
     reach, pair = span[at], span[at] > 1
-    share = step / parts[at]
-    place = np.where(pair, 0.5 + _GAUSS * (2.0 * step - 1.0), share + 0.5 / parts[at]) * reach  # in samples after `at`
+    part = 1.0 / np.repeat(count, count)
+    share = step * part
+    place = np.where(pair, 0.5 + _GAUSS * (2.0 * step - 1.0), share + 0.5 * part) * reach  # in samples after `at`
     begin, length = t[at], t[at + reach] - t[at]
     below = place.astype(np.intp)
     beyond, below = place - below, at + below

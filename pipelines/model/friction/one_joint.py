@@ -12,6 +12,7 @@ from typing import NoReturn
 import numpy as np
 
 from pipelines.log.robot import Joint, RobotDescription
+from pipelines.model.effects.base import SpeedCurve
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
 __all__ = ["OneJoint", "gravity_columns", "gravity_names"]
@@ -55,6 +56,9 @@ class OneJoint:
     def friction_torque(self, motion: Motion) -> Array:
         """None: its law of friction is what is fitted."""
         return np.zeros_like(motion.dq)
+
+    def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...]:
+        return ()
 
     def with_body(self, body: RigidBody, p: Array) -> NoReturn:
         raise TypeError("a joint on its own has no links")

@@ -31,6 +31,7 @@ from pipelines.signal.tuning import tune_jerk
 
 __all__ = ["Stretch", "Windows", "stretches_of", "swaying"]
 
+_MOTIONLESS = ("edges", "kept", "impulse", "length", "torque")
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
 _SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
 _FEWEST = 10  # windows of a stretch that is worth using
@@ -80,8 +81,10 @@ class Stretch:
     beside: tuple[Sway, ...] = ()  # joints that are held and give way
 
     def moved(self, q: Array, dq: Array) -> Stretch:
-        """The same with a better motion."""
-        return replace(self, q=q, dq=dq)
+        """The same with a better motion; what does not depend on that is kept."""
+        other = replace(self, q=q, dq=dq)
+        other.__dict__.update({name: self.__dict__[name] for name in _MOTIONLESS if name in self.__dict__})
+        return other
 
     @property
     def rows(self) -> int:
