@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import product
 
 import numpy as np
 
+from benchmarks.hidden_effects.robots import ROBOTS
 from pipelines.bench.faults import fault_names, find_fault
 
 __all__ = ["COMPLIANT", "EASY", "FAMILIES", "OUTSIDE", "STRENGTHS", "Hidden", "SealedCase", "campaign"]
@@ -54,11 +55,14 @@ class SealedCase:
     frf: bool = False  # with frequency responses and reversals of every joint
     amplifier: float = 1.0  # times the amplifier's noise
     held: bool = True  # the log says that torque was held over each sample, as it was
+    robot: str = "rrr"  # see robots.py
+    loop: str = ""  # "backward-difference": of the speed; "delayed": torque; else on the observer, a quarter with feed-forward
 
     @property
     def key(self) -> str:
-        """Ten hexadecimal digits."""
-        return hashlib.blake2b(repr(asdict(self)).encode(), digest_size=5).hexdigest()
+        """Ten hexadecimal digits: a digest of all that is not as usual."""
+        unusual = [(field.name, getattr(self, field.name)) for field in fields(self) if getattr(self, field.name) != field.default]
+        return hashlib.blake2b(repr(unusual).encode(), digest_size=5).hexdigest()
 
 
 def campaign(seed: int = 0, families: Iterable[str] = (), short: bool = False) -> tuple[SealedCase, ...]:
@@ -160,12 +164,33 @@ def zero(seed: int) -> Iterator[SealedCase]:
 def uncentred(seed: int, count: int = 12) -> Iterator[SealedCase]:
     """Healthy arms whose logs claim that torque was sampled: it then is not centred, and shows as a delay."""
     for place in range(count):
-        yield replace(_case("uncentred", seed, place, []), held=False)
+        yield _case("uncentred", seed, place, [], held=False)
+
+
+def paper(seed: int) -> Iterator[SealedCase]:
+    """Arms with friction of three sigmoids, as the paper has it, and reference logs: in order, or with one cause more."""
+    for place in range(8):
+        yield _case("paper", seed, place, [], reference=True, robot="paper")
+    for place, (strength, cause) in enumerate(product(STRENGTHS[:2], EASY), start=8):
+        joints = [joint for name, joint in _places(EASY) if name == cause]
+        yield _case("paper", seed, place, [(cause, joints[place % len(joints)], strength)], reference=True, robot="paper")
+
+
+def elsewhere(seed: int) -> Iterator[SealedCase]:
+    """Other arms under other loops, at full strength: in order, or with one cause."""
+    robots, loops = tuple(ROBOTS), ("", "backward-difference", "delayed")
+    for place in range(2 * len(robots)):
+        yield _case("elsewhere", seed, place, [], robot=robots[place % len(robots)], loop=loops[place % len(loops)])
+    causes = [cause for cause in EASY if cause not in ("rotor_inertia", "link_length")]  # where they show depends on the arm
+    for place, (cause, turn) in enumerate(product(causes, range(2)), start=2 * len(robots)):
+        robot = robots[place % len(robots)]
+        joint = None if find_fault(cause).scope == "arm" else 1 + (place + turn) % ROBOTS[robot].n_joints
+        yield _case("elsewhere", seed, place, [(cause, joint, 1.0)], robot=robot, loop=loops[place // 2 % len(loops)])
 
 
 FAMILIES: dict[str, Callable[[int], Iterable[SealedCase]]] = {
     each.__name__: each for each in (single, compliance, healthy, outside, invisible, payload, pairs, noise, standing, zero,
-                                     uncentred)}
+                                     uncentred, paper, elsewhere)}
 
 
 def _places(causes: Iterable[str]) -> list[tuple[str, int | None]]:

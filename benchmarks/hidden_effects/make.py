@@ -22,8 +22,7 @@ from pipelines.log.files import write_log
 
 __all__ = ["Sealed", "answers_in", "make_case", "make_cases", "seal"]
 
-_VERDICTS = {"healthy": "nothing-wrong", "standing": "nothing-wrong", "zero": "nothing-wrong", "outside": "unknown",
-             "invisible": "not-testable", "uncentred": "flagged"}
+_VERDICTS = {"zero": "nothing-wrong", "outside": "unknown", "invisible": "not-testable", "uncentred": "flagged"}
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ def make_case(case: SealedCase, out: Path) -> bool:
 
 def seal(case: SealedCase, session: Session) -> Sealed:
     """The answer of a case."""
-    verdict = _VERDICTS.get(case.family, "cause")
+    verdict = _VERDICTS.get(case.family, "cause" if case.hidden else "nothing-wrong")
     findings = answer(session.hidden) if verdict != "nothing-wrong" else []
     return Sealed(case.key, case.family, verdict, tuple(findings), tuple(answer(session.standing)), asdict(case))
 

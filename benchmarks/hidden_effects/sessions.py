@@ -18,17 +18,17 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from benchmarks.hidden_effects.cases import Hidden, SealedCase
+from benchmarks.hidden_effects.robots import ROBOTS
 from pipelines.bench import experiments
 from pipelines.bench.controllers import Decentralised, FeedForward
 from pipelines.bench.experiments import Experiment
 from pipelines.bench.fault import Fault
 from pipelines.bench.faults import make
-from pipelines.bench.friction import CoulombViscous
-from pipelines.bench.machine import Machine, draw_machine, with_links
+from pipelines.bench.machine import Machine, draw_machine, machine_of, with_links
 from pipelines.bench.session import peak_torque
 from pipelines.bench.solid import Solid
 from pipelines.errors import UsageError
-from pipelines.log.experiment import ExperimentLog
+from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
@@ -83,9 +83,13 @@ def _record(case: SealedCase, session: str) -> Session:
 
 def machine_of_case(case: SealedCase) -> Machine:
     """The machine as it stood on its first day; its gains are drawn anew for each case."""
-    machine = draw_machine(case.machine, "fault")
+    if case.robot in ROBOTS:
+        machine = machine_of(ROBOTS[case.robot], case.machine)
+    else:
+        machine = draw_machine(case.machine, "paper" if case.robot == "paper" else "fault")
     stiffness = float(np.random.default_rng([93, case.seed]).uniform(0.7, 1.4))
-    return replace(machine, amplifier_noise=tuple(case.amplifier * rms for rms in machine.amplifier_noise),
+    return replace(machine, delay=int(case.loop == "delayed"),
+                   amplifier_noise=tuple(case.amplifier * rms for rms in machine.amplifier_noise),
                    kp=tuple(stiffness * gain for gain in machine.kp), kd=tuple(stiffness**0.5 * gain for gain in machine.kd))
 
 
@@ -106,6 +110,9 @@ def _plans(case: SealedCase, machine: Machine, session: str) -> Plans:
     rng = np.random.default_rng([94, case.seed])
     plans = _SETS[session](machine, [int(seed) for seed in rng.integers(1, 100_000, 4)])
     plans = [replace(plan, name=f"{plan.kind}-{number}") for number, plan in enumerate(plans, start=1)]
+    if case.loop == "backward-difference":
+        return [replace(plan, law=Decentralised("backward-difference")) if isinstance(plan.law, Decentralised) else plan
+                for plan in plans]
     if case.frf or rng.uniform() < 0.25:
         model = _controllers_model(machine, case.seed)
         if case.frf:
@@ -118,7 +125,7 @@ def _plans(case: SealedCase, machine: Machine, session: str) -> Plans:
 def _mixed(machine: Machine, seeds: list[int]) -> Plans:
     one, two, three, four = seeds
     return [experiments.excitation(machine, one, 12.0, 1), experiments.excitation(machine, two, 10.0, 1),
-            experiments.free(machine, three, 10.0), experiments.hold(_somewhere(one), 1, 2.0),
+            experiments.free(machine, three, 10.0), experiments.hold(_somewhere(machine, one), 1, 2.0),
             experiments.excitation(machine, three, 10.0, 1).judging(), experiments.free(machine, four, 8.0).judging()]
 
 
@@ -130,8 +137,9 @@ def _periodic(machine: Machine, seeds: list[int]) -> Plans:
 
 def _friction(machine: Machine, seeds: list[int]) -> Plans:
     one, two, three, _ = seeds
-    return [experiments.excitation(machine, one, 6.0, 2), *(experiments.friction(machine, joint, two, 5.0) for joint in (1, 2, 3)),
-            experiments.hold(_somewhere(one), 1, 3.0), experiments.excitation(machine, three, 12.0, 1).judging(),
+    alone = [experiments.friction(machine, joint, two, 15.0 / machine.n) for joint in range(1, machine.n + 1)]
+    return [experiments.excitation(machine, one, 6.0, 2), *alone, experiments.hold(_somewhere(machine, one), 1, 3.0),
+            experiments.excitation(machine, three, 12.0, 1).judging(),
             experiments.free(machine, two, 10.0).judging()]
 
 
@@ -161,9 +169,11 @@ def _compliance_plans(machine: Machine, model: ControllerModel, seed: int) -> It
         yield experiments.reversal(machine, joint, _REVERSAL_SECONDS)
 
 
-def _somewhere(seed: int) -> np.ndarray:
-    """A posture (3,) [rad] to rest in."""
-    return np.round(np.random.default_rng([95, seed]).uniform(-1.2, 1.2, 3), 3)
+def _somewhere(machine: Machine, seed: int) -> Array:
+    """A posture (n,) [rad] to rest in."""
+    joints, share = machine.robot.joints, np.random.default_rng([95, seed]).uniform(-1.2, 1.2, machine.n)
+    return np.array([round(float(np.clip(x if joint.revolute else 0.15 + 0.1 * x, *joint.position)), 3)
+                     for x, joint in zip(share, joints, strict=True)])
 
 
 def _controllers_model(machine: Machine, seed: int) -> ControllerModel:
@@ -173,7 +183,6 @@ def _controllers_model(machine: Machine, seed: int) -> ControllerModel:
     arm = Arm.from_links(with_links(machine.described, links))
     acting = []
     for joint, true in enumerate(machine.friction, start=1):
-        assert isinstance(true, CoulombViscous)
         law = true.drawn(rng, _FRICTION_ERROR)
         acting += [Acting.of(Coulomb(joint), {"level": law.coulomb, "sharpness": 100.0}, origin="known"),
                    Acting.of(Viscous(joint), {"coefficient": law.viscous}, origin="known")]

@@ -50,7 +50,8 @@ def test_a_coupling_has_two_joints() -> None:
 
 
 @pytest.mark.parametrize(("family", "said", "right"), [
-    ("healthy", answer(), True), ("healthy", answer(verdict="unknown"), False), ("healthy", answer(finding("spring", 1)), False),
+    ("paper", answer(), True), ("paper", answer(finding("stribeck", 1)), False), ("healthy", answer(), True),
+    ("healthy", answer(verdict="unknown"), False), ("healthy", answer(finding("spring", 1)), False),
     ("uncentred", answer(), False), ("uncentred", answer(verdict="unknown"), True),
     ("uncentred", answer(finding("time_delay", 1)), True),
 ])
