@@ -12,17 +12,12 @@ is some 600 cases of 52 s: an hour and a half to make on one core, and as long a
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
 
-from benchmarks.hidden_effects.cases import FAMILIES, SealedCase, campaign
+from benchmarks.hidden_effects.cases import FAMILIES, SealedCase, campaign, in_part
 from benchmarks.hidden_effects.judge import engine_named, judge, scores_in, tasks
 from benchmarks.hidden_effects.make import make_cases
 from benchmarks.hidden_effects.table import table
-
-T = TypeVar("T")
-
 
 def main() -> None:
     arguments = _parser().parse_args()
@@ -42,7 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("command", choices=("make", "judge", "table", "all"))
     parser.add_argument("--out", type=Path, required=True, help="folder of the cases")
     parser.add_argument("--families", nargs="*", default=[], choices=list(FAMILIES))
-    parser.add_argument("--part", default="1/1", help="i/N: every N-th case, from the i-th")
+    parser.add_argument("--part", default="1/1", help="i/N: about one case in N, always the same ones")
     parser.add_argument("--count", type=int, help="no more than so many")
     parser.add_argument("--seed", type=int, default=0, help="another seed, other machines and motions")
     parser.add_argument("--causes", nargs="*", default=[], help="make only cases that hide one of these")
@@ -56,22 +51,17 @@ def _parser() -> argparse.ArgumentParser:
 
 def _make(arguments: argparse.Namespace) -> None:
     chosen = [case for case in campaign(arguments.seed, arguments.families, arguments.short)
-              if _wanted(case, arguments.causes, arguments.strengths)]
-    for case, seconds in make_cases(_part(chosen, arguments), arguments.out):
+              if in_part(case.key, arguments.part) and _wanted(case, arguments.causes, arguments.strengths)]
+    for case, seconds in make_cases(chosen[:arguments.count], arguments.out):
         print(f"{case.key} {case.family:10} {case.session:8} {seconds:5.1f} s", flush=True)
 
 
 def _judge(arguments: argparse.Namespace, kept: Path, taken_out: bool) -> None:
-    chosen = _part(tasks(arguments.out, arguments.families, taken_out), arguments)
-    for score in judge(arguments.out, kept, chosen, engine_named(arguments.engine)):
+    chosen = [task for task in tasks(arguments.out, arguments.families, taken_out) if in_part(task[0].key, arguments.part)]
+    for score in judge(arguments.out, kept, chosen[:arguments.count], engine_named(arguments.engine)):
         outcome = "right" if score.right else "wrong" if score.wrong else "open"
         print(f"{score.key} {score.family:10} {'+'.join(score.truth) or '-':40} {score.strength or 0:4g} -> {score.verdict}: "
               f"{', '.join(score.named) or '-':30} {outcome:5} {score.seconds:5.1f} s", flush=True)
-
-
-def _part(chosen: Sequence[T], arguments: argparse.Namespace) -> Sequence[T]:
-    which, parts = (int(number) for number in arguments.part.split("/"))
-    return chosen[which - 1::parts][:arguments.count]
 
 
 def _wanted(case: SealedCase, causes: list[str], strengths: list[float]) -> bool:

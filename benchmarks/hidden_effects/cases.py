@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.hidden_effects.robots import ROBOTS
 from pipelines.bench.faults import fault_names, find_fault
 
-__all__ = ["COMPLIANT", "EASY", "FAMILIES", "OUTSIDE", "STRENGTHS", "Hidden", "SealedCase", "campaign"]
+__all__ = ["COMPLIANT", "EASY", "FAMILIES", "OUTSIDE", "STRENGTHS", "Hidden", "SealedCase", "campaign", "in_part"]
 
 STRENGTHS = (1.0, 0.3, 0.1)  # times the figures of causes.md
 MACHINES = 6
@@ -78,6 +78,12 @@ def campaign(seed: int = 0, families: Iterable[str] = (), short: bool = False) -
     order = np.random.default_rng([90, seed]).permutation(len(cases))
     shuffled = tuple(cases[place] for place in order)
     return tuple(replace(case, session="short") for case in shuffled) if short else shuffled
+
+
+def in_part(key: str, part: str) -> bool:
+    """Whether the case of this key belongs to part "i/N": the same one in making and in judging, whatever there is already."""
+    which, parts = (int(number) for number in part.split("/"))
+    return int(key, 16) % parts == which - 1
 
 
 def single(seed: int) -> Iterator[SealedCase]:

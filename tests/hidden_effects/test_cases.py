@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden_effects import sessions
-from benchmarks.hidden_effects.cases import FAMILIES, Hidden, SealedCase, campaign
+from benchmarks.hidden_effects.cases import FAMILIES, Hidden, SealedCase, campaign, in_part
 from benchmarks.hidden_effects.make import answers_in, make_cases
 from benchmarks.hidden_effects.sessions import machine_of_case, record_case
 from pipelines.bench import references
@@ -78,6 +78,13 @@ def test_a_seed_is_a_campaign() -> None:
     assert len({case.key for case in once}) == len({case.seed for case in once}) == len(once)
     assert not {case.key for case in once} & {case.key for case in other}
     assert not {case.machine for case in once} & {case.machine for case in other}
+
+
+def test_parts_are_the_whole() -> None:
+    keys = [case.key for case in campaign(4)]
+    parts = [[key for key in keys if in_part(key, f"{part}/3")] for part in (1, 2, 3)]
+    assert sorted(key for part in parts for key in part) == sorted(keys)
+    assert min(map(len, parts)) > 0.8 * len(keys) / 3
 
 
 @pytest.mark.usefixtures("brief")
