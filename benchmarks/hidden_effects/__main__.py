@@ -19,6 +19,7 @@ from benchmarks.hidden_effects.judge import engine_named, judge, scores_in, task
 from benchmarks.hidden_effects.make import make_cases
 from benchmarks.hidden_effects.table import table
 
+
 def main() -> None:
     arguments = _parser().parse_args()
     kept = arguments.verdicts or arguments.out / "verdicts.jsonl"
