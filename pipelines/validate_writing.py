@@ -54,6 +54,7 @@ class Settings:
     lift: float = Wishes.lift  # [m] off the plane between strokes
     speed: float = Wishes.speed  # [m/s] of the tip in fast phases
     slow: float = Wishes.slow  # [m/s] in slow ones
+    acceleration: float = Wishes.acceleration  # [m/s^2] of the tip
     elbow: str | None = None  # up | down, of the RRR arm; None: up
     posture: tuple[float, ...] | None = None  # [rad] near the task, of any other arm
     via_points: int | None = None  # design so many moves between random postures instead of a text
@@ -67,8 +68,8 @@ class Settings:
     @property
     def wishes(self) -> Wishes:
         elbow: Elbow | None = None if self.elbow is None else "down" if self.elbow == "down" else "up"
-        return Wishes(self.text, self.plane_y, self.x, self.z, self.size, self.lift, self.speed, self.slow, elbow, self.posture,
-                      self.via_points, self.seed, self.sample_time)
+        return Wishes(self.text, self.plane_y, self.x, self.z, self.size, self.lift, self.speed, self.slow, self.acceleration,
+                      elbow, self.posture, self.via_points, self.seed, self.sample_time)
 
 
 @dataclass(frozen=True)

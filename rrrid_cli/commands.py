@@ -247,6 +247,7 @@ def validate_writing(
     size: Annotated[float | None, typer.Option(help="Height of a letter [m]. [0.12]")] = None,
     speed: Annotated[float | None, typer.Option(help="Speed of the tip in fast phases [m/s]. [0.6]")] = None,
     slow: Annotated[float | None, typer.Option(help="In slow phases, from a line into an arc [m/s]. [0.05]")] = None,
+    acceleration: Annotated[float | None, typer.Option(help="Largest acceleration of the tip [m/s^2]. [6]")] = None,
     elbow: Annotated[str | None, typer.Option(help="up or down, of the RRR arm. [up]")] = None,
     posture: Annotated[list[str] | None, typer.Option(help="Posture near the task [rad], of any other arm.")] = None,
     via_points: Annotated[int | None, typer.Option(help="Design so many moves between random postures instead.")] = None,
@@ -257,7 +258,8 @@ def validate_writing(
 
     _go(STAGE, tuple(logs or ()), common, {
         "model": model, "torque_gate": torque_gate, "draws": draws, "seed": seed, "simulate": False if no_simulation else None,
-        "text": text, "plane_y": plane_y, "x": x, "z": z, "size": size, "speed": speed, "slow": slow, "elbow": elbow,
+        "text": text, "plane_y": plane_y, "x": x, "z": z, "size": size, "speed": speed, "slow": slow,
+        "acceleration": acceleration, "elbow": elbow,
         "posture": numbers(posture, "--posture"), "via_points": via_points, "recipe": recipe})
 
 

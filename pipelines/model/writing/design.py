@@ -47,6 +47,7 @@ class Wishes:
     lift: float = Page.lift  # [m]
     speed: float = Pace.fast  # [m/s]
     slow: float = Pace.slow  # [m/s]
+    acceleration: float = Pace.acceleration  # [m/s^2] of the tip; the jerk goes with it
     elbow: Elbow | None = None
     posture: tuple[float, ...] | None = None  # [rad]
     via_points: int | None = None  # so many moves instead of a text
@@ -110,7 +111,8 @@ def plan(robot: RobotDescription, arm: Arm | None, wishes: Wishes) -> Plan:
 
 def _text(robot: RobotDescription, arm: Arm | None, wishes: Wishes) -> Plan:
     page = Page(wishes.plane_y, wishes.x, wishes.z, wishes.size, lift=wishes.lift)
-    pace = Pace(wishes.speed, min(wishes.slow, wishes.speed))
+    jerk = Pace.jerk * wishes.acceleration / Pace.acceleration
+    pace = Pace(wishes.speed, min(wishes.slow, wishes.speed), wishes.acceleration, jerk)
     task = writing_task(robot, wishes.text or "", page, pace, elbow=wishes.elbow, posture=wishes.posture)
     reference = task.sampled(wishes.sample_time, arm)
     closed = rrr.fits(robot)
