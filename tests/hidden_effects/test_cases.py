@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.hidden_effects import sessions
+from benchmarks.hidden_effects import make, sessions
 from benchmarks.hidden_effects.cases import FAMILIES, Hidden, SealedCase, campaign, in_part
 from benchmarks.hidden_effects.make import answers_in, make_cases
 from benchmarks.hidden_effects.sessions import machine_of_case, record_case
@@ -18,6 +19,7 @@ from pipelines.bench.controllers import Decentralised
 from pipelines.bench.experiments import Experiment
 from pipelines.bench.faults import find_fault
 from pipelines.bench.machine import Machine
+from pipelines.errors import UsageError
 from pipelines.log.canonical import digest_of
 from pipelines.log.files import open_log
 from tests.bench.machines import sway
@@ -98,6 +100,18 @@ def test_a_case_is_made_once_and_always_the_same(tmp_path: Path) -> None:
                     for out in ("one", "two"))
         assert one == two
         assert len(one) == 3
+
+
+def test_a_loop_that_runs_away_stops_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is said, and leaves neither logs nor an answer."""
+    def runs_away(case: SealedCase) -> sessions.Session:
+        raise UsageError("C02", "the loop runs away")
+
+    monkeypatch.setattr(make, "record_case", runs_away)
+    (case, seconds), = make_cases([CASE], tmp_path)
+    assert case == CASE
+    assert math.isnan(seconds)
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 @pytest.mark.usefixtures("brief")
