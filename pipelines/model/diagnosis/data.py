@@ -5,15 +5,15 @@
     data.lay(lambda motion: torque)     (rows,) any torque, or (rows, k) of k columns, in the same rows
 
 One log's rows are those of its first joint in order of time, then those of its second …; the logs follow each other. What is
-done to a signal is linear, and done to torque and columns alike: for a held command the average over two samples, then the
-zero-phase low-pass in the frequency domain, |H|² of `signal.filters`, then decimation. Rows next to the end of a stretch, where
-the low-pass has to guess what was before, are left out.
+done to a signal is linear, and done to torque and columns alike, in the frequency domain: for a held command the average over two
+samples (`signal.filters.centre_samples`), the zero-phase low-pass |H|², and nothing beyond half the rate of the thinned rows. Rows
+next to the end of a stretch, where the low-pass has to guess what was before, are left out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -37,40 +37,35 @@ _END = 1.0  # periods of the cut-off left out at either end of a stretch
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A stretch without a gap: what is done to a signal of it."""
+    """A stretch without a gap: what is done to a signal of it, in the frequency domain."""
 
     part: slice  # of the log's kept samples
-    centred: bool  # average over two samples first
-    response: Array | None  # of the low-pass at the frequencies of the padded stretch
-    pad: int
-    chosen: Indices  # places in the centred stretch that become rows
+    held: bool  # the torque is a held command: columns are averaged as it is
+    response: Array  # (bins,) low-pass, at the frequencies of the padded stretch, as far as the thinned rows go
+    average: Array  # (bins,) of the average over two samples of a smooth signal
+    size: int  # of the padded stretch
+    pad: int  # a multiple of `every`
+    every: int
+    chosen: Indices  # places in the thinned stretch that become rows
 
     def lay(self, x: Array) -> Array:
-        """(channels, samples) -> (channels, rows)."""
-        if self.centred:
-            x = _centred(x)
-        if self.response is None:
-            return np.asarray(x[:, self.chosen])
-        pad, n = self.pad, x.shape[1]
-        wide = np.concatenate([2.0 * x[:, :1] - x[:, pad:0:-1], x, 2.0 * x[:, -1:] - x[:, -2:-pad - 2:-1]], axis=1)
-        spectrum = np.fft.rfft(wide, n=2 * (len(self.response) - 1), axis=1)
-        spectrum *= self.response
-        smooth = np.fft.irfft(spectrum, axis=1)[:, pad:pad + n]
-        return np.asarray(smooth[:, self.chosen])
+        """A smooth signal (channels, samples) -> (channels, rows)."""
+        return self._through(x, self.response * self.average if self.held else self.response)
 
     def lay_command(self, tau: Array) -> Array:
-        """The same of a held command (joints, samples): ½ (u_k + u_{k-1}) is its average."""
-        if not self.centred:
-            return self.lay(tau)
-        return replace(self, centred=False).lay(0.5 * (tau[:, 1:-1] + tau[:, :-2]))
+        """The same of the torque (joints, samples): of a held command ½ (u_k + u_{k-1}) is its average."""
+        if self.held:
+            tau = 0.5 * (tau + np.concatenate([tau[:, :1], tau[:, :-1]], axis=1))
+        return self._through(tau, self.response)
 
-
-def _centred(x: Array) -> Array:
-    """`signal.filters.centre_samples` along axis 1."""
-    out = x[:, 1:-1] * (4.0 / 6.0)
-    out += (x[:, :-2] + x[:, 2:]) * (1.0 / 6.0)
-    out[:, 1:-1] -= (x[:, :-4] - 4.0 * x[:, 1:-3] + 6.0 * x[:, 2:-2] - 4.0 * x[:, 3:-1] + x[:, 4:]) * (1.0 / 180.0)
-    return np.asarray(out)
+    def _through(self, x: Array, response: Array) -> Array:
+        pad, wide = self.pad, np.empty((len(x), x.shape[1] + 2 * self.pad))
+        wide[:, pad:-pad] = x
+        np.subtract(2.0 * x[:, :1], x[:, pad:0:-1], out=wide[:, :pad])
+        np.subtract(2.0 * x[:, -1:], x[:, -2:-pad - 2:-1], out=wide[:, -pad:])
+        spectrum = np.fft.rfft(wide, n=self.size, axis=1)[:, :len(response)]
+        spectrum *= response / self.every
+        return np.asarray(np.fft.irfft(spectrum, n=self.size // self.every, axis=1)[:, self.chosen + pad // self.every])
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +107,7 @@ class LogData:
 
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """What `x` (samples, …) is at the moments of the rows, unfiltered."""
-        return np.concatenate([x[piece][run.chosen + int(run.centred)] for piece, run in self._parts])
+        return np.concatenate([x[piece][run.chosen * run.every] for piece, run in self._parts])
 
     def lay(self, table: Array) -> Array:
         """Columns over the motion, (samples, joints) or (samples, joints, k), as (joints, rows) or (k, joints, rows)."""
@@ -234,29 +229,30 @@ def _of_log(log: ExperimentLog, equations: LogEquations) -> LogData:
 
 
 def _run(equations: LogEquations, part: slice) -> _Run:
-    how, centred = equations.conditioning, equations.held
-    rate = 1.0 / equations.found.good.log.sample_time
-    n = part.stop - part.start - 2 * int(centred)
-    reach = 2 if how.cutoff_hz is None else int(np.ceil(_END * rate / how.cutoff_hz))
-    chosen = np.arange(min(reach, n // 4), n - min(reach, n // 4), how.decimation)
-    chosen = chosen[~equations.rows.out[part][chosen + int(centred)]]
-    if how.cutoff_hz is None:
-        return _Run(part, centred, None, 0, chosen)
-    pad = min(n - 2, int(np.ceil(_PAD * rate / how.cutoff_hz)))
-    size = _quick(n + 2 * pad)
-    response = passed_both_ways(np.arange(size // 2 + 1) * rate / size, how.cutoff_hz, rate)
-    return _Run(part, centred, response, pad, chosen)
+    how, held = equations.conditioning, equations.held
+    rate, every = 1.0 / equations.found.good.log.sample_time, how.decimation
+    n = part.stop - part.start
+    cutoff = how.cutoff_hz
+    reach = 2 if cutoff is None else int(np.ceil(_END * rate / cutoff))
+    chosen = np.arange(-(-min(reach, n // 4) // every), (n - min(reach, n // 4)) // every)
+    chosen = chosen[~equations.rows.out[part][chosen * every]]
+    pad = every * (min(n - 2, 16 if cutoff is None else int(np.ceil(_PAD * rate / cutoff))) // every)
+    size = 2 * every * quick_size(-(-(n + 2 * pad) // (2 * every)))
+    bins = np.arange(size // 2 // every + 1)
+    turn = 2.0 * np.pi * bins / size
+    response = np.ones(len(bins)) if cutoff is None else passed_both_ways(bins * rate / size, cutoff, rate)
+    return _Run(part, held, response, (114.0 + 68.0 * np.cos(turn) - 2.0 * np.cos(2.0 * turn)) / 180.0, size, pad, every, chosen)
 
 
-def _quick(n: int) -> int:
-    """The smallest even 2^a 3^b 5^c from n on: lengths of a quick Fourier transform."""
-    best = 1 << max(1, (n - 1).bit_length())
+def quick_size(n: int) -> int:
+    """The smallest 2^a 3^b 5^c from n on: lengths of a quick Fourier transform."""
+    best = 1 << max(0, (n - 1).bit_length())
     for five in range(8):
         for three in range(12):
             odd = 5**five * 3**three
             if odd >= best:
                 break
-            size = odd << max(1, int(np.ceil(np.log2(max(n / odd, 1.0)))))
+            size = odd << max(0, int(np.ceil(np.log2(max(n / odd, 1.0)))))
             if n <= size < best:
                 best = size
     return best

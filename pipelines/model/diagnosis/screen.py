@@ -24,7 +24,7 @@ from pipelines.model.effects.base import Effect
 __all__ = ["Screened", "screen", "screen_family"]
 
 _INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
-_EVENTS = 4  # residuals that an event is looked for in
+_EVENTS = 3  # residuals that an event is looked for in
 _SPREAD = 1e-4  # of the largest: directions of c⊥ that are left alone
 
 

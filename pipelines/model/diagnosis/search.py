@@ -25,7 +25,6 @@ from pipelines.model.diagnosis.nominal import Fit, orthonormal
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
-from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "held_out", "provisional", "search"]
@@ -48,9 +47,8 @@ class Case:
     model: Exact  # nominal
     weight: Array  # (joints,)
     families: tuple[Family, ...]
-    twin: Twin | None
-    floor: Array  # (joints,) [N m]; NaN where unknown
-    blocks: int
+    thresholds: Thresholds | None  # None: a share of the residual
+    blocks: int = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +140,7 @@ def _explored(case: Case, now: Refined) -> Explored:
 
 def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
     now, screened = explored.before, explored.screened
-    thresholds = (without_twin(screened, now.rss) if case.twin is None else
-                  Thresholds.of_twin(case.twin, case.families, case.model.arm, now.weight))
+    thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
     passes = {id(one) for one, bound in zip(screened, thresholds.gain, strict=True) if one.gain[0] > bound}
     tried = [one for one in explored.tried if id(one.screened) in passes]
     best = _fewest(tried, explored.error) if more else None

@@ -25,11 +25,13 @@ _SHARE = 0.02  # of the squared weighted residual of one joint: what is less is 
 
 @dataclass(frozen=True, eq=False)
 class Thresholds:
-    """Gains of squared weighted residual, of families in their order."""
+    """Gains of squared weighted residual, of families in their order, with joints weighted by `weight`."""
 
     gain: Array  # (families,)
     own: Array  # (families,) the most that any replica gives
     origin: str
+    weight: Array  # (joints,)
+    joints: tuple[int | None, ...]  # of the families
 
     @classmethod
     def of_twin(cls, twin: Twin, families: Sequence[Family], arm: Arm, weight: Array) -> Thresholds:
@@ -39,10 +41,17 @@ class Thresholds:
         alike = {joint: max(o for o, f in zip(own, families, strict=True) if f.joint == joint)
                  for joint in {f.joint for f in families}}
         family = np.array([alike[f.joint] for f in families])
-        return cls(_TIMES * np.maximum(own, _FAMILY * family), own, f"{len(twin.fits)} replicas of the twin")
+        return cls(_TIMES * np.maximum(own, _FAMILY * family), own, f"{len(twin.fits)} replicas of the twin", weight,
+                   tuple(f.joint for f in families))
+
+    def at(self, weight: Array) -> Thresholds:
+        """The same with other weights: a cause acts on its joint, one of the whole arm where that counts most."""
+        ratio = np.square(weight / self.weight)
+        scale = np.array([ratio.max() if joint is None else ratio[joint - 1] for joint in self.joints])
+        return Thresholds(scale * self.gain, scale * self.own, self.origin, weight, self.joints)
 
 
-def without_twin(found: Sequence[Screened], power: float) -> Thresholds:
+def without_twin(found: Sequence[Screened], power: float, weight: Array) -> Thresholds:
     """Where nothing can be simulated: a share of the residual."""
     gain = np.full(len(found), _SHARE * power)
-    return Thresholds(gain, np.zeros(len(found)), "a share of the residual")
+    return Thresholds(gain, np.zeros(len(found)), "a share of the residual", weight, tuple(one.joint for one in found))
