@@ -22,11 +22,12 @@ _DAMPINGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # tried for a new pair of poles
 _FREQUENCIES = 150  # tried for it
 _REFINED = 3  # of the trials
 _DELAYS = 100  # tried, in eighths of a period of the highest frequency, early and late
-_LEAP = 3.0  # of the logarithm of the gain
+_LEAP = 3.0  # of the logarithm of the gain at once
 _ROUGH = (12, 1e-3)  # steps and relative decrease of a trial
 _STEPS = 60  # of Gauss and Newton at most
 _STOP = 1e-7  # relative decrease of the sum of squares below which they end
 _PATIENCE = 2  # sections more that do not pay before the search ends
+_FEWEST = 18  # bins
 _EXACT = 1e-12  # of the square of the response: a variance below this is rounding
 
 
@@ -50,8 +51,8 @@ class _Data:
 
 
 def fit_rational(frequency: Array, response: Complex, variance: Array, *, integrators: int = 0, hold: float = 0.0,
-                 most: int = 6, fewest: int = 0, with_delay: bool = True, correlated: float = 1.0,
-                 freedom: float = np.inf, floor: float = 1e-3) -> Rational:
+                 most: int = 6, with_delay: bool = True, correlated: float = 1.0, freedom: float = np.inf,
+                 floor: float = 1e-3) -> Rational:
     """The rational function of the shortest description.
 
     Args:
@@ -59,28 +60,26 @@ def fit_rational(frequency: Array, response: Complex, variance: Array, *, integr
         response: (bins,).
         variance: of it, E|Ĝ - G|² (bins,); bins with none, or without a finite response, are left out.
         integrators: i, poles at s = 0 that are known to be there.
-        hold: [s] time that the input is held between samples: its response (1 - e^(-s hold)) / (s hold) is known; 0 for none.
-        most, fewest: sections of the denominator.
+        hold: [s] time that the input is held between samples, see `known_part`; 0 for a response in continuous time.
+        most: sections of the denominator.
         with_delay: find one, positive or negative; else it is 0.
         correlated: neighbouring bins that carry one independent estimate.
         freedom: degrees of freedom of the variance, as of a `Responses`; infinite where it is known.
         floor: relative deviation that every bin has at least, for what the model leaves out.
 
     Raises:
-        InputRejected: T08, fewer bins than three times the parameters of one section; D09, not one bin with a finite variance.
+        InputRejected: T08, fewer than 18 bins, too few for gain, delay and one mode; D09, not one bin with a finite variance.
     """
     frequency, data = _prepare(frequency, response, variance, integrators, hold, with_delay, correlated, freedom, floor)
     shell = Rational(np.zeros(2), np.zeros((2, 2)), data.sign, 0, 0, integrators, hold, data.unit,
                      (float(frequency[0]), float(frequency[-1])), np.inf, np.inf)
     current = _rigid(data, shell)
-    best, waited = (current if fewest == 0 else shell), 0
+    best, waited = current, 0
     for order in range(1, most + 1):
         if 2 + 4 * order > data.independent:
             break
         square, fewer = _grow(data, current, True), _grow(data, current, False)
         current = square
-        if order < fewest:
-            continue
         better = min((square, fewer, best), key=lambda one: one.description)
         waited = 0 if better is not best else waited + 1
         best = better
@@ -97,7 +96,7 @@ def _prepare(frequency: Array, response: Complex, variance: Array, integrators: 
                             remedy="excite the frequencies that are asked for")
     frequency = frequency[good]
     s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-    if len(frequency) < 18:
+    if len(frequency) < _FEWEST:
         raise InputRejected("T08", f"{len(frequency)} frequencies are too few for a mode",
                             remedy="record longer, or ask for a finer resolution or a wider band")
     known = known_part(s, integrators, hold)
@@ -169,7 +168,7 @@ def _descend(data: _Data, start: Rational, freedom: float, steps: int = _STEPS, 
                 step = np.linalg.solve(matrix + damping * np.eye(len(p)), gradient / scale) / scale
                 tried, its_slope = _residual(data, p - step, start.zeros)
                 its_cost, its_w = _cost(tried, freedom)
-                if its_cost < cost:
+                if its_cost < cost and abs(step[0]) < _LEAP:
                     p, rest, slope, cost, w, damping = p - step, tried, its_slope, its_cost, its_w, max(damping / 10.0, 1e-12)
                     break
                 damping *= 4.0
@@ -196,6 +195,8 @@ def _judged(data: _Data, model: Rational) -> Rational:
     free[1] = data.with_delay
     misfit = float((w * np.abs(rest) ** 2).sum()) / max(2.0 * len(data.s) - float(free.sum()), 1.0)
     normal = _normal(slope[free], w)
+    if not np.isfinite(normal).all():
+        return model  # poles on a measured frequency, or beyond all numbers: no description is longer
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / scale / scale[:, None], rcond=1e-14, hermitian=True) / scale / scale[:, None]
     wider = data.correlated * max(misfit, 1.0) * (1.0 if data.freedom == np.inf else 1.0 + 2.0 / data.freedom)

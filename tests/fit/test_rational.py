@@ -159,3 +159,24 @@ def test_too_little_to_fit_is_said() -> None:
         with pytest.raises(InputRejected) as refused:
             fit_rational(frequency, response, variance)
         assert refused.value.code == f"RRID-{code}"
+
+
+@pytest.mark.parametrize("kind", ["noise", "exact ones", "hardly damped", "wandering", "late, with holes"])
+def test_any_response_ends_in_finite_numbers(kind: str) -> None:
+    """Noise, constants, poles next to a bin, bins that are unknown: no warning, and every number with its deviation."""
+    rng = np.random.default_rng(9)
+    f = np.sort(rng.uniform(0.5, 300.0, 120))
+    noise = rng.standard_normal(120) + 1j * rng.standard_normal(120)
+    response, variance = {
+        "noise": (noise, np.full(120, 1e-30)), "exact ones": (np.ones(120) + 0j, np.zeros(120)),
+        "hardly damped": (1.0 / (1.0 - (f / 50.0) ** 2 + 2e-5j * f), np.full(120, 1e-8)),
+        "wandering": (np.cumsum(noise), 10.0 ** rng.uniform(-8.0, 3.0, 120)),
+        "late, with holes": (np.where(np.arange(120) % 7 == 0, np.nan, np.exp(-0.2j * f) * (1.0 + 0.2 * noise)),
+                             np.full(120, 0.04)),
+    }[kind]
+    found = fit_rational(f, response, variance, hold=T, integrators=1, freedom=5.0, correlated=3.0)
+    numbers = [n for k in (found.low, found.high, found.delay, *(x for m in found.modes() for x in (m.frequency, m.damping)))
+               for n in (k.value, k.std)]
+    assert np.isfinite(numbers).all()
+    assert np.isfinite(found.response(f)).all()
+    assert np.isfinite(found.covariance).all()
