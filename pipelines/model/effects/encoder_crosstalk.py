@@ -20,7 +20,7 @@ class EncoderCrosstalk(Effect):
     To first order τ = c P_j(-q_i). Exactly: c q_i taken off q_j, and so with speed and acceleration.
     """
 
-    from_joint: int = 1  # i
+    from_joint: float = 0.0  # i, 1-based
 
     name = "encoder_crosstalk"
     title = "Encoder that follows another joint"
@@ -38,16 +38,18 @@ class EncoderCrosstalk(Effect):
     def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
         return super().everywhere(n_joints) if n_joints > 1 else ()
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.from_joint and self.joint is not None:
+            object.__setattr__(self, "from_joint", float(self.joint - 1 or 2))
+
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return perturbed_torque(arm.torque, motion, self._index, *self._error(motion))[..., None]
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for other in range(1, arm.n_joints + 1):
             if other != self.joint:
-                yield replace(self, from_joint=other)
-
-    def at(self, values: Values) -> Self:
-        return replace(self, from_joint=round(values["from_joint"]))
+                yield replace(self, from_joint=float(other))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         true, c = motion, values["coefficient"]
@@ -57,7 +59,7 @@ class EncoderCrosstalk(Effect):
         return predict(true, arm) if predict is not None else arm.torque(true)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        c, other = values["coefficient"], self.at(values)._other(arm.n_joints)
+        c, other = values["coefficient"], int(values["from_joint"]) - 1
 
         def sensor(q: Array, _: Array) -> Array:
             seen = q.copy()
@@ -73,9 +75,5 @@ class EncoderCrosstalk(Effect):
 
     def _error(self, motion: Motion) -> tuple[Array, Array, Array]:
         """-q_i and its derivatives."""
-        other = self._other(motion.q.shape[1])
+        other = int(self.from_joint) - 1
         return -motion.q[:, other], -motion.dq[:, other], -motion.ddq[:, other]
-
-    def _other(self, n_joints: int) -> int:
-        """Column of the other joint; on an arm that has no such joint the last one's."""
-        return min(self.from_joint, n_joints) - 1

@@ -59,10 +59,10 @@ class TimeDelay(Effect):
         return shifted(motion, self._index, x - q, v - dq, a - ddq)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        """The encoder reads from a record of past positions and speeds; the first state is a clock.
+        """The encoder reads from a record of past positions and speeds.
 
-        States: the time, then t, q, q̇ of each kept sample, the newest first. Between the newest and now, whose speed an
-        encoder does not know, a parabola.
+        States: t and q now, then t, q, q̇ of each kept sample, the newest first. Between the newest and now, whose speed an
+        encoder does not know, a parabola. What other sensors add stays.
         """
         j, delay = self._index, values["delay"]
         if not delay:
@@ -77,25 +77,25 @@ class TimeDelay(Effect):
             """Before the first sample it moved on evenly."""
             ago = np.arange(1, _ROWS + 1) * delay * _CLOSEST
             rows = [np.stack([motion.t - back, motion.q[:, j] - back * motion.dq[:, j], motion.dq[:, j]], axis=-1) for back in ago]
-            return np.concatenate([motion.t[:, None], *rows], axis=1)
+            return np.concatenate([motion.t[:, None], motion.q[:, [j]], *rows], axis=1)
 
         def update(motion: Motion, command: Array, states: Array) -> Array:
-            if motion.t[0] - states[0, 1] < 0.999 * _CLOSEST * delay:
+            if motion.t[0] - states[0, 2] < 0.999 * _CLOSEST * delay:
                 return states
             now = np.stack([motion.t, motion.q[:, j], motion.dq[:, j]], axis=-1)
-            return np.concatenate([states[:, :1], now, states[:, 1:-3]], axis=1)
+            return np.concatenate([states[:, :2], now, states[:, 2:-3]], axis=1)
 
         def rate(motion: Motion, command: Array, states: Array) -> Array:
             running = np.zeros_like(states)
-            running[:, 0] = 1.0
+            running[:, 0], running[:, 1] = 1.0, motion.dq[:, j]
             return running
 
         def sensor(q: Array, states: Array) -> Array:
             seen = q.copy()
-            seen[:, j] = _read(states, q[:, j], delay)
+            seen[:, j] += _read(states, delay) - states[:, 1]
             return seen
 
-        return Hooks(sensor=sensor, states=1 + 3 * _ROWS, settled=settled, start=start, rate=rate, update=update)
+        return Hooks(sensor=sensor, states=2 + 3 * _ROWS, settled=settled, start=start, rate=rate, update=update)
 
 
 def _cubic(t: Array, x: Array, slope: Array, k: Indices, at: Array) -> Array:
@@ -108,12 +108,13 @@ def _cubic(t: Array, x: Array, slope: Array, k: Indices, at: Array) -> Array:
                       + u * u * (3 - 2 * u) * x[k + 1] - u * u * (1 - u) * h * slope[k + 1])
 
 
-def _read(states: Array, q: Array, delay: float) -> Array:
+def _read(states: Array, delay: float) -> Array:
     """The position (replicas,) that is `delay` old; all replicas share one clock."""
-    t, x, v = states[:, 1::3].T[::-1], states[:, 2::3].T[::-1], states[:, 3::3].T[::-1]  # (rows, replicas), the oldest first
-    wanted = float(states[0, 0]) - delay
+    now, q = states[:, 0], states[:, 1]
+    t, x, v = (states[:, k::3].T[::-1] for k in (2, 3, 4))  # (rows, replicas), the oldest first
+    wanted = float(now[0]) - delay
     k = int(np.searchsorted(t[:, 0], wanted, side="right")) - 1
     if k < len(t) - 1:
         return np.asarray(_cubic(t[:, 0], x, v, np.array([max(k, 0)]), np.array([wanted]))[0])
-    since, back = wanted - t[-1], states[:, 0] - t[-1]
+    since, back = wanted - t[-1], now - t[-1]
     return np.asarray(x[-1] + since * v[-1] + (since / back) ** 2 * (q - x[-1] - back * v[-1]) if back[0] > 0.0 else q)

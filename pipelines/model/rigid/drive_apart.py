@@ -2,9 +2,9 @@
 
     J_m θ̈ = τ - τ_friction(θ̇) - τ_passed(θ - q, θ̇ - q̇)
 
-The arm that is simulated is the links, q; angle θ and speed θ̇ of the drive are two memories. Encoder and friction sit on the
-drive. Its inertia is that of a geared rotor: it feels its own joint's acceleration, not that of the joints before it, which a
-disc of J_m on a parallel axis would feel too. All arrays have replicas first.
+The arm that is simulated is the links, q; the angle θ - q by which the drive is ahead and its speed θ̇ are two memories. Encoder
+and friction sit on the drive. Its inertia is that of a geared rotor: it feels its own joint's acceleration, not that of the
+joints before it, which a disc of J_m on a parallel axis would feel too. All arrays have replicas first.
 """
 
 from __future__ import annotations
@@ -38,16 +38,17 @@ class DriveApart:
     def actuator(self, command: Array, motion: Motion, states: Array) -> Array:
         """What reaches the link: friction is given back that the plant will take off at the link's speed."""
         reached, speed = command.copy(), motion.dq[:, self.index]
-        reached[:, self.index] = self.passed(*self._apart(motion, states)) + self.friction(motion, speed)
+        reached[:, self.index] = self.passed(states[:, 0], states[:, 1] - speed) + self.friction(motion, speed)
         return reached
 
     def rate(self, motion: Motion, command: Array, states: Array) -> Array:
-        left = command[:, self.index] - self.friction(motion, states[:, 1]) - self.passed(*self._apart(motion, states))
-        return np.stack([states[:, 1], left / self.inertia], axis=-1)
+        ahead = states[:, 1] - motion.dq[:, self.index]
+        left = command[:, self.index] - self.friction(motion, states[:, 1]) - self.passed(states[:, 0], ahead)
+        return np.stack([ahead, left / self.inertia], axis=-1)
 
     def sensor(self, q: Array, states: Array) -> Array:
         seen = q.copy()
-        seen[:, self.index] = states[:, 0]
+        seen[:, self.index] += states[:, 0]
         return seen
 
     def settled(self, motion: Motion, tau: Array) -> Array:
@@ -57,7 +58,4 @@ class DriveApart:
         return q
 
     def start(self, motion: Motion, tau: Array) -> Array:
-        return np.stack([motion.q[:, self.index] + self.ahead(tau[:, self.index]), motion.dq[:, self.index]], axis=-1)
-
-    def _apart(self, motion: Motion, states: Array) -> tuple[Array, Array]:
-        return states[:, 0] - motion.q[:, self.index], states[:, 1] - motion.dq[:, self.index]
+        return np.stack([self.ahead(tau[:, self.index]), motion.dq[:, self.index]], axis=-1)
