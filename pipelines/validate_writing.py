@@ -180,7 +180,7 @@ def _drawn_from(arm: Arm) -> str:
         return "the covariance of the fit"
     if any(p.std for p in arm.base):
         return "the standard deviations of the model file's base parameters, as if independent"
-    return "nothing, for the model file states no uncertainty: they equal the plant's, and case 6 errs by what is replayed alone"
+    return ""
 
 
 def _refuse_strange(settings: Settings) -> None:

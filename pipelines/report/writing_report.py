@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -45,7 +46,7 @@ def _verdict(result: Result) -> str:
         kind = "writing" if torque.of == "writing" else "held-out"
         holds = "The model holds on" if result.gates.torque else "The model does not hold on"
         said.append(f"{holds} {'the' if count == 1 else count} {kind} log{'s' * (count > 1)} it was not fitted to: it misses "
-                    f"{_percents(torque.relative_error)} of their torque, joint by joint (gate: "
+                    f"{_percents(torque.relative_error)} of {'its' if count == 1 else 'their'} torque, joint by joint (gate: "
                     f"{format_number(100 * result.gates.torque_limit, 3)} %)")
     by = {one.case: one for one in result.cases}
     if {1, 6} <= set(by):
@@ -154,8 +155,10 @@ def _cases_section(result: Result) -> Section:
     if any(one.origin == "simulated" for one in result.cases):
         base = next(one.logs[0] for one in result.cases if one.origin == "simulated")
         text.append(f"Simulated: on the controller of {base}. The plant is the model plus what it left of the torque of that log, "
-                    f"replayed over time; the controller ran on {result.draws} other models in turn, drawn from {result.drawn}. "
-                    "± is the spread over them.")
+                    "replayed over time. " + (
+                        f"The controller ran on {result.draws} other models in turn, drawn from {result.drawn}; ± is the spread "
+                        "over them." if result.drawn else "The controller ran on the plant's model, for the model file states no "
+                        "uncertainty: case 6 errs by what is replayed alone, and would err by more on the arm."))
     if not result.cases:
         return Section("Control cases: the second validation", tuple(text))
     first = next((one for one in result.cases if one.case == 1), None)
@@ -177,7 +180,8 @@ def _cases_section(result: Result) -> Section:
 
 
 def _with_spread(value: float, spread: float | None) -> str:
-    shown = format_number(1e3 * value, 3)
+    decimals = 2 - math.floor(math.log10(1e3 * value)) if value > 0.0 else 0
+    shown = f"{1e3 * value:.{max(0, decimals)}f}"
     return shown if spread is None or 1e3 * spread < 5e-5 else f"{shown} ± {format_number(1e3 * spread, 1)}"
 
 

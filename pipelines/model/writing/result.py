@@ -61,7 +61,7 @@ class Result:
     logs: tuple[FirstValidation, ...]
     cases: tuple[Case, ...]
     cases_left_out: str  # why some or all of them are missing, in words
-    drawn: str  # what the controllers' models of simulated cases were drawn from, in words
+    drawn: str  # what the controllers' models of simulated cases were drawn from, in words; empty: nothing
     draws: int
     simulation: SimulationError | None
     simulation_left_out: str
