@@ -24,7 +24,7 @@ from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 __all__ = ["STAGE", "STEPS", "Group", "Result", "Settings", "Step", "compute", "report"]
 
 # Modules of the stages, in the order they are run.
-STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing")
+STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing", "frf")
 
 _WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
 

@@ -23,11 +23,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Outcome[ru
 
 
 def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result]) -> None:
-    """inspect, fit-friction, reconstruct, estimate-bps, validate-writing; each with its result and a folder of its name."""
+    """inspect, fit-friction, reconstruct, estimate-bps, validate-writing; each with its result and folder; no frf logs."""
     stages = json.loads((whole.folder / "result.json").read_text())["stages"]
     assert [(stage["name"], stage["exit"]) for stage in stages] == [
         ("inspect", 0), ("fit-friction", 0), ("reconstruct", 0), ("estimate-bps", 0),
-        ("validate-writing", 0)]
+        ("validate-writing", 0), ("frf", 5)]
     assert {p.name for p in (whole.folder / "reconstruct/logs").iterdir()} == {p.name for p in (
         whole.folder / "estimate-bps/logs").iterdir()} | {f"{n}.h5" for n in ("friction-1", "friction-2", "friction-3", "hold-1")}
     assert (whole.folder / "estimate-bps/model.json").is_file()

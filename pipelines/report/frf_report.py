@@ -82,7 +82,7 @@ _UNITS = {"stiffness": "N m/rad", "damping": "N m s/rad", "motor_inertia": "kg m
 
 def _numbers(parameters: Mapping[str, Known]) -> str:
     return "; ".join(f"{name.replace('_', ' ')} {with_std(v.value, v.std)} {_UNITS.get(name, '')}".strip()
-                     for name, v in parameters.items() if name not in ("frequency", "damping_ratio"))
+                     for name, v in sorted(parameters.items()) if name not in ("frequency", "damping_ratio"))
 
 
 def _grouping(sure: Sequence[Classified], unsure: Sequence[Undecided]) -> Section:
@@ -176,7 +176,8 @@ def _beside(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method]]
     warning = (f"The direct method is biased, though its coherence looks fine: {'; '.join(wrong)}. A disturbance goes round the "
                "loop, and input to position then tends to minus the inverse of the controller." if wrong else "")
     columns = ("joint", "posture", "method", "beyond noise off the default, at most [%]", "at [Hz]", "coherence under 0.7 [Hz]")
-    table = Table(columns, tuple(rows), "Largest difference from the default where both are reliable.", tuple(tones))
+    table = Table(columns, tuple(rows), "Largest difference from the default where the method's own coherence is 0.7 or more.",
+                  tuple(tones))
     tables = [table, *_continuous(postures)]
     text = ("Default: cross spectra of the excitation with position and with input. No disturbance biases their quotient, and it "
             "needs no controller. Indirect: by the sensitivity, eq. (29), with the controller as it was sampled. Direct: input to "
@@ -191,7 +192,8 @@ def _bands(method: Method) -> str:
 
 
 def _continuous(postures: Iterable[Posture]) -> list[Table]:
-    rows = [(p.joint, posture_words(p.posture, p.joint), ", ".join(f"{100.0 * e:.3g} % at {f} Hz" for f, e in p.continuous.items()))
+    rows = [(p.joint, posture_words(p.posture, p.joint),
+             ", ".join(f"{100.0 * p.continuous[f]:.3g} % at {f} Hz" for f in sorted(p.continuous, key=float)))
             for p in postures if p.continuous]
     if not rows:
         return []

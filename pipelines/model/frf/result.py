@@ -146,15 +146,15 @@ def _mode(mode: Mode) -> ModeFound:
 
 
 def difference(default: FrequencyResponse, other: FrequencyResponse) -> tuple[float | None, float | None]:
-    """Largest share by which `other` is off beyond what noise explains, where both say they are reliable, and the frequency."""
+    """Largest share by which `other` is off beyond what noise explains, where its coherence looks fine, and the frequency."""
     k = np.searchsorted(default.frequency, other.frequency)
     k = np.minimum(k, len(default.frequency) - 1)
     same = np.abs(default.frequency[k] - other.frequency) < 0.25 * default.resolution
-    good = same & (default.coherence[k] >= COHERENCE) & (other.coherence >= COHERENCE)
+    good = same & (other.coherence >= COHERENCE)
     if not good.any():
         return None, None
     base, size = default.response[k], np.abs(default.response[k])
-    noise = 3.0 * np.sqrt(default.variance[k] + other.variance)
+    noise = 3.0 * np.sqrt(np.maximum(default.variance[k], 0.0) + np.maximum(other.variance, 0.0))
     off = np.where(good, np.maximum(np.abs(other.response - base) - noise, 0.0) / np.maximum(size, 1e-300), 0.0)
     worst = int(np.argmax(off))
     return float(off[worst]), float(other.frequency[worst])
