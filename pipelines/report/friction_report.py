@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from pipelines.model.effects import find_effect
+from pipelines.model.friction.break_away import REST, WITHIN
+from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.result import JointResult, Result, Value
 from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
 from pipelines.report.report import Report, Section, Table, Tone
@@ -11,6 +16,7 @@ from pipelines.report.style import format_number, with_std
 __all__ = ["friction_report"]
 
 _GOOD = 0.05  # of the speed error without friction: what the law has to leave
+_THIN = 0.01  # of the curve: a narrower band is hidden by the line
 
 
 def friction_report(result: Result) -> Report:
@@ -19,6 +25,9 @@ def friction_report(result: Result) -> Report:
     if result.checks:
         sections.append(Section("What the logs say of themselves", (), (checks_table(result.checks),)))
     return Report("Friction", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
+
+
+_GRAVITY = {"sine": "c in c sin q + c' cos q", "cosine": "c' in c sin q + c' cos q", "constant": "weight along the axis"}
 
 
 def _ratio(joint: JointResult) -> float | None:
@@ -49,10 +58,12 @@ def _tone(result: Result) -> Tone:
 
 
 def _verdict(result: Result) -> str:
-    laws = "; ".join(f"{joint.name}: {_plain(joint.law)}" for joint in result.joints)
+    laws = ". ".join(_law_and_errors(joint) for joint in result.joints)
     poor = [joint.name for joint in result.joints if not _well(joint)]
     open_ = [joint.name for joint in result.joints if joint.unseen]
-    words = f"{laws[:1].upper()}{laws[1:]}."
+    words = f"{laws}."
+    if any(joint.validation.by and not joint.validation.held_out for joint in result.joints):
+        words += " Simulated were logs that were fitted too, for none has role validate."
     if gates := [check.message for check in result.checks if check.gate]:
         words = f"{gates[0][:1].upper()}{gates[0][1:]}. {words}"
     if poor:
@@ -62,8 +73,38 @@ def _verdict(result: Result) -> str:
     return words
 
 
+def _law_and_errors(joint: JointResult) -> str:
+    """The law, and how far the simulated speed is off with it and without."""
+    judged = joint.validation
+    words = f"{joint.name[:1].upper()}{joint.name[1:]}: {_plain(joint.law)}"
+    if not judged.by:
+        return words
+    with_, without = (_error(value) for value in (judged.velocity_error_with, judged.velocity_error_without))
+    return f"{words}, simulated speed off by {with_} {_speed_unit(joint)} rms ({without} without friction)"
+
+
+def _error(value: float | None) -> str:
+    return "no end" if value is None else format_number(value, 3)
+
+
+def _speed_unit(joint: JointResult) -> str:
+    return "rad/s" if joint.inertia.unit == "kg m^2" else "m/s"
+
+
 def _plain(law: str) -> str:
-    return law.replace("_", " ").replace("+", " + ")
+    return law.replace("three_sigmoid", "three sigmoids").replace("stribeck", "Stribeck").replace("_", " ").replace("+", " + ")
+
+
+def _meaning(joint: JointResult, name: str) -> str:
+    """What a number of the joint's law stands for."""
+    law = law_named(joint.law)
+    members = joint.law.split("+") if law is None else law.members
+    effect, _, quantity = name.rpartition(".")
+    for member in (effect,) if effect else members:
+        for known in find_effect(member).parameters:
+            if known.name == quantity:
+                return known.meaning
+    return ""
 
 
 def _key_figures(result: Result) -> Table:
@@ -80,23 +121,29 @@ def _key_figures(result: Result) -> Table:
 def _summary(result: Result) -> Section:
     """Table III, which the print of the paper has lost."""
     names = sorted({name for joint in result.joints for name in joint.parameters})
-    rows = []
+    rows, meanings = [], []
     for name in names:
         having = [joint.parameters.get(name) for joint in result.joints]
-        unit = next(value.unit for value in having if value is not None)
-        rows.append((name, *(None if value is None else with_std(value.value, value.std) for value in having), unit))
-    rows.append(("J", *(with_std(joint.inertia.value, joint.inertia.std) for joint in result.joints), "kg m^2"))
+        first = next(joint for joint in result.joints if name in joint.parameters)
+        rows.append((name, *(None if value is None else with_std(value.value, value.std) for value in having),
+                     first.parameters[name].unit))
+        meanings.append((name, _meaning(first, name)))
+    rows.append(("J", *(with_std(joint.inertia.value, joint.inertia.std) for joint in result.joints),
+                 result.joints[0].inertia.unit if result.joints else ""))
+    meanings.append(("J", "inertia about the joint, the others held"))
     for name in dict.fromkeys(key for joint in result.joints for key, _ in _gravity(joint)):
         found = [joint.gravity.get(name) for joint in result.joints]
-        rows.append((f"gravity, {name}", *(None if v is None else with_std(v.value, v.std) for v in found), "N m"))
+        unit = next(value.unit for value in found if value is not None)
+        rows.append((f"gravity, {name}", *(None if v is None else with_std(v.value, v.std) for v in found), unit))
+        meanings.append((f"gravity, {name}", _GRAVITY[name]))
     text = ("Compare curves, not labels: several sets of numbers give one curve.",)
     table = Table(("parameter", *(joint.name for joint in result.joints), "unit"), tuple(rows), "Table III: value ± std.")
-    return Section("Parameters", text, (table,))
+    return Section("Parameters", text, (table, Table(("parameter", "what it is"), tuple(meanings))))
 
 
 def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
     revolute = joint.inertia.unit == "kg m^2"
-    curve = curve_figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law with its band; the points pair torques at equal "
+    curve = curve_figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law, {_band(joint)}; the points pair torques at equal "
                          "position and opposite speed and know of no law.", joint.series, revolute)
     parts = fraction_figure(f"fractions-{joint.joint}", f"{joint.name}: torque of {joint.validation.by} and its fractions in the "
                             "simulation (Fig. 5).", joint.series, revolute)
@@ -107,14 +154,32 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
             Section(f"{joint.name}: choice of the law", _ladder_words(joint), (_ladder(joint),)))
 
 
+def _band(joint: JointResult) -> str:
+    """In words how wide the band about the curve is."""
+    width, height = 2.0 * float(np.max(joint.series.band)), float(np.max(np.abs(joint.series.curve)))
+    unit = "N m" if joint.inertia.unit == "kg m^2" else "N"
+    if not np.isfinite(width) or height <= 0.0:
+        return "its band is not known"
+    hidden = ", narrower than the line" if width < _THIN * height else ""
+    return f"± 2 std shaded: at most ± {format_number(width, 2)} {unit}{hidden}"
+
+
 def _words(joint: JointResult) -> tuple[str, ...]:
     slowest, fastest = joint.driven
-    unit = "rad/s" if joint.inertia.unit == "kg m^2" else "m/s"
+    unit = _speed_unit(joint)
     words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}; logs: {', '.join(joint.logs)}."]
     if joint.held is not None:
         low, high = joint.held
         words.append(f"At rest friction carried from {format_number(low, 3)} to {format_number(high, 3)} N m.")
+    if joint.validation.by and (never := _never_broke_away(joint)):
+        words.append(f"No break-away torque {' or '.join(never)} is given: nowhere in these logs does the joint rest for {REST:g} "
+                     f"s and then run that way within {WITHIN:g} s. A slow ramp of torque from rest shows it.")
     return tuple(words)
+
+
+def _never_broke_away(joint: JointResult) -> list[str]:
+    seen = {event.direction for event in joint.break_away}
+    return [words for side, words in ((1, "forth"), (-1, "back")) if side not in seen]
 
 
 def _tables(joint: JointResult) -> tuple[Table, ...]:
@@ -131,11 +196,10 @@ def _tables(joint: JointResult) -> tuple[Table, ...]:
 
 def _simulation_words(joint: JointResult) -> tuple[str, ...]:
     judged = joint.validation
-    with_, without = judged.velocity_error_with, judged.velocity_error_without
     log = f"{judged.by}, {'which was held out' if judged.held_out else 'which was fitted too, for no log has role validate'}"
-    errors = [format_number(value, 3) if value is not None else "no end" for value in (with_, without)]
-    return (f"Simulated from its first sample under the torque of {log}: the speed is off by {errors[0]} rad/s rms with friction, "
-            f"by {errors[1]} rad/s without.",)
+    errors, unit = [_error(value) for value in (judged.velocity_error_with, judged.velocity_error_without)], _speed_unit(joint)
+    return (f"Simulated from its first sample under the torque of {log}: the speed is off by {errors[0]} {unit} rms with friction, "
+            f"by {errors[1]} {unit} without.",)
 
 
 def _ladder_words(joint: JointResult) -> tuple[str, ...]:

@@ -17,12 +17,12 @@ from pipelines.model.friction.one_joint import gravity_columns
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array
 
-__all__ = ["BreakAway", "break_away", "held_at_least"]
+__all__ = ["REST", "WITHIN", "BreakAway", "break_away", "held_at_least"]
 
 _CREEP = 5e-3  # of the fastest speed
-_REST = 0.1  # [s] rest before a break-away
+REST = 0.1  # [s] rest before a break-away
 _RUNS = 5.0  # times the creeping speed: the joint runs
-_WITHIN = 1.0  # [s] from creeping to running, or it was no break-away
+WITHIN = 1.0  # [s] from creeping to running, or it was no break-away
 _SMOOTH = 0.01  # [s] mean over which torque is taken
 
 
@@ -69,13 +69,13 @@ def _events(stretch: Stretch, creep: float, step: float) -> list[tuple[int, int,
     edges = np.flatnonzero(np.diff(slow.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     found = []
     for begin, end in edges.tolist():
-        if (end - begin) * step < _REST or end >= len(slow):
+        if (end - begin) * step < REST or end >= len(slow):
             continue
-        ahead = np.abs(stretch.dq[end:end + round(_WITHIN / step)])
+        ahead = np.abs(stretch.dq[end:end + round(WITHIN / step)])
         runs = np.flatnonzero(ahead > _RUNS * creep)
         again = np.flatnonzero(ahead < creep)
         if runs.size and not (again.size and again[0] < runs[0]) and not stretch.spoilt[begin:end + runs[0]].any():
-            found.append((int(np.sign(stretch.dq[end + runs[0]])), max(begin, end - round(_WITHIN / step)), end + int(runs[0])))
+            found.append((int(np.sign(stretch.dq[end + runs[0]])), max(begin, end - round(WITHIN / step)), end + int(runs[0])))
     return found
 
 

@@ -17,6 +17,7 @@ __all__ = ["fit_law", "roughly", "takes_power"]
 
 _SCANNED = 120  # rows that a scan for starts looks at
 _STARTS = 4
+_BRIEF = 10  # steps on those rows, before all rows are looked at
 _AT_ONCE = 64  # starts: memory
 _OTHERS = 8
 _ROUGH = 240  # rows of a rough fit
@@ -75,12 +76,12 @@ def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableF
 
 def _other(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: Sequence[Array], found: SeparableFit) -> SeparableFit:
     """The best of other local optima whose curve takes power; `found` where there is none."""
-    problem = equations.problem(law, arms)
+    whole, few = equations.problem(law, arms), equations.thinned(_ROUGH).problem(law, arms)
     grid = list(starts) if len(starts) > 1 else list(law.starts(equations.nodes, arms[0]))
     ranked = _ranked(equations.thinned(_SCANNED), law, arms, grid)[:_OTHERS]
-    ends = sorted((search(problem, theta) for theta in ranked), key=lambda end: end[1].rss)
+    ends = sorted((search(few, theta) for theta in ranked), key=lambda end: end[1].rss)
     for theta, _ in ends:
-        one = fit_separable(problem, [theta])
+        one = fit_separable(whole, [theta])
         if takes_power(equations, law, arms[0], one):
             return one
     return found
@@ -91,7 +92,7 @@ def _best_of(equations: Equations, law: Law, arms: Sequence[OneJoint], starts: S
     few = equations.thinned(_SCANNED)
     problem = few.problem(law, arms)
     grid = _ranked(few, law, arms, starts)[:_STARTS]
-    ends = sorted((search(problem, theta) for theta in grid), key=lambda end: end[1].rss)
+    ends = sorted((search(problem, theta, _BRIEF) for theta in grid), key=lambda end: end[1].rss)
     return [theta for theta, _ in ends[:1]]
 
 
