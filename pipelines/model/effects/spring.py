@@ -18,7 +18,9 @@ __all__ = ["Spring"]
 class Spring(Effect):
     """τ = k x + b x² + c x³, x = q - q0: a polynomial in q, whose coefficients are the amplitudes.
 
-    A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its linear part is q0.
+    A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its linear part is q0. Where gravity
+    acts on the joint, the fit of its weight takes much of the polynomial: k, of either sign then, and q0 are known poorly. With
+    b = 0 the fit was no better known, and not linear: it ended elsewhere.
     """
 
     degree: int = 3
@@ -26,8 +28,8 @@ class Spring(Effect):
     name = "spring"
     title = "Spring"
     parameters = (
-        Quantity("stiffness", "N m/rad", 0.0, 1e4, "at rest"),
-        Quantity("rest_angle", "rad", -10.0, 10.0, "where it does not pull"),
+        Quantity("stiffness", "N m/rad", -1e4, 1e4, "at rest"),
+        Quantity("rest_angle", "rad", -20.0, 20.0, "where it does not pull"),
         Quantity("curvature", "N m/rad^2", -1e4, 1e4, "b: how much stiffer it is on one side"),
         Quantity("hardening", "N m/rad^3", -1e4, 1e4, "c: how much stiffer it is far out"),
     )
