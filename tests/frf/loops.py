@@ -44,6 +44,7 @@ class Loop:
     seconds: float = 40.0
     period: int | None = 2000  # [samples] of v; None: random
     encoder: float = 1e-6  # [rad]
+    late: int = 0  # samples by which the measured position is late
     seed: int = 1
 
     def response(self, frequency: Array) -> Array:
@@ -55,7 +56,8 @@ class Loop:
         """q per input in powers of z^-1."""
         scale = self.inertia if self.law == "computed-torque" else 1.0
         numerator, denominator, _ = cont2discrete((scale * self.plant[0], self.plant[1]), T, method="zoh")
-        return np.atleast_1d(np.squeeze(numerator)), np.asarray(denominator)
+        zeros = np.zeros(self.late)
+        return np.concatenate([zeros, np.atleast_1d(np.squeeze(numerator))]), np.concatenate([np.asarray(denominator), zeros])
 
     def log(self, **changed: object) -> ExperimentLog:
         """What a recorder would have written."""

@@ -70,6 +70,15 @@ def test_a_strong_disturbance_misleads_the_direct_method_alone() -> None:
     assert np.mean(off**2) < 1.3  # no more than its variance says: no bias
 
 
+@pytest.mark.parametrize("late", [0, 1, 5])
+def test_a_delay_is_a_delay(late: int) -> None:
+    """Whole samples, also so many that the phase turns round in the band; none is rigid."""
+    found = frf_findings([Loop(rigid(1.0), late=late).log()])
+    (one,) = found.classification
+    assert one.kind == ("delay" if late else "rigid")
+    assert found.seen[0].modes.delay.value == pytest.approx(late * 1e-3, abs=2e-5)
+
+
 def test_modes_of_a_link_on_a_spring() -> None:
     """Frequencies within 0.1 %, damping within 3 %, inertia and level of the rigid body within 1 %."""
     found = frf_findings([LINK.log()])

@@ -30,6 +30,7 @@ _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
+_LONGEST = 0.05  # [s] no delay is longer
 _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
 
 
@@ -120,16 +121,21 @@ def _level_and_delay(rest: FrequencyResponse) -> tuple[Known, Known]:
     weight, omega = 1.0 / relative[good], 2.0 * np.pi * part.frequency[good]
     if good.sum() < _FEWEST:
         return Known(float(np.median(np.abs(rest.response))), np.inf), Known(0.0, np.inf)
-    size, phase = np.log(np.abs(part.response[good])), np.angle(part.response[good] * np.exp(-1j * _turn(part.response[good])))
+    rough = _rough_delay(part.response[good], weight, omega)
+    straight = part.response[good] * np.exp(1j * omega * rough)
+    size, phase = np.log(np.abs(straight)), np.angle(straight / np.sum(weight * straight / np.abs(straight)))
     level, level_std = _weighted(np.ones((len(size), 1)), size, weight, part.correlated)
+    phase += float(np.angle(np.sum(weight * straight / np.abs(straight))))
     slope, slope_std = _weighted(np.column_stack([-omega, 1.0 / omega]), phase, weight, part.correlated)
     value = float(np.exp(level[0]))
-    return Known(value, value * float(level_std[0])), Known(float(slope[0]), float(slope_std[0]))
+    return Known(value, value * float(level_std[0])), Known(rough + float(slope[0]), float(slope_std[0]))
 
 
-def _turn(response: Complex) -> float:
-    """Half a turn where the response is of the other sign: it is taken off before phases are compared."""
-    return 0.0 if float(np.median(np.real(response))) >= 0.0 else float(np.pi)
+def _rough_delay(response: Complex, weight: Array, omega: Array) -> float:
+    """The delay [s] that lays all phases on zero best: no phase has to be unwrapped then."""
+    tried = np.arange(-_LONGEST, _LONGEST, 0.5 / float(omega.max()))
+    unit = weight * response / np.abs(response)
+    return float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ unit).real)])
 
 
 def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tuple[Array, Array]:
