@@ -61,7 +61,7 @@ def _said(one: Classified) -> str:
     if one.kind == "delay":
         return f"Joint {one.joint} is measured {format_number(1e3 * one.parameters['delay'].value, 3)} ms late."
     at = f"{with_std(one.frequency.value, one.frequency.std)} Hz" if one.frequency else "an unknown frequency"
-    return f"The base gives way at {at}." if one.kind == "base" else f"Joint {one.joint} gives way at {at} (antiresonance)."
+    return f"The base gives way at {at}." if one.kind == "base" else f"Joint {one.joint} gives way at {at}, its motor locked."
 
 
 def _key_figures(sure: Sequence[Classified]) -> Table | None:
