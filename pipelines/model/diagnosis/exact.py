@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.nominal import Fit, law_rows, law_slopes, nominal
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 
-__all__ = ["Exact", "Named", "Refined", "refine"]
+__all__ = ["Exact", "Named", "Refined", "number_moved", "refine"]
 
 _STEPS, _HALVES = 8, 5
 _GAIN = 1e-5  # of the squared residual: less is no progress
@@ -111,7 +111,7 @@ class Exact:
             if kind == 0:
                 laws[place] = _shape_moved(laws[place], name, by)
             else:
-                effects[place] = _number_moved(effects[place], name, by)
+                effects[place] = number_moved(effects[place], name, by)
         return Exact(replace(self.columns, laws=tuple(laws)), self.beta + shift[:first], tuple(effects))
 
 
@@ -124,7 +124,8 @@ def _shape_moved(effect: Effect, name: str, by: float) -> Effect:
     return replace(effect, **shape)
 
 
-def _number_moved(one: Named, name: str, by: float) -> Named:
+def number_moved(one: Named, name: str, by: float) -> Named:
+    """Amplitude number `name`, or the shape of that name, moved: a shape of positive range by its logarithm."""
     if name.isdigit():
         amplitudes = list(one.amplitudes)
         amplitudes[int(name)] += by
@@ -212,7 +213,7 @@ def _slopes(model: Exact, data: Data, rigid: Array, torque: Array) -> tuple[Arra
         for name, step in _steps(one):
             names.append((1, place, name))
             effects = list(model.effects)
-            effects[place] = _number_moved(one, name, step)
+            effects[place] = number_moved(one, name, step)
             more.append((replace(model, effects=tuple(effects)).torque(data) - torque)[None] / step)
     return np.concatenate([rigid, *laws, *more]), names
 

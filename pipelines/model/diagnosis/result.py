@@ -23,8 +23,8 @@ Verdict = Literal["cause", "nothing-wrong", "unknown"]
 class Value:
     """One number of a finding."""
 
-    value: float
-    std: float | None  # None: nobody knows
+    value: float | tuple[float, ...]
+    std: float | tuple[float, ...] | None  # None: nobody knows
     unit: str
 
 

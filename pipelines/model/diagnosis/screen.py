@@ -24,6 +24,7 @@ from pipelines.model.effects.base import Effect
 __all__ = ["Screened", "screen", "screen_family"]
 
 _INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
+_USUAL = 0.25  # of the shapes reach less
 _EVENTS = 3  # residuals that an event is looked for in
 _SPREAD = 1e-4  # of the largest: directions of c⊥ that are left alone
 
@@ -37,6 +38,8 @@ class Screened:
     shape: tuple[Effect, ...]  # the best one for each residual
     visibility: Array  # η of it
     best_visibility: float  # the largest η of any shape
+    reach: float  # what the first of its columns, one unit of it, adds to the residual: √ of the gain, in most shapes or more
+    width: int  # columns of one shape
     logs: tuple[int | None, ...] = ()  # of an event: number of the log it happened in
 
     @property
@@ -57,6 +60,7 @@ def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm, residua
 def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Array | None = None) -> Screened:
     """What happens once: looked for in each log apart, where the residual is largest."""
     wanted = fit.residual[None] if residuals is None else residuals[:_EVENTS]
+    reach, width = [0.0], 0
     best: list[tuple[float, Effect, float, int | None]] = [(0.0, family.shapes[0], 1.0, None)] * len(wanted)
     for k, residual in enumerate(wanted):
         left = list(data.split(residual / fit.weights))
@@ -67,30 +71,34 @@ def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arra
                 continue
             for laid in lay_family(data, replace(family, shapes=shapes), arm):
                 only = data.log_of[laid.rows] == place
-                gains, seen = _gains(replace(laid, table=np.where(only, laid.table, 0.0)), fit, residual[None])
+                gains, seen, size = _gains(replace(laid, table=np.where(only, laid.table, 0.0)), fit, residual[None])
+                reach.append(float(np.median(size)))
+                width = laid.table.shape[1]
                 top = int(np.argmax(gains[:, 0]))
                 if gains[top, 0] > best[k][0]:
                     best[k] = (float(gains[top, 0]), shapes[laid.first + top], float(seen[top]), data.first + place)
     eta = [one[2] for one in best]
     return Screened(family, np.array([one[0] for one in best]), tuple(one[1] for one in best), np.array(eta), max(eta),
-                    tuple(one[3] for one in best))
+                    float(np.median(reach)), width, tuple(one[3] for one in best))
 
 
 def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Array | None = None) -> Screened:
     wanted = fit.residual[None] if residuals is None else residuals
-    gains, visible = [], []
+    gains, visible, reach, width = [], [], [], 0
     for laid in lay_family(data, family, arm):
-        gain, eta = _gains(laid, fit, wanted)
+        gain, eta, size = _gains(laid, fit, wanted)
         gains.append(gain)
+        width = laid.table.shape[1]
         visible.append(eta)
+        reach.append(size)
     gain, eta = np.concatenate(gains), np.concatenate(visible)
     best = np.argmax(gain, axis=0)
     return Screened(family, gain[best, np.arange(gain.shape[1])], tuple(family.shapes[int(k)] for k in best), eta[best],
-                    float(eta.max()))
+                    float(eta.max()), float(np.quantile(np.concatenate(reach), _USUAL)), width)
 
 
-def _gains(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array]:
-    """(shapes, residuals) gains and (shapes,) visibility."""
+def _gains(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array, Array]:
+    """(shapes, residuals) gains; (shapes,) visibility, and size of the first column."""
     shapes, k, _ = laid.table.shape
     c = laid.table * fit.weights[laid.rows]
     flat = c.reshape(shapes * k, -1)
@@ -106,4 +114,4 @@ def _gains(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array]:
     sure = values > lowest
     gain = np.sum(np.where(sure[:, :, None], turned / np.where(sure, values, 1.0)[:, :, None], 0.0), axis=1)
     share = np.sqrt(np.clip(np.einsum("skk->s", unit) / k, 0.0, None))
-    return gain, np.asarray(np.minimum(share, 1.0))
+    return gain, np.asarray(np.minimum(share, 1.0)), np.sqrt(np.maximum(gram[:, 0, 0], 0.0))

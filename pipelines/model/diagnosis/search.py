@@ -27,7 +27,8 @@ from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "held_out", "provisional", "search"]
+__all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "held_out", "held_out_left", "provisional",
+           "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
@@ -61,6 +62,11 @@ class Tried:
     done: Refined
     error: float  # squared weighted, held out
     visibility: float
+
+    @property
+    def possible(self) -> bool:
+        """Whether the cause's numbers lie in their ranges."""
+        return self.done.model.effects[-1].possible
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +156,7 @@ def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
 
 def _fewest(tried: Sequence[Tried], before: float) -> Tried | None:
     """Of those that leave nearly as little as the best, the one with fewest numbers; none where the best leaves no less."""
-    possible = [one for one in tried if one.error < before and one.done.model.effects[-1].possible]
+    possible = [one for one in tried if one.error < before and one.possible]
     if not possible:
         return None
     least = possible[0].error
@@ -207,26 +213,29 @@ def _amplitudes(fit: Fit, table: Array) -> Array:
 
 def held_out(done: Refined, case: Case) -> float:
     """Squared weighted error on what the model was not fitted to."""
-    if case.judge is None:
-        return cross_validated(done, case.blocks)
-    left = case.judge.y - done.model.torque(case.judge)
-    return float(np.sum(np.square(left * done.weight[case.judge.joint])))
+    data = done.data if case.judge is None else case.judge
+    return float(np.sum(np.square(held_out_left(done, case.judge, case.blocks) * done.weight[data.joint])))
 
 
-def cross_validated(done: Refined, blocks: int) -> float:
-    """Every stretch of time explained by the numbers that the rest asks for, to first order around the solution."""
+def held_out_left(done: Refined, judge: Data | None, blocks: int) -> Array:
+    """(rows,) [N m] of the judging logs; of the fitted ones, block by block, where there are none."""
+    return cross_validated(done, blocks) if judge is None else judge.y - done.model.torque(judge)
+
+
+def cross_validated(done: Refined, blocks: int) -> Array:
+    """(rows,) [N m] what is left of every stretch of time by the numbers that the rest asks for, to first order."""
     table, residual = done.slopes * done.weights, done.residual
     size = np.linalg.norm(table, axis=1)
     unit = table / np.where(size > 0.0, size, 1.0)[:, None]
     place = done.data.blocks(blocks)
-    total, gram, moment = 0.0, unit @ unit.T, unit @ residual
+    left, gram, moment = np.empty_like(residual), unit @ unit.T, unit @ residual
     ridge = 1e-9 * np.eye(len(gram))
     for block in range(int(place.max()) + 1):
         held = place == block
         own = unit[:, held]
         shift = np.linalg.solve(gram - own @ own.T + ridge, moment - own @ residual[held])
-        total += float(np.sum(np.square(residual[held] - shift @ own)))
-    return total
+        left[held] = residual[held] - shift @ own
+    return left / done.weights
 
 
 def _reweighted(done: Refined) -> Refined:
@@ -253,7 +262,7 @@ def _ledger(screened: Sequence[Screened], thresholds: Thresholds, tried: Sequenc
             continue
         reason = ("accepted" if accepted else "below its threshold" if one.gain[0] <= thresholds.gain[k] else
                   "weaker than others" if fitted is None else
-                  "impossible numbers" if not fitted.done.model.effects[-1].possible else
+                  "impossible numbers" if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= error else "explains less than the one accepted")
         gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
         rows.append(Trial(number, one.cause, one.joint, float(one.gain[0] / now.rss), float(thresholds.gain[k] / now.rss),

@@ -1,7 +1,7 @@
 """The twin: the fitted model run through the same experiments, controller, quantisation and noise, and then analysed alike.
 
     noise = drive_noise(...)                       of the drives, from what the log shows at rest from everything else
-    twin = make_twin(arm, data, fit, recipe, ...)  replicas of every log whose controller is known
+    twin = make_twin(model, weight, data, ...)     replicas of every log whose controller is known
     twin.weighted(weight)                          residuals (replicas, rows) of the log's own rows
 
 What the twin shows too is an artefact of sampling, smoothing and friction at reversals, no fault: its residual is the floor,
@@ -19,6 +19,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.imperfections import small_loads
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, law_slopes, rows_of
 from pipelines.model.estimation.logs import Motions, Recipe
@@ -27,7 +28,7 @@ from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
 
-__all__ = ["Twin", "drive_noise", "make_twin", "replayable"]
+__all__ = ["Twin", "drive_noise", "make_twin", "replayable", "white"]
 
 _WINDOW = 0.4  # [s] in which the noise is looked at
 _QUIET = 0.3  # of the windows are taken for quiet
@@ -71,8 +72,7 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
     return tuple(found)
 
 
-def drive_noise(arm: Arm, data: Data, left: Array, columns: Columns, motions: Motions, recipe: Recipe, place: int,
-                seed: int) -> Array:
+def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe: Recipe, place: int, seed: int) -> Array:
     """(joints,) [N m] white torque noise of the drives: as much as makes a replica as rough as log number `place`.
 
     Rough: quick changes of the residual in its quietest windows, where neither reversals nor any fault are. Two replicas,
@@ -88,12 +88,19 @@ def drive_noise(arm: Arm, data: Data, left: Array, columns: Columns, motions: Mo
     guess = rough * np.sqrt(step / log.sample_time)
     seen = []
     for level, own in ((np.zeros_like(guess), seed), (guess, seed + 1)):
-        done = simulate(arm, Experiment.of_log(log), Noise(level, np.zeros_like(guess)), (own,))
-        copy, found = _analysed(log, done, 0, recipe, columns, data, place)
+        done = simulate(model.nominal, Experiment.of_log(log), Noise(level, np.zeros_like(guess)), (own,))
+        copy, found = _analysed(log, done, 0, recipe, model.columns, data, place)
         seen.append(_roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t)))))
     still, shaken = np.square(seen[0]), np.square(seen[1])
     share = (np.square(rough) - still) / np.maximum(shaken - still, 1e-6 * np.square(rough) + 1e-300)
     return np.asarray(guess * np.sqrt(np.clip(share, 0.0, 4.0)))
+
+
+def white(data: Data, left: Array) -> Array:
+    """(joints,) [N m] of the residual that is white noise, from its quick changes: a floor that no model can be below."""
+    share = np.sqrt(1.0 - 1.0 / _SMOOTH)
+    each = [_roughness(x, float(np.median(np.diff(one.t)))) / share for one, x in zip(data.logs, data.split(left), strict=True)]
+    return np.asarray(np.sqrt(np.mean(np.square(each), axis=0)))
 
 
 def _roughness(x: Array, step: float) -> Array:
@@ -105,7 +112,7 @@ def _roughness(x: Array, step: float) -> Array:
     return np.asarray(np.sqrt(np.quantile(windows.var(axis=2), _QUIET, axis=1)))
 
 
-def make_twin(arm: Arm, data: Data, fit: Fit, columns: Columns, motions: Motions, recipe: Recipe, noise: Array, replicas: int,
+def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe: Recipe, noise: Array, replicas: int,
               seed: int) -> Twin | None:
     """Replicas of every log that can be simulated; None where there is none.
 
@@ -115,16 +122,18 @@ def make_twin(arm: Arm, data: Data, fit: Fit, columns: Columns, motions: Motions
     places = replayable([log for log, _ in motions])
     if not places or replicas < 1:
         return None
+    columns = model.columns
     drawn = Noise(noise, np.zeros_like(noise))
-    runs = {place: simulate(arm, Experiment.of_log(motions[place][0]), drawn, range(seed, seed + replicas)) for place in places}
+    seeds = range(seed, seed + replicas)
+    runs = {place: simulate(model.nominal, Experiment.of_log(motions[place][0]), drawn, seeds) for place in places}
     found = []
     for k in range(replicas):
         parts = [_motion(motions[place][0], done, k, recipe) for place, done in runs.items()]
         rows = [data.logs[place].equations.rows for place in places]
         own = gather(tuple(parts), columns, recipe, rows)
-        small = own.lay_each(_imperfect(arm, noise, own, seed + k))
-        slopes, _ = law_slopes(own, columns, fit.beta)
-        found.append(fit_columns(own, np.concatenate([rows_of(own, columns), *slopes]), own.y + small, fit.weight))
+        small = own.lay_each(_imperfect(model.nominal, noise, own, seed + k))
+        slopes, _ = law_slopes(own, columns, model.beta)
+        found.append(fit_columns(own, np.concatenate([rows_of(own, columns), *slopes]), own.y + small, weight))
     return Twin(tuple(found), places, noise)
 
 

@@ -1,0 +1,138 @@
+"""Diagnose an arm: what its nominal model gets wrong in these logs, and why.
+
+    found = diagnose(Logs.by_role(logs), DiagnosisSettings())
+    found.verdict, found.findings, found.extended
+
+Reconstruct and condition the logs; fit the nominal model; take the greatest causes away for a moment and make the twin of what
+is left; search with the twin's thresholds; judge what was found on held-out logs; say what these logs cannot tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.errors import InputRejected
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.evidence import evidence
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.findings import extended_arm, findings, rejected, sure
+from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.limits import detectable, not_testable
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.result import Diagnosis, Finding, ResidualRms, Threshold
+from pipelines.model.diagnosis.search import Case, Explored, Found, clean, held_out_left, provisional, search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.twin import Twin, drive_noise, make_twin, replayable, white
+from pipelines.model.diagnosis.verdict import Ruling, rule
+
+__all__ = ["diagnose"]
+
+Tell = Callable[[str], None]
+
+
+def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None) -> Diagnosis:
+    """What the nominal model of an arm gets wrong in `logs`, and why.
+
+    Args:
+        arm: whose friction laws the nominal model takes, fitted anew; Coulomb and viscous friction where left out.
+        tell: progress, in words.
+
+    Raises:
+        InputRejected: no log can be fitted (S01, T04, T08).
+    """
+    chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
+    prepared = prepare(logs, chosen, arm)
+    case = _case(prepared, chosen)
+    say("looking for the greatest causes")
+    rough = provisional(case)
+    say("simulating the twin")
+    floored = _floored(prepared, case, rough, chosen)
+    say("looking for causes")
+    case = replace(case, thresholds=floored.thresholds)
+    found = search(case, chosen.most, rough)
+    ruling = _believed(found, prepared, rule(found, floored.rms), chosen)
+    return _told(prepared, case, found, ruling, floored, chosen)
+
+
+def _case(prepared: Prepared, chosen: DiagnosisSettings) -> Case:
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    every = families(columns.laws, whole_motion(prepared.data), model.arm, chosen.without)
+    return Case(prepared.data, prepared.judge, model, fit.weight, every, None, chosen.blocks)
+
+
+@dataclass(frozen=True, eq=False)
+class _Floored:
+    """The floor, where it comes from, and what follows from it."""
+
+    rms: Array  # (joints,) [N m]
+    origin: str
+    twin: Twin | None
+    thresholds: Thresholds | None
+    noise: Array
+
+
+def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> _Floored:
+    """By the twin where a controller is known, else by the noise in the residual."""
+    left, last = clean(rough[-1]), rough[-1].before
+    places = replayable([log for log, _ in prepared.motions])
+    nan = np.full(prepared.data.n_joints, np.nan)
+    if places and chosen.replicas:
+        model = last.model
+        try:
+            noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
+            twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas,
+                             chosen.seed)
+        except InputRejected:  # such an arm cannot be simulated: D15, D17
+            twin = None
+        if twin is not None:
+            bounds = Thresholds.of_twin(twin, case.families, model.nominal, rough[0].before.weight)
+            return _Floored(twin.rms, "twin", twin, bounds, twin.noise)
+    return _Floored(white(prepared.data, left), "blocks", None, None, nan)
+
+
+def _believed(found: Found, prepared: Prepared, ruling: Ruling, chosen: DiagnosisSettings) -> Ruling:
+    """Only what repeats on held-out time, in the same size in every log."""
+    doubts = [sure(found.steps[k], prepared, chosen.blocks) for k in ruling.named]
+    kept = tuple(k for k, doubt in zip(ruling.named, doubts, strict=True) if not doubt)
+    if ruling.verdict == "cause" and not kept:
+        return Ruling("unknown", (), next(doubt for doubt in doubts if doubt))
+    return replace(ruling, named=kept)
+
+
+def _told(prepared: Prepared, case: Case, found: Found, ruling: Ruling, floored: _Floored, chosen: DiagnosisSettings) -> Diagnosis:
+    nominal, last = found.nominal, found.steps[-1]
+    named = findings(found, ruling, prepared, floored.rms, chosen.blocks, chosen.evidence)
+    thresholds = last.thresholds
+    bounds = tuple(Threshold(f.cause, f.joint, float(g / last.before.rss), thresholds.origin)
+                   for f, g in zip(case.families, thresholds.gain, strict=True))
+    limits = detectable(last.screened, thresholds, prepared.data.logs[0].log.robot.revolute) if chosen.limits else ()
+    hidden = not_testable(prepared.data, nominal.fit, nominal.model.columns, found.steps[0].screened, nominal.model.arm,
+                          bool(prepared.referring), chosen.without)
+    judge = prepared.judge
+    rms = [ResidualRms(one.rms, (one.data if judge is None else judge).rms(held_out_left(one, judge, chosen.blocks)), floored.rms)
+           for one in (nominal, found.final)]
+    pictures = (evidence(nominal, floored.rms, floored.twin, None),) if chosen.evidence else ()
+    return Diagnosis(
+        ruling.verdict, _sentence(ruling, named), named, (), rejected(found, ruling), limits, hidden, rms[0], "what is wrong",
+        "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
+        tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
+        0 if floored.twin is None else len(floored.twin.fits), floored.noise, nominal.model.arm, extended_arm(found, ruling))
+
+
+def _sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:
+    """What a technician is told."""
+    if ruling.verdict == "nothing-wrong":
+        return "Nothing is wrong with this arm, as far as these logs can tell."
+    if ruling.verdict == "unknown":
+        return f"Something is wrong that has no name here: {ruling.reason}."
+    first = named[0]
+    where = "" if first.joint is None else f" at joint {first.joint}"
+    more = f", and {len(named) - 1} more" if len(named) > 1 else ""
+    return f"{first.title}{where}: {first.torque_rms:.2g} N m of torque that the model does not have{more}."

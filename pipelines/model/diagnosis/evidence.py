@@ -1,0 +1,149 @@
+"""The picture of what is wrong, before any name, and the figure that proves a finding.
+
+    evidence(data, left, ...)       the residual over time, and against all that it may depend on
+    proof(before, after, joint)     before and after, over the signal that the cause depends on
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Refined
+from pipelines.model.diagnosis.result import Curve, Evidence, Proof, Spectrum
+from pipelines.model.diagnosis.signals import binned, signals
+from pipelines.model.diagnosis.twin import Twin
+from pipelines.signal.spectra import welch
+
+__all__ = ["evidence", "proof"]
+
+_POINTS = 3000  # of a series
+_STRETCH = 2.0  # [s] of a proof in time
+_SEGMENT = 512  # rows of a spectrum
+_MOST = 0.8  # of the excess that the band holds
+_ORDERS = np.arange(0.5, 80.25, 0.25)
+
+
+def evidence(done: Refined, floor: Array, twin: Twin | None, simulated: tuple[Array, Array] | None) -> Evidence:
+    """Of the first log that was fitted; curves and spectra of all.
+
+    Args:
+        done: the nominal model.
+        simulated: t (samples,) and position error (samples, joints) of the nominal arm in closed loop.
+    """
+    data, left = done.data, done.left
+    predicted = data.y - left
+    measured, modelled, rest = (next(iter(data.split(x))).T for x in (data.y, predicted, left))
+    every = max(1, -(-len(measured) // _POINTS))
+    curves, spectra = [], []
+    for joint in range(data.n_joints):
+        own = left[data.joint == joint]
+        for signal in signals(data, joint, predicted):
+            means = binned(signal.values, own)
+            share = float(np.sum(means.count * means.mean**2) / max(float(own @ own), 1e-300))
+            curves.append(Curve(joint + 1, signal.name, signal.unit, means.x, means.mean, means.spread, share))
+        spectra += _spectra(data, left, joint, twin)
+    table = np.array([[_correlation(left[data.joint == i], data.y[data.joint == j]) for j in range(data.n_joints)]
+                      for i in range(data.n_joints)])
+    t, error = (None, None) if simulated is None else _thinned(*simulated)
+    above = np.clip(1.0 - np.square(floor / done.rms), 0.0, 1.0)
+    return Evidence(data.logs[0].log.name, data.logs[0].t[::every], measured[::every], modelled[::every], rest[::every], t, error,
+                    tuple(curves), tuple(spectra), above, _bands(spectra, data.n_joints), table,
+                    _torques(data, predicted))
+
+
+def _thinned(t: Array, error: Array) -> tuple[Array, Array]:
+    every = max(1, -(-len(t) // _POINTS))
+    return t[::every], error[::every]
+
+
+def _correlation(x: Array, y: Array) -> float:
+    return float(np.corrcoef(x, y)[0, 1]) if x.std() > 0.0 and y.std() > 0.0 else 0.0
+
+
+def _torques(data: Data, predicted: Array) -> Array:
+    """(joints, joints): each measured torque by all modelled ones; near the identity where nothing is mixed up."""
+    table = np.array([predicted[data.joint == j] for j in range(data.n_joints)])
+    return np.array([np.linalg.lstsq(table.T, data.y[data.joint == j], rcond=None)[0] for j in range(data.n_joints)])
+
+
+def _spectra(data: Data, left: Array, joint: int, twin: Twin | None) -> list[Spectrum]:
+    """Over frequency and over orders of the joint's angle, beside those of the twin."""
+    turning = data.logs[0].log.robot.revolute[joint]
+    own = _frequency(data, left, joint)
+    floor = None if twin is None else _frequency(twin.data, twin.fits[0].left, joint)
+    found = []
+    if own is not None:
+        beside = None if floor is None or len(floor[0]) != len(own[0]) else floor[1]
+        found.append(Spectrum(joint + 1, "frequency", "Hz", own[0], own[1], beside))
+    orders = _orders(data, left, joint)
+    below = None if twin is None else _orders(twin.data, twin.fits[0].left, joint)
+    found.append(Spectrum(joint + 1, "order", "1/rev" if turning else "1/(2 pi m)", _ORDERS, orders, below))
+    return found
+
+
+def _frequency(data: Data, left: Array, joint: int) -> tuple[Array, Array] | None:
+    """Frequencies [Hz] and amplitudes [N m] of bins, of the longest log."""
+    parts = [(one, x[joint]) for one, x in zip(data.logs, data.split(left), strict=True)]
+    one, x = max(parts, key=lambda part: len(part[1]))
+    if len(x) < 64:
+        return None
+    step = float(np.median(np.diff(one.t)))
+    found = welch(x[:, None], 1.0 / step, min(_SEGMENT, len(x) // 2))
+    width = float(found.frequency[1] - found.frequency[0])
+    return found.frequency, np.sqrt(found.density[:, 0] * width)
+
+
+def _orders(data: Data, left: Array, joint: int) -> Array:
+    """(orders,) [N m] amplitude of each wave along the turn."""
+    q = np.concatenate([one.at_rows(one.motion.q)[:, joint] for one in data.logs])
+    own = left[data.joint == joint]
+    return np.array([2.0 * abs(np.mean(own * np.exp(-1j * k * q))) for k in _ORDERS.tolist()])
+
+
+def _bands(spectra: list[Spectrum], joints: int) -> Array:
+    """(joints, 2) [Hz] where most of what stands above the floor lies."""
+    out = np.full((joints, 2), np.nan)
+    for one in spectra:
+        if one.over == "frequency":
+            power = np.square(one.amplitude) - (0.0 if one.floor is None else np.square(one.floor))
+            power = np.maximum(power, 0.0)
+            total = np.cumsum(power) / max(float(power.sum()), 1e-300)
+            low, high = np.searchsorted(total, (0.5 - 0.5 * _MOST, 0.5 + 0.5 * _MOST))
+            out[one.joint - 1] = one.x[min(low, len(one.x) - 1)], one.x[min(high, len(one.x) - 1)]
+    return out
+
+
+def proof(before: Refined, after: Refined, joint: int | None) -> Proof:
+    """Over the signal that tells the predicted part best, of the joint that shows most of it."""
+    data = before.data
+    predicted = before.left - after.left
+    shown = joint - 1 if joint is not None else int(np.argmax(data.rms(predicted) / before.rms))
+    own = data.joint == shown
+    parts = [x[own] for x in (before.left, after.left, predicted)]
+
+    def told(values: Array) -> float:
+        means = binned(values, parts[2])
+        return float(np.sum(means.count * means.mean**2))
+
+    best = max(signals(data, shown, data.y - before.left), key=lambda signal: told(signal.values))
+    b, a, p = (binned(best.values, x) for x in parts)
+    t, rows = _stretch(data, shown, parts[2])
+    return Proof(shown + 1, best.name, best.unit, b.x, b.mean, a.mean, p.mean, b.spread / np.sqrt(b.count), t,
+                 *(x[rows] for x in parts))
+
+
+def _stretch(data: Data, joint: int, predicted: Array) -> tuple[Array, slice]:
+    """Time and rows of the stretch in which the predicted part is largest."""
+    first, best, found = 0, -1.0, slice(0, 0)
+    times = np.concatenate([one.t for one in data.logs])
+    for one in data.logs:
+        step = float(np.median(np.diff(one.t))) if one.rows > 1 else 1.0
+        size = max(2, min(one.rows, round(_STRETCH / step)))
+        for start in range(first, first + one.rows - size + 1, max(1, size // 2)):
+            power = float(np.sum(np.square(predicted[start:start + size])))
+            if power > best:
+                best, found = power, slice(start, start + size)
+        first += one.rows
+    return times[found], found

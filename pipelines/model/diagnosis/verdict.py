@@ -1,0 +1,65 @@
+"""The verdict: which of the causes found are named, and why not the others.
+
+A cause is named where the model with all that was found comes down near to the floor; where the best of them explains less than
+half of what stands above it, nothing is: the name would be wrong more often than right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.search import Found, Step
+
+__all__ = ["Ruling", "explained", "rule"]
+
+_HALF = 0.5  # of the excess over the floor
+_ABOVE = 1.6  # times the floor: what stands higher is not explained
+_REST = 0.35  # of a joint's residual that may be left beside a named cause, where it still stands above the floor
+
+
+@dataclass(frozen=True)
+class Ruling:
+    """What is said of the steps of a search."""
+
+    verdict: Literal["cause", "nothing-wrong", "unknown"]
+    named: tuple[int, ...]  # places of the steps whose cause is named
+    reason: str
+
+
+def excess(rms: Array, floor: Array) -> float:
+    """Sum over the joints of how far the power of a residual stands above its floor, in floors."""
+    return float(np.sum(np.maximum(np.square(rms / floor) - 1.0, 0.0)))
+
+
+def explained(step: Step, found: Found, floor: Array) -> float:
+    """Share of the excess of the nominal residual that this step takes away."""
+    if step.best is None:
+        return 0.0
+    whole = excess(found.nominal.rms, floor)
+    return float(np.clip((excess(step.before.rms, floor) - excess(step.best.done.rms, floor)) / max(whole, 1e-12), 0.0, 1.0))
+
+
+def rule(found: Found, floor: Array) -> Ruling:
+    """Which causes are named."""
+    accepted = [step for step in found.steps if step.best is not None]
+    joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
+    high = ", ".join(f"joint {j + 1}" for j in joints.tolist())
+    if not accepted:
+        if len(joints):
+            return Ruling("unknown", (), f"the residual of {high} stands above the floor, and no cause explains it")
+        return Ruling("nothing-wrong", (), "")
+    compliant = [step for step in accepted if step.best is not None and step.best.effect.evidence != "residual"]
+    if compliant:
+        return Ruling("unknown", (), "something gives way, of a kind that these logs do not tell: record frequency responses")
+    whole = excess(found.nominal.rms, floor)
+    total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
+    if whole > 0.1 and total < _HALF:
+        return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")
+    left = [j for j in joints.tolist() if found.final.rms[j] > _REST * found.nominal.rms[j]]
+    if left:
+        return Ruling("unknown", (), f"what was found leaves the residual of {high} well above the floor")
+    return Ruling("cause", tuple(range(len(accepted))), "")
