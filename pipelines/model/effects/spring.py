@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import comb
 from typing import Self
 
 import numpy as np
@@ -13,17 +14,20 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Spring"]
 
+_DEGREE = 5
+_TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth")  # of x, x², …
+
 
 @dataclass(frozen=True)
 class Spring(Effect):
-    """τ = k x + b x² + c x³, x = q - q0: a polynomial in q, whose coefficients are the amplitudes.
+    """τ = k x + b x² + c x³ + d x⁴ + e x⁵, x = q - q0: a polynomial in q, whose coefficients are the amplitudes.
 
     A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its linear part is q0. Where gravity
     acts on the joint, the fit of its weight takes much of the polynomial: k, of either sign then, and q0 are known poorly. With
-    b = 0 the fit was no better known, and not linear: it ended elsewhere.
+    odd powers alone they were no better known, and the fit, no longer linear, ended elsewhere.
     """
 
-    degree: int = 3
+    degree: int = _DEGREE
 
     name = "spring"
     title = "Spring"
@@ -32,6 +36,8 @@ class Spring(Effect):
         Quantity("rest_angle", "rad", -20.0, 20.0, "where it does not pull"),
         Quantity("curvature", "N m/rad^2", -1e4, 1e4, "b: how much stiffer it is on one side"),
         Quantity("hardening", "N m/rad^3", -1e4, 1e4, "c: how much stiffer it is far out"),
+        Quantity("fourth", "N m/rad^4", -1e4, 1e4, "d"),
+        Quantity("fifth", "N m/rad^5", -1e4, 1e4, "e"),
     )
     signature = "A torque that depends on the angle of its joint alone and pulls towards one angle."
     explanation = "A cable bundle, a hose or a balancing spring pulls the joint."
@@ -47,25 +53,34 @@ class Spring(Effect):
         yield replace(self, degree=1)
 
     def full(self) -> Self:
-        return replace(self, degree=3)
+        return replace(self, degree=_DEGREE)
 
     def amplitudes(self, values: Values) -> Array:
-        k, q0, b, c = (values[q.name] for q in self.parameters)
-        polynomial = [k - 2.0 * b * q0 + 3.0 * c * q0**2, -k * q0 + b * q0**2 - c * q0**3, b - 3.0 * c * q0, c]
-        return np.array(polynomial[:1 + self.degree])
+        constant, slope, *rest = _about([0.0, *(values[name] for name in _TERMS)], -values["rest_angle"])[:1 + self.degree]
+        return np.array([slope, constant, *rest])
 
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
-        slope, constant, bent, cubic = [float(a) for a in amplitudes] + [0.0] * (3 - self.degree)
-        q0 = _zero(slope, constant, bent, cubic)
-        return {"stiffness": slope + 2.0 * bent * q0 + 3.0 * cubic * q0**2, "rest_angle": q0,
-                "curvature": bent + 3.0 * cubic * q0, "hardening": cubic}
+        slope, constant, *rest = (float(a) for a in amplitudes)
+        polynomial = [constant, slope, *rest]
+        zero = _zero(polynomial)
+        found = dict(zip(_TERMS, [*_about(polynomial, zero)[1:], *[0.0] * (_DEGREE - self.degree)], strict=True))
+        return {q.name: zero if q.name == "rest_angle" else found[q.name] for q in self.parameters}
 
 
-def _zero(slope: float, constant: float, bent: float, cubic: float) -> float:
-    """Of cubic q³ + bent q² + slope q + constant."""
-    linear = -constant / slope if slope else 0.0
-    if not (bent or cubic):
+def _about(polynomial: Sequence[float], point: float) -> list[float]:
+    """Coefficients of the same polynomial in powers of q - point; both from the constant upwards."""
+    size = len(polynomial)
+    return [sum(comb(i, m) * polynomial[i] * point**(i - m) for i in range(m, size)) for m in range(size)]
+
+
+def _zero(polynomial: Sequence[float]) -> float:
+    """The zero nearest to that of the linear part; the point nearest to zero where there is none."""
+    linear = -polynomial[0] / polynomial[1] if polynomial[1] else 0.0
+    if not any(polynomial[2:]):
         return linear
-    roots = np.roots([cubic, bent, slope, constant])
-    size = np.abs(roots.imag) + np.where(np.abs(roots.imag) > 1e-7 * (1.0 + np.abs(roots)), 1e6, 0.0)
-    return float(roots[np.argmin(np.abs(roots.real - linear) + size)].real)
+    roots = np.roots(polynomial[::-1])
+    real = roots[np.abs(roots.imag) <= 1e-6 * (1.0 + np.abs(roots))].real
+    among = real if len(real) else roots.real
+    best = float(among[np.argmin(np.abs(among - linear))])
+    slope = _about(polynomial, best)
+    return best - slope[0] / slope[1] if len(real) and slope[1] else best

@@ -192,6 +192,6 @@ def test_a_level_arm_tells_nothing_of_its_waist() -> None:
 
 def test_a_spring_of_three_zeros_rests_at_the_one_near_its_line() -> None:
     """(q - 1)(q - 2)(q + 3) = q³ - 7 q + 6: the line -7 q + 6 is zero at 0.86."""
-    found = Spring(1).values([-7.0, 6.0, 0.0, 1.0])
+    found = Spring(1, degree=3).values([-7.0, 6.0, 0.0, 1.0])
     assert found["rest_angle"] == pytest.approx(1.0)
     assert found["stiffness"] == pytest.approx(-4.0)  # (1 - 2)(1 + 3)
