@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["error_map_figure", "executed_figure", "simulated_figures", "split_figure", "task_figures"]
 
 _AXES = ("x", "y", "z")
+_SEGMENTS = 600  # of a coloured path
 _LEFT = (1, 2, 3, 4)  # Fig. 16 has the first four cases on one side
 _PARTS = (("inertia", style.BLUE), ("coriolis", style.PURPLE), ("gravity", style.ORANGE), ("friction", style.GREEN),
           ("left", style.VERMILLION))
@@ -60,21 +61,22 @@ def split_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None
 def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None:
     """The path of the tip, darker where the model leaves more torque, one picture a joint."""
     course = found.course
-    if course is None:
+    if course is None or found.marks == "time":
         return None
     a, b = plane(course.tip)
+    every = max(1, -(-len(course.t) // _SEGMENTS))
 
     def draw(drawing: Drawing) -> None:
         from matplotlib.collections import LineCollection
 
         axes = drawing.subplots(len(joints), 1, sharex=True, squeeze=False)[:, 0]
-        points = course.tip[:, [a, b]]
+        points = course.tip[::every, [a, b]]
         lines = np.stack([points[:-1], points[1:]], axis=1)
         for j, axis in enumerate(axes):
-            size = np.nan_to_num(np.abs(course.left[:, j]))
-            top = float(np.quantile(size, 0.995)) or 1.0
+            size = _largest_of(np.nan_to_num(np.abs(course.left[:, j])), every)
+            top = float(np.quantile(size, 0.99)) or 1.0
             drawn = LineCollection(list(lines), cmap="magma_r", linewidths=2.0)
-            drawn.set_array(_spread(size)[:-1])
+            drawn.set_array(size[:len(lines)])
             drawn.set_clim(-0.15 * top, top)  # the lightest colour is no colour on white
             axis.add_collection(drawn)
             axis.set_xlim(points[:, 0].min() - 0.01, points[:, 0].max() + 0.01)
@@ -92,10 +94,9 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
                   (6.0, 0.7 + 1.35 * len(joints)))
 
 
-def _spread(size: Array, reach: int = 6) -> Array:
-    """The largest nearby: a peak of one sample would not be seen."""
-    wide = np.pad(size, reach, mode="edge")
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(wide, 2 * reach + 1).max(axis=1))
+def _largest_of(size: Array, every: int) -> Array:
+    """The largest of every so many samples: a peak of one sample would not be seen."""
+    return np.maximum.reduceat(size, np.arange(0, len(size), every))
 
 
 def executed_figure(cases: Sequence[Case]) -> Figure | None:
