@@ -21,9 +21,9 @@ UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "k
          "N m/rad", "N m/rad^2", "N m/rad^3", "N m/rad^4",
          "N m/rad^5", "N m s^2/rad^2"}
 REPO = Path(__file__).resolve().parents[3]
-# Where names of effects stand all the same: the laws among which friction is fitted, the nominal model, and what a frequency
-# response tells apart without any motion.
-MAY_NAME = ("pipelines/model/friction/", "pipelines/model/estimation/nominal.py", "pipelines/model/frf/")
+# Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, and what
+# a frequency response tells apart without any motion.
+MAY_NAME = ("pipelines/model/friction/", "pipelines/report/friction_report.py", "pipelines/model/estimation/nominal.py", "pipelines/model/frf/")
 NOMINAL = {"coulomb", "viscous", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
 
