@@ -23,7 +23,8 @@ UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "k
 REPO = Path(__file__).resolve().parents[3]
 # Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, and what
 # a frequency response tells apart without any motion.
-MAY_NAME = ("pipelines/model/friction/", "pipelines/report/friction_report.py", "pipelines/model/estimation/nominal.py", "pipelines/model/frf/")
+MAY_NAME = ("pipelines/model/friction/", "pipelines/report/friction_report.py", "pipelines/model/estimation/nominal.py",
+            "pipelines/model/frf/")
 NOMINAL = {"coulomb", "viscous", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
 
