@@ -70,6 +70,12 @@ def command(*words: str) -> tuple[dict[str, object], Path, float]:
     return json.loads(done.stdout), folder, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+def figure(result: dict[str, object], name: str) -> float:
+    value = result[name]
+    assert isinstance(value, float), f"{name} is {value}"
+    return value
+
+
 @cache
 def bare_robot() -> str:
     """The paper's arm with the paper's limits alone: no links, no torques."""
@@ -84,7 +90,7 @@ def paper(seconds: float, bar: float, seeds: int) -> None:
     for seed in range(1, seeds + 1):
         # start-up, finishing and files take their share of the time
         result, _, used = command(bare_robot(), *PAPER, "--no-report", "--seconds", str(seconds - 2.0), "--seed", str(seed))
-        found.append(float(result["condition_number"]))  # type: ignore[arg-type]
+        found.append(figure(result, "condition_number"))
         cpu.append(used)
     row(f"the paper's problem, {seconds:.0f} s", statistics.median(found), bar, f"{np.round(found, 4)}, CPU {np.round(cpu, 1)} s")
 
@@ -104,10 +110,10 @@ def default(seeds: int) -> None:
 def _default(every: range, parameters: int) -> None:
     """13, as the paper fits; of all 15 two are zero, and are compared with 0.5 % of the largest of their unit."""
     mine, other = ([designed(c, seed, parameters)[0] for seed in every] for c in ("default", "condition"))
-    condition = [float(r["condition_number"]) for r in mine]  # type: ignore[arg-type]
+    condition = [figure(r, "condition_number") for r in mine]
     row(f"the default design, {parameters} parameters: condition number", statistics.median(condition), 3.0,
         str(np.round(condition, 3)))
-    ratio = [float(a["predicted_relative_std"]) / float(b["predicted_relative_std"]) for a, b in zip(mine, other, strict=True)]  # type: ignore[arg-type]
+    ratio = [figure(a, "predicted_relative_std") / figure(b, "predicted_relative_std") for a, b in zip(mine, other, strict=True)]
     row("… predicted relative std / the condition-optimal one's", statistics.median(ratio), 0.5, str(np.round(ratio, 3)))
 
 
@@ -172,7 +178,7 @@ def six_axes(seeds: int) -> None:
     for seed in range(1, seeds + 1):
         result, _, _ = command(str(TX40), "--criterion", "condition", "--harmonics", "20", "--seconds", "55", "--no-report",
                                "--set", "design-excitation.rehearse=false", "--seed", str(seed))
-        found.append(float(result["condition_number"]))  # type: ignore[arg-type]
+        found.append(figure(result, "condition_number"))
         ratio.append(found[-1] / median)
     row("TX40: condition number / median of 50 random motions", statistics.median(ratio), 0.2,
         f"{np.round(found, 1)}, random {median:.0f}")

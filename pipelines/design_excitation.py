@@ -241,8 +241,9 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
         lower_bound=judged.lower_bound, predicted_relative_std=judged.predicted_relative_std, frobenius=judged.frobenius,
         smallest_singular_value=judged.smallest_singular_value, log_determinant=judged.log_determinant,
         limits=tuple(CostOfLimit(p.joint, p.quantity, p.peak, p.limit, p.unit, p.share, p.cost) for p in found.peaks),
-        evaluations=found.evaluations, found_at=found.found_at, seed=settings.seed, interrupted=found.interrupted,
-        reached=found.reached, shrunk=found.shrunk, singular_values=judged.singular_values, parameters=judged.parameters,
+        evaluations=found.evaluations, found_at=found.found_at, seed=settings.seed,
+        interrupted=found.stopped > 0, stopped=found.stopped, reached=found.reached, shrunk=found.shrunk,
+        singular_values=judged.singular_values, parameters=judged.parameters,
         random=judged.random, course=judged.course, period=trajectory.series.period, periods=trajectory.periods,
         run_in=trajectory.run_in, duration=trajectory.duration, sample_time=settings.sample_time,
         home=None if task.home is None else tuple(map(float, task.home)), noise=tuple(map(float, goal.noise)),
@@ -299,5 +300,5 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("design-excitation", "Design the excitation", Settings, compute, report, read, write,
-              lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks)
+              lambda result, check: result.stopped or int(check and any(found.gate for found in _checks(result))), _checks)
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pipelines.model.excitation.rehearse import Rehearsal
 from pipelines.model.excitation.result import DrawnPlan, Result
 from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
 from pipelines.report.report import Figure, Report, Section, Table, Tone
@@ -33,9 +34,18 @@ def excitation_report(result: Result) -> Report:
 
 
 def _tone(result: Result) -> Tone:
-    if not result.reached or (result.rehearsal is not None and not result.rehearsal.safe) or result.rehearsal_failed:
+    found = result.rehearsal
+    if not result.reached or result.interrupted or result.rehearsal_failed or (found is not None and _trouble(result, found)):
         return "attention"
     return "good" if result.torque_checked else "attention"
+
+
+def _trouble(result: Result, found: Rehearsal) -> list[str]:
+    """What its rehearsal says against a motion: drives that saturate, joints beyond their speed."""
+    full = [f"the drive of {name} saturates in {format_number(100 * share, 2)} % of the samples"
+            for name, share in zip(result.joints, found.saturated, strict=True) if share > 0.0]
+    return full + [f"{result.joints[j]} reaches {format_number(100 * share, 3)} % of its speed limit"
+                   for j, share in found.too_fast]
 
 
 def _verdict(result: Result) -> str:
@@ -49,6 +59,8 @@ def _verdict(result: Result) -> str:
         text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"
     if not result.torque_checked:
         text += "; torque limits could not be checked, for neither a model nor the links are known"
+    if result.rehearsal is not None and (trouble := _trouble(result, result.rehearsal)):
+        text += f"; in the rehearsal {', '.join(trouble)}"
     if result.interrupted:
         text += "; the search was interrupted, this is its best by then"
     return text + "."
@@ -89,11 +101,7 @@ def _safety(result: Result) -> Section:
                     if not result.torque_checked or result.torque_bounded else
                     "It was not rehearsed in simulation.")
     else:
-        fast = [f"{name} reaches {100 * v / limit:.3g} % of its speed limit" for name, v, limit in
-                zip(result.joints, found.speed_peak, found.speed_limit, strict=True) if v > limit]
-        full = [f"the drive of {name} saturates in {format_number(100 * share, 2)} % of the samples"
-                for name, share in zip(result.joints, found.saturated, strict=True) if share > 0.0]
-        end = ", ".join((*full, *fast)) or "no drive saturates, no joint exceeds its speed"
+        end = ", ".join(_trouble(result, found)) or "no drive saturates, no joint exceeds its speed"
         text.append(f"Its first {found.seconds:.3g} s were rehearsed in simulation under PD control of 8 Hz a joint, without "
                     f"feed-forward: {end}. Another controller will follow otherwise.")
         tables.append(Table(("joint", "away, rms [rad]", "away, most [rad]", "torque, peak [N m]", "limit [N m]",
@@ -164,7 +172,9 @@ def _told(result: Result) -> Section:
     noise = ", ".join(format_number(value, 3) for value in result.noise)
     text = (f"Standard deviations are those of one experiment whose torque has white noise of {noise} N m (standard deviation, "
             f"joint by joint), sampled every {1e3 * result.sample_time:g} ms. What the model lacks adds to them.",
-            "A small condition number is no aim in itself: it presses all singular values down to the smallest.")
+            "A small condition number is no aim in itself: it presses all singular values down to the smallest.",
+            "The condition number is the largest singular value of Φ over the smallest; the Frobenius condition number, "
+            "‖Φ‖ ‖Φ⁺‖, counts those between as well: the root of the sum of their squares times that of their inverses' squares.")
     figures = [singular_value_figure("singular-values", "Singular values of Φ: the smallest belongs to the direction known worst.",
                                      result.singular_values)]
     if relative:

@@ -49,7 +49,7 @@ class Design:
     trajectory: Trajectory
     evaluations: int  # of the search: as many give the same design again
     found_at: int  # evaluation of the best one
-    interrupted: bool
+    stopped: int  # exit code of the signal that ended the search early; 0 where none did
     peaks: tuple[Peak, ...]
     shrunk: float  # what the motion was multiplied by so that its limits hold between samples
     cost: tuple[float, ...]  # of each limit, a share of what all cost
@@ -78,13 +78,13 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
     best = Best()
     budget = Budget(effort.seconds, effort.evaluations, lambda done: effort.tell(_progress(task, done, best)),
                     reserve=2.0 * _FINISH_EVALUATIONS)
-    interrupted = False
+    stopped = 0
     try:
         search(coarse, fine, lambda x: fine.space.point(coarse.space.series(x)), budget, np.random.default_rng(seed), best)
-    except Interrupted:  # whoever stops the search wants what it has found by then
+    except Interrupted as signal:  # whoever stops the search wants what it has found by then
         if best.x is None:
             raise
-        interrupted = True
+        stopped = signal.exit_code
     x = best.x if best.x is not None else fine.start(np.random.default_rng(seed))
     ended = Best()
     polish(finish, x, _FINISHING, Budget(None, _FINISH_EVALUATIONS), ended)
@@ -95,7 +95,7 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
         trajectory = with_run_in(task, trajectory)
     found = _peaks(task, trajectory)
     cost = tuple(float(c) for c in finish.cost(finish.sized(x, 0.9999, 1.0)))
-    return Design(trajectory, budget.done, best.evaluation, interrupted,
+    return Design(trajectory, budget.done, best.evaluation, stopped,
                   tuple(replace(peak, cost=share) for peak, share in zip(found, cost, strict=True)), factor, cost,
                   task.problem.goal.ceiling is None or best.score < FAR)
 

@@ -40,6 +40,12 @@ class Rehearsal:
     saturated: tuple[float, ...]  # share of samples at the torque limit
 
     @property
+    def too_fast(self) -> tuple[tuple[int, float], ...]:
+        """Joints, counted from 0, that go faster than their limit, and what share of it they reach."""
+        shares = (v / limit for v, limit in zip(self.speed_peak, self.speed_limit, strict=True))
+        return tuple((j, share) for j, share in enumerate(shares) if share > 1.0)
+
+    @property
     def safe(self) -> bool:
         """No drive saturates, and no joint goes faster than its limit by more than the controller's overshoot explains."""
         return max(self.saturated) == 0.0 and all(

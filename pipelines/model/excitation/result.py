@@ -73,6 +73,7 @@ class Result:
     evaluations: int = 0
     found_at: int = 0
     interrupted: bool = False
+    stopped: int = field(default=0, metadata=NOT_STORED)  # exit code of the signal that interrupted
     reached: bool = True
     shrunk: float = 1.0
     singular_values: tuple[float, ...] = ()

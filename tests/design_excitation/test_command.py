@@ -1,0 +1,140 @@
+"""What the command leaves: files that agree, the table of a controller, the report, wrong usage."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.design_excitation import STAGE
+from pipelines.errors import InputRejected, UsageError
+from pipelines.inspect import STAGE as DOCTOR
+from pipelines.log.files import open_log
+from pipelines.stage import Request, run_stage
+from tests.cli.commands import rrrid
+from tests.design_excitation.short import QUICK, designed
+
+RECIPE = """
+[robot]
+use = "rrr"
+
+[log]
+match = "controller.csv"
+
+[time]
+column = "t"
+unit = "s"
+rate = 500
+
+[signals]
+q = { columns = ["m2", "m1", "m3"], unit = "deg", scale = [1.0, 2.0, 1.0], sign = [1, -1, 1], offset = [0.1, 0.0, -0.2] }
+tau = { columns = ["m2", "m1", "m3"], unit = "N m" }
+
+[drive]
+transmission = [[10.0, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 5.0, 30.0]]
+"""
+
+
+def test_what_the_result_says(tmp_path: Path) -> None:
+    """Every key of the contract; limits kept; the certificate beside the value."""
+    done = designed(tmp_path / "out").json
+    for key in ("condition_number", "lower_bound", "criterion", "predicted_relative_std", "limits", "evaluations"):
+        assert done[key] is not None
+    assert done["evaluations"] == 150
+    assert done["lower_bound"] == pytest.approx(1.5**0.5)
+    assert done["condition_number"] > done["lower_bound"]
+    assert {(one["joint"], one["quantity"]) for one in done["limits"]} == {
+        (j, quantity) for j in (1, 2, 3) for quantity in ("speed", "acceleration", "torque")}
+    assert all(abs(one["peak"]) <= abs(one["limit"]) for one in done["limits"])
+    assert done["limits"][-1]["limit"] in (-13.5, 13.5)  # nine tenths of 15 N m
+
+
+def test_the_files_agree(tmp_path: Path) -> None:
+    """The log, the coefficients by eq. (22), and the table for a controller are one motion; the doctor finds the log in order."""
+    out = designed(tmp_path / "out").folder
+    log = open_log(out / "trajectory.h5").log
+    assert (log.origin, log.experiment, log.role, log.period) == ("planned", "excitation", "identify", 10.0)
+    assert "q" not in log
+    assert "tau" not in log
+    told = json.loads((out / "coefficients.json").read_text())
+    for j, joint in enumerate(told["joints"]):
+        w = 2 * np.pi * np.array(joint["harmonics"]) / told["period"]
+        a, b = np.array(joint["a"]), np.array(joint["b"])
+        q = joint["q0"] + np.sin(np.outer(log.t, w)) @ (a / w) - np.cos(np.outer(log.t, w)) @ (b / w)
+        np.testing.assert_allclose(log["q_ref"][:, j], q, atol=1e-9)
+        np.testing.assert_allclose(log["dq_ref"][:, j], np.cos(np.outer(log.t, w)) @ a + np.sin(np.outer(log.t, w)) @ b, atol=1e-9)
+    table = np.loadtxt(out / "controller.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table, np.column_stack([log.t, log["q_ref"]]), atol=1e-12)
+    assert (out / "controller.csv").read_text().startswith("t,q_1,q_2,q_3\n")
+    examined = run_stage(DOCTOR, Request((out,), out=tmp_path / "examined", no_report=True), DOCTOR.settings()).result
+    assert len(examined.logs) == 1
+    assert [check for check in examined.checks if check.level in ("reject", "repair")] == []
+
+
+def test_the_table_comes_back_through_its_recipe(tmp_path: Path) -> None:
+    """Motor side, coupled, in degrees, of other order, sign and scale, at another rate: importing it gives the motion."""
+    from pipelines.import_log import STAGE as IMPORT
+
+    (tmp_path / "recipe.toml").write_text(RECIPE)
+    out = designed(tmp_path / "out", replace(QUICK, recipe=str(tmp_path / "recipe.toml"))).folder
+    table = np.loadtxt(out / "controller.csv", delimiter=",", skiprows=1)
+    assert np.diff(table[:, 0]) == pytest.approx(np.full(len(table) - 1, 0.002))
+    data = tmp_path / "data"
+    data.mkdir()
+    (data / "controller.csv").write_bytes((out / "controller.csv").read_bytes())
+    settings = replace(IMPORT.settings(), recipe=str(tmp_path / "recipe.toml"), source=data, trust_units=True)
+    back = run_stage(IMPORT, Request((), out=tmp_path / "back", no_report=True), settings)
+    imported = open_log(next(back.folder.rglob("*.h5"))).log
+    planned = open_log(out / "trajectory.h5").log
+    np.testing.assert_allclose(imported.q, planned["q_ref"][::2], atol=1e-9)
+
+
+def test_fundamentals_of_their_own(tmp_path: Path) -> None:
+    """0.1, 0.2 and 0.3 Hz: each joint moves at multiples of its own alone."""
+    out = designed(tmp_path / "out", replace(QUICK, frequency=(0.1, 0.2, 0.3), harmonics=(12, 8, 5))).folder
+    told = json.loads((out / "coefficients.json").read_text())
+    assert told["period"] == pytest.approx(10.0)
+    assert [joint["harmonics"] for joint in told["joints"]] == [list(range(1, 13)), list(range(2, 17, 2)), list(range(3, 16, 3))]
+
+
+def test_a_rehearsal_before_the_robot_moves(tmp_path: Path) -> None:
+    """The simulated arm follows a modest plan to a few hundredths of a radian, without saturation."""
+    done = designed(tmp_path / "out", replace(QUICK, rehearse=True)).result
+    assert done.rehearsal is not None
+    assert done.rehearsal.safe
+    assert max(done.rehearsal.position_max) < 0.1
+    assert all(peak < limit for peak, limit in zip(done.rehearsal.torque_peak, done.rehearsal.torque_limit, strict=True))
+
+
+def test_the_report_warns_in_bold(tmp_path: Path) -> None:
+    outcome = run_stage(STAGE, Request((), out=tmp_path / "out"), QUICK)
+    page = (outcome.folder / "report.html").read_text()
+    assert "<strong>Self-collision is not checked" in page
+    assert "√(3/2)" in page
+
+
+@pytest.mark.parametrize(("changes", "code"), [
+    ({"purpose": "writing"}, "RRID-C02"), ({"keep_out": (1.0,)}, "RRID-C02"), ({"robot": "nobody"}, "RRID-C04"),
+    ({"criterion": "C"}, "RRID-C02"), ({"periods": 0}, "RRID-C02"), ({"evaluations": 0}, "RRID-C02"),
+    ({"seconds": float("nan")}, "RRID-C02"), ({"seed": -1}, "RRID-C02"), ({"tip_speed": 0.0}, "RRID-C02"),
+    ({"noise": (1.0, -1.0, 1.0)}, "RRID-C02"), ({"torque_share": 1.5}, "RRID-C02"), ({"bounds": "nothing"}, "RRID-C02"),
+    ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),
+])
+def test_wrong_usage_is_said(changes: dict[str, Any], code: str, tmp_path: Path) -> None:
+    with pytest.raises((UsageError, InputRejected)) as told:
+        designed(tmp_path / "out", replace(QUICK, **changes))
+    assert told.value.code == code
+
+
+def test_the_command_line(tmp_path: Path) -> None:
+    """ROBOT defaults to the shipped rrr; options reach the stage; an unknown criterion ends in exit 2."""
+    done = rrrid("design-excitation", "--evaluations", "120", "--harmonics", "12", "--out", tmp_path / "out", "--json", "-q",
+                 "--no-report", "--symmetric", "--set", "design-excitation.rehearse=false", "--seed", "7", cwd=tmp_path)
+    assert done.returncode == 0
+    told = json.loads(done.stdout)
+    assert (told["robot"], told["evaluations"], told["seed"], len(told["parameters"])) == ("rrr-tue", 120, 7, 13)
+    assert rrrid("design-excitation", "--criterion", "best", "--out", tmp_path / "other", cwd=tmp_path).returncode == 2

@@ -1,0 +1,109 @@
+"""Plans of the other experiments: friction, frequency responses, held postures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.errors import UsageError
+from pipelines.inspect import STAGE as DOCTOR
+from pipelines.log.files import open_log
+from pipelines.log.robot_files import load_robot
+from pipelines.model.arm import Arm
+from pipelines.model.rigid.base import BaseArm
+from pipelines.stage import Request, run_stage
+from tests.design_excitation.short import QUICK, designed
+
+
+@pytest.mark.parametrize(("purpose", "count"), [("friction", 3), ("frf", 3), ("hold", 8)])
+def test_the_other_experiments(purpose: str, count: int, tmp_path: Path) -> None:
+    """One log an experiment, each within the limits, its speed and acceleration the derivatives of its position."""
+    out = designed(tmp_path / "out", replace(QUICK, purpose=purpose)).folder
+    robot = load_robot("rrr")
+    paths = sorted((out / "logs").glob("*.h5"))
+    assert len(paths) == count
+    for path in paths:
+        log = open_log(path).log
+        assert (log.experiment, log.origin) == (purpose, "planned")
+        q, dq, ddq = (log[name] for name in ("q_ref", "dq_ref", "ddq_ref"))
+        np.testing.assert_allclose(np.diff(q, axis=0), 0.5e-3 * (dq[1:] + dq[:-1]), atol=2e-6)
+        np.testing.assert_allclose(dq[[0, -1]], 0.0, atol=1e-9)
+        for j, joint in enumerate(robot.joints):
+            assert np.abs(dq[:, j]).max() <= joint.velocity
+            assert np.abs(ddq[:, j]).max() <= joint.acceleration
+    examined = run_stage(DOCTOR, Request((out,), out=tmp_path / "examined", no_report=True), DOCTOR.settings()).result
+    assert [check for check in examined.checks if check.level in ("reject", "repair")] == []
+
+
+def test_friction_speeds_span_two_decades(tmp_path: Path) -> None:
+    """Both directions, each of nine speeds held constant, the slowest a hundredth of the fastest; the others stay."""
+    out = designed(tmp_path / "out", replace(QUICK, purpose="friction")).folder
+    log = open_log(out / "logs/friction-2.h5").log
+    assert log.joint == 2
+    assert not np.ptp(log["q_ref"][:, [0, 2]], axis=0).any()
+    speed, still = log["dq_ref"][:, 1], np.abs(log["ddq_ref"][:, 1]) < 1e-9
+    held = np.unique(np.round(speed[still & (np.abs(speed) > 1e-6)], 6))
+    assert len(held) == 18
+    np.testing.assert_allclose(held, -held[::-1])
+    assert held[-1] / held[9] == pytest.approx(100.0, rel=1e-3)
+
+
+def test_held_postures_show_gravity(tmp_path: Path) -> None:
+    """Together the postures determine all four parameters of gravity (rank 4, verified.md, section 3)."""
+    out = designed(tmp_path / "out", replace(QUICK, purpose="hold")).folder
+    postures = np.array([open_log(path).log.posture for path in sorted((out / "logs").glob("*.h5"))])
+    body = Arm.from_links(load_robot("rrr")).body
+    still = np.zeros_like(postures)
+    values = np.linalg.svd(body.regressor(postures, still, still).reshape(-1, 15), compute_uv=False)
+    assert (values > 1e-6 * values[0]).sum() == 4
+    assert values[3] > 0.1 * values[0]
+    p = BaseArm(body.robot).known_parameters()
+    assert p is not None
+    tau = BaseArm(body.robot).torque(postures, still, still, p)
+    assert (np.abs(tau) <= 0.9 * np.array([60.0, 30.0, 15.0])).all()
+
+
+def test_held_postures_stay_in_the_box(tmp_path: Path) -> None:
+    box = (-0.4, 0.4, -0.4, 0.4, 0.4, 1.0)
+    out = designed(tmp_path / "out", replace(QUICK, purpose="hold", tip_box=box)).folder
+    postures = np.array([open_log(path).log.posture for path in (out / "logs").glob("*.h5")])
+    tip = BaseArm(load_robot("rrr")).tip(postures)
+    assert len(tip) == 8
+    assert ((tip >= np.array(box[::2])) & (tip <= np.array(box[1::2]))).all()
+
+
+@pytest.mark.parametrize("purpose", ["friction", "frf"])
+def test_plans_keep_the_tip_speed_and_the_torque(purpose: str, tmp_path: Path) -> None:
+    """A slow tip makes plans slower: its speed from its places by differences; the torque of the excitation included."""
+    out = designed(tmp_path / "out", replace(QUICK, purpose=purpose, tip_speed=0.8)).folder
+    robot = load_robot("rrr")
+    arm = BaseArm(robot)
+    p = arm.known_parameters()
+    assert p is not None
+    for path in sorted((out / "logs").glob("*.h5")):
+        log = open_log(path).log
+        tip = arm.tip(log["q_ref"])
+        assert np.linalg.norm(np.diff(tip, axis=0), axis=1).max() / log.sample_time <= 0.8
+        ddq = log["ddq_ref"] + log["v"] if purpose == "frf" else log["ddq_ref"]
+        tau = arm.torque(log["q_ref"], log["dq_ref"], ddq, p)
+        assert (np.abs(tau).max(axis=0) <= 0.9 * np.array([60.0, 30.0, 15.0])).all()
+
+
+def test_a_plan_that_no_limit_allows_names_the_limit(tmp_path: Path) -> None:
+    """Home lies outside the box: every friction plan leaves it."""
+    with pytest.raises(UsageError) as told:
+        designed(tmp_path / "out", replace(QUICK, purpose="friction", tip_box=(5.0, 6.0, -1.0, 1.0, 0.0, 2.0)))
+    assert told.value.code == "RRID-C08"
+    assert "tip x" in told.value.message
+
+
+def test_plans_are_rehearsed(tmp_path: Path) -> None:
+    """The simulated arm holds each posture, and no drive saturates."""
+    done = designed(tmp_path / "out", replace(QUICK, purpose="hold", rehearse=True)).result
+    assert len(done.rehearsals) == 8
+    for _, found in done.rehearsals:
+        assert found.safe
+        assert max(found.position_max) < 0.05
