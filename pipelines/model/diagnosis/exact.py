@@ -178,7 +178,11 @@ class Refined:
 
 def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target: Array | None = None) -> Refined:
     """Gauss-Newton with halved steps until the squared weighted residual no longer falls."""
-    y = data.y if target is None else target
+    with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
+        return _refined(model, data, weight, steps, data.y if target is None else target)
+
+
+def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
     weights = weight[data.joint]
     rigid = rigid_rows(data, model.columns)
     left = y - model.torque(data)

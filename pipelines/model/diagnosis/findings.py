@@ -67,7 +67,7 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
     for one in step.rivals:
         theirs = step.before.residual - one.done.residual
         alike = float(mine @ theirs) / max(float(np.linalg.norm(mine) * np.linalg.norm(theirs)), 1e-300)
-        if one is not best and alike > _ALIKE and one.error < step.error_before and one.possible:
+        if one is not best and alike > _ALIKE and one.error < 1.0 and one.possible:
             found.append(Rival(one.screened.cause, one.screened.joint, alike))
     return tuple(sorted(found, key=lambda rival: -rival.similarity))
 

@@ -34,7 +34,9 @@ _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
 _LEAST = 2e-3  # of the squared residual: no cause is fitted for less
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
+_MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
+_CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
 
@@ -60,7 +62,7 @@ class Tried:
     effect: Effect
     log: int | None
     done: Refined
-    error: float  # squared weighted, held out
+    error: float  # squared weighted error as a share of that before: held out; of an event, of the logs it happened in
     visibility: float
 
     @property
@@ -90,6 +92,7 @@ class Step:
     screened: tuple[Screened, ...]
     thresholds: Thresholds
     trials: tuple[Trial, ...]
+    other: Screened | None = None  # what explains more than anything that can be named by the residual, and cannot be
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +110,7 @@ def provisional(case: Case) -> tuple[Explored, ...]:
     for _ in range(_GREAT):
         one = _explored(case, now)
         found.append(one)
-        best = _fewest(one.tried, one.error)
+        best = _fewest(one.tried)
         if best is None or _share(best.screened, now) < _LARGE:
             break
         now = _reweighted(best.done)
@@ -124,7 +127,7 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         steps.append(step)
         if step.best is None:
             break
-        follows = number < len(rough) and same and step.best is _fewest(rough[number - 1].tried, rough[number - 1].error)
+        follows = number < len(rough) and same and step.best is _fewest(rough[number - 1].tried)
         now = rough[number].before if follows else _reweighted(step.best.done)
     return Found(nominal, tuple(steps), now)
 
@@ -140,8 +143,10 @@ def _explored(case: Case, now: Refined) -> Explored:
     taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
     order = sorted((one for one in screened if one.gain[0] >= _LEAST * now.rss
                     and (one.family.event or (one.cause, one.joint) not in taken)), key=lambda one: -one.gain[0])
-    tried = [_fitted(case, now, one) for one in order[:_RIVALS] if one.gain[0] >= _CLOSE * order[0].gain[0]]
-    return Explored(now, held_out(now, case), tuple(screened), tuple(sorted(tried, key=lambda one: one.error)))
+    error = held_out(now, case)
+    able = [one for one in order if one.family.shapes[0].evidence == "residual"]
+    tried = [_fitted(case, now, one, error) for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
+    return Explored(now, error, tuple(screened), tuple(sorted(tried, key=lambda one: one.error)))
 
 
 def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
@@ -149,32 +154,59 @@ def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
     thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
     passes = {id(one) for one, bound in zip(screened, thresholds.gain, strict=True) if one.gain[0] > bound}
     tried = [one for one in explored.tried if id(one.screened) in passes]
-    best = _fewest(tried, explored.error) if more else None
-    trials = _ledger(screened, thresholds, explored.tried, best, now, explored.error, number)
-    return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials)
+    best = _fewest(tried) if more else None
+    other = _other([one for one in screened if id(one) in passes], best, now)
+    best = None if other is not None else best
+    trials = _ledger(screened, thresholds, explored.tried, best, now, number)
+    return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials, other)
 
 
-def _fewest(tried: Sequence[Tried], before: float) -> Tried | None:
+def _other(passing: Sequence[Screened], best: Tried | None, now: Refined) -> Screened | None:
+    """What gives way explains more than all that the residual can name, to first order even."""
+    there = [one for one in passing if one.family.shapes[0].evidence != "residual"]
+    most = max(there, key=lambda one: one.gain[0], default=None)
+    taken = 0.0 if best is None else now.rss - best.done.rss
+    return most if most is not None and most.gain[0] > _MORE * taken else None
+
+
+def _fewest(tried: Sequence[Tried]) -> Tried | None:
     """Of those that leave nearly as little as the best, the one with fewest numbers; none where the best leaves no less."""
-    possible = [one for one in tried if one.error < before and one.possible]
+    possible = [one for one in tried if one.error < 1.0 and one.possible]
     if not possible:
         return None
     least = possible[0].error
-    near = [one for one in possible if one.error - least <= _PARSIMONY * (before - least)
+    near = [one for one in possible if one.error - least <= _PARSIMONY * (1.0 - least)
             and one.screened.joint == possible[0].screened.joint]
     return min(near, key=lambda one: (one.done.model.effects[-1].count, one.error))
 
 
-def _fitted(case: Case, now: Refined, one: Screened) -> Tried:
-    """A cause fitted exactly beside everything that was found before."""
-    log = one.logs[0] if one.family.event else None
+def _fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
+    """A cause fitted exactly beside everything that was found before; `error` is what was left held out without it."""
+    if one.family.event:
+        return _happened(case, now, one, error)
     effect = one.shape[0].full()
-    table = _table(case.data, effect, now, log)
-    amplitudes = _amplitudes(now.fit, table)
-    done = refine(now.model.with_effect(effect, amplitudes, log), case.data, now.weight)
-    seen = now.fit.project(table)
-    share = float(np.linalg.norm(seen)) / max(float(np.linalg.norm(table * now.weights)), 1e-300)
-    return Tried(one, effect, log, done, held_out(done, case), share)
+    table = _laid(case.data, effect, now.model.arm)
+    done = refine(now.model.with_effect(effect, _amplitudes(now.fit, table)), case.data, now.weight)
+    return Tried(one, effect, None, done, held_out(done, case) / error, _visibility(now, table))
+
+
+def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:
+    """An event: in one log, which no other can confirm; or in all at the same time, where the held-out ones do."""
+    log, effect = one.logs[0], one.shape[0].full()
+    whole = _laid(case.data, effect, now.model.arm)
+    table = whole if log is None else np.where(case.data.log_of == log - case.data.first, whole, 0.0)
+    once = refine(now.model.with_effect(effect, _amplitudes(now.fit, table), log), case.data, now.weight)
+    tried = Tried(one, effect, log, once, once.rss / now.rss, _visibility(now, table))
+    if case.judge is None or log is None:
+        return tried
+    named = once.model.effects[-1]
+    always = refine(now.model.with_effect(named.effect, np.array(named.amplitudes)), case.data, now.weight)
+    seen = held_out(always, case) / error
+    return Tried(one, effect, None, always, seen, tried.visibility) if seen < _CONFIRMED else tried
+
+
+def _visibility(now: Refined, table: Array) -> float:
+    return float(np.linalg.norm(now.fit.project(table))) / max(float(np.linalg.norm(table * now.weights)), 1e-300)
 
 
 def clean(explored: Explored, most: int = 8) -> Array:
@@ -195,11 +227,6 @@ def _laid(data: Data, effect: Effect, arm: Arm) -> Array:
     out = np.zeros((laid.table.shape[1], data.rows))
     out[:, laid.rows] = laid.table[0]
     return out
-
-
-def _table(data: Data, effect: Effect, now: Refined, log: int | None) -> Array:
-    out = _laid(data, effect, now.model.arm)
-    return out if log is None else np.where(data.log_of == log - data.first, out, 0.0)
 
 
 def _amplitudes(fit: Fit, table: Array) -> Array:
@@ -250,7 +277,7 @@ def _reweighted(done: Refined) -> Refined:
 
 
 def _ledger(screened: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried], best: Tried | None, now: Refined,
-            error: float, number: int) -> tuple[Trial, ...]:
+            number: int) -> tuple[Trial, ...]:
     exact = {id(one.screened): one for one in tried}
     rows: list[Trial] = []
     order = sorted(range(len(screened)), key=lambda k: -screened[k].gain[0])
@@ -263,7 +290,7 @@ def _ledger(screened: Sequence[Screened], thresholds: Thresholds, tried: Sequenc
         reason = ("accepted" if accepted else "below its threshold" if one.gain[0] <= thresholds.gain[k] else
                   "weaker than others" if fitted is None else
                   "impossible numbers" if not fitted.possible else
-                  "held-out error does not fall" if fitted.error >= error else "explains less than the one accepted")
+                  "held-out error does not fall" if fitted.error >= 1.0 else "explains less than the one accepted")
         gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
         rows.append(Trial(number, one.cause, one.joint, float(one.gain[0] / now.rss), float(thresholds.gain[k] / now.rss),
                           float(one.visibility[0]), gained, accepted, reason))

@@ -1,7 +1,7 @@
 """What a cause has to exceed before it is believed: what the twin, in which nothing is wrong, shows of it and of its like.
 
-A threshold is three times the larger of the most that any replica gives the cause itself, and half the most that any gives any
-cause at the same place. The second keeps the luck of few replicas out.
+A threshold is three times the largest of: the most that any replica gives the cause itself; what half the causes at the same place
+get, which keeps the luck of few replicas out; and a hundredth of what is left at the joint, which is of no use to anybody.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from pipelines.model.diagnosis.twin import Twin
 
 __all__ = ["Thresholds", "without_twin"]
 
-_TIMES, _FAMILY = 3.0, 0.5
+_TIMES = 3.0
+_USELESS = 0.01  # of the squared weighted residual of a joint of the twin
 _SHARE = 0.02  # of the squared weighted residual of one joint: what is less is no finding, whatever the twin says
 
 
@@ -38,11 +39,16 @@ class Thresholds:
         fit, residuals = twin.weighted(weight)
         found = screen(twin.data, fit, families, arm, residuals)
         own = np.array([one.gain.max() for one in found])
-        alike = {joint: max(o for o, f in zip(own, families, strict=True) if f.joint == joint)
-                 for joint in {f.joint for f in families}}
-        family = np.array([alike[f.joint] for f in families])
-        return cls(_TIMES * np.maximum(own, _FAMILY * family), own, f"{len(twin.fits)} replicas of the twin", weight,
-                   tuple(f.joint for f in families))
+        once = np.array([f.event for f in families])
+        joint = np.array([f.joint or 0 for f in families])
+        there = [own[(joint == j) & ~once] for j in range(len(weight) + 1)]
+        usual = np.array([np.median(some) if len(some) else 0.0 for some in there])
+        usual[0] = max(usual[0], float(np.median(usual[1:])))
+        power = np.mean(residuals**2, axis=0)
+        left = np.bincount(twin.data.joint, power, minlength=len(weight))
+        least = _USELESS * np.append(left.mean(), left)
+        gain = _TIMES * np.max([own, np.where(once, 0.0, usual[joint]), least[joint]], axis=0)
+        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, tuple(f.joint for f in families))
 
     def at(self, weight: Array) -> Thresholds:
         """The same with other weights: a cause acts on its joint, one of the whole arm where that counts most."""

@@ -33,6 +33,7 @@ __all__ = ["Twin", "drive_noise", "make_twin", "replayable", "white"]
 _WINDOW = 0.4  # [s] in which the noise is looked at
 _QUIET = 0.3  # of the windows are taken for quiet
 _NUISANCE = 20040509
+_BOUNDS = (0.25, 2.0)  # of the guess's power: counting of the encoders hides what is less
 _SMOOTH = 5  # rows of the moving average whose remainder is noise
 
 
@@ -93,7 +94,7 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
         seen.append(_roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t)))))
     still, shaken = np.square(seen[0]), np.square(seen[1])
     share = (np.square(rough) - still) / np.maximum(shaken - still, 1e-6 * np.square(rough) + 1e-300)
-    return np.asarray(guess * np.sqrt(np.clip(share, 0.0, 4.0)))
+    return np.asarray(guess * np.sqrt(np.clip(share, *_BOUNDS)))
 
 
 def white(data: Data, left: Array) -> Array:

@@ -46,15 +46,17 @@ def explained(step: Step, found: Found, floor: Array) -> float:
 def rule(found: Found, floor: Array) -> Ruling:
     """Which causes are named."""
     accepted = [step for step in found.steps if step.best is not None]
+    other = next((step.other for step in found.steps if step.other is not None), None)
     joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
     high = ", ".join(f"joint {j + 1}" for j in joints.tolist())
+    if other is not None and (not accepted or len(joints)):
+        where = "the arm or its base" if other.joint is None else f"joint {other.joint} or what carries it"
+        return Ruling("unknown", (), f"{where} gives way, of a kind that these logs do not tell: record frequency responses in two "
+                      "postures")
     if not accepted:
         if len(joints):
             return Ruling("unknown", (), f"the residual of {high} stands above the floor, and no cause explains it")
         return Ruling("nothing-wrong", (), "")
-    compliant = [step for step in accepted if step.best is not None and step.best.effect.evidence != "residual"]
-    if compliant:
-        return Ruling("unknown", (), "something gives way, of a kind that these logs do not tell: record frequency responses")
     whole = excess(found.nominal.rms, floor)
     total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
     if whole > 0.1 and total < _HALF:
