@@ -136,7 +136,8 @@ class Hooks:
     (a delay line): after `sensor` was asked, before the command acts. A command is the torque as it reaches this effect:
     of several the last one meets it first. The motion handed in is the true one with ddq
     zero: what multiplies acceleration goes to `inertia` or `arm`. Where a sensor is in error, `settled` says where the arm
-    truly is at rest when it reads its first position, so that the run does not begin with a jump.
+    truly is when it reads its first position, so that the run does not begin with a jump; it and `start` are given the first
+    acceleration too, as far as that is known.
     """
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
@@ -145,7 +146,7 @@ class Hooks:
     inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)
     arm: ArmModel | None = None  # the arm as it truly is
     states: int = 0
-    settled: Callable[[Motion, Array], Array] | None = None  # motion as measured at the first sample and its torque -> true q
+    settled: Callable[[Motion, Array], Motion] | None = None  # as measured at the first sample, with its torque -> as it truly is
     start: Callable[[Motion, Array], Array] | None = None  # motion and torque at the first sample -> states
     rate: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> d(states)/dt
     update: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> next states

@@ -92,13 +92,16 @@ class BaseResonance(Effect):
             seen[:, _FIRST] -= states[:, 0]
             return seen
 
-        def settled(motion: Motion, tau: Array) -> Array:
+        def rests(motion: Motion, tau: Array) -> Array:
+            return np.asarray((friction(motion, motion.dq[:, _FIRST]) - tau[:, _FIRST]) / (inertia * w * w))
+
+        def settled(motion: Motion, tau: Array) -> Motion:
             q = motion.q.copy()
-            q[:, _FIRST] -= tau[:, _FIRST] / (inertia * w * w)
-            return q
+            q[:, _FIRST] += rests(motion, tau)
+            return replace(motion, q=q)
 
         def start(motion: Motion, tau: Array) -> Array:
-            return np.stack([-tau[:, _FIRST] / (inertia * w * w), np.zeros(len(tau))], axis=-1)
+            return np.stack([rests(motion, tau), np.zeros(len(tau))], axis=-1)
 
         return Hooks(actuator=actuator, sensor=sensor, states=2, settled=settled, start=start, rate=rate)
 

@@ -52,10 +52,7 @@ class EncoderCrosstalk(Effect):
                 yield replace(self, from_joint=float(other))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
-        true, c = motion, values["coefficient"]
-        if c:
-            d, rate, second = self.at(values)._error(motion)
-            true = shifted(motion, self._index, c * d, c * rate, c * second)
+        true = self._corrected(motion, values) if values["coefficient"] else motion
         return predict(true, arm) if predict is not None else arm.torque(true)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
@@ -66,12 +63,12 @@ class EncoderCrosstalk(Effect):
             seen[:, self._index] += c * q[:, other]
             return seen
 
-        def settled(motion: Motion, _: Array) -> Array:
-            q = motion.q.copy()
-            q[:, self._index] -= c * q[:, other]
-            return q
+        return Hooks(sensor=sensor, settled=lambda motion, _: self._corrected(motion, values))
 
-        return Hooks(sensor=sensor, settled=settled)
+    def _corrected(self, motion: Motion, values: Values) -> Motion:
+        c = values["coefficient"]
+        d, rate, second = self.at(values)._error(motion)
+        return shifted(motion, self._index, c * d, c * rate, c * second)
 
     def _error(self, motion: Motion) -> tuple[Array, Array, Array]:
         """-q_i and its derivatives."""

@@ -66,12 +66,7 @@ class EncoderEccentricity(Effect):
             seen[:, self._index] += values["amplitude"] * np.sin(self.own(q) + values["phase"])
             return seen
 
-        def settled(motion: Motion, _: Array) -> Array:
-            q = motion.q.copy()
-            q[:, self._index] = _settled(self.own(q), values)
-            return q
-
-        return Hooks(sensor=sensor, settled=settled)
+        return Hooks(sensor=sensor, settled=lambda motion, _: self._corrected(motion, values))
 
 
 def _settled(measured: Array, values: Values) -> Array:

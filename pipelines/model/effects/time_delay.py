@@ -61,28 +61,28 @@ class TimeDelay(Effect):
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The encoder reads from a record of past positions and speeds.
 
-        States: t and q now, then t, q, q̇ of each kept sample, the newest first. Between the newest and now, whose speed an
-        encoder does not know, a parabola. What other sensors add stays.
+        States: time since the start and q now, then time, q, q̇ of each kept sample, the newest first. Between the newest
+        and now, whose speed an encoder does not know, a parabola. What other sensors add stays.
         """
         j, delay = self._index, values["delay"]
         if not delay:
             return Hooks(sensor=lambda q, states: q)
 
-        def settled(motion: Motion, tau: Array) -> Array:
-            q = motion.q.copy()
-            q[:, j] += delay * motion.dq[:, j]
-            return q
+        def settled(motion: Motion, tau: Array) -> Motion:
+            v, a = motion.dq[:, j], motion.ddq[:, j]
+            return shifted(motion, j, delay * (v + 0.5 * delay * a), delay * a, 0.0 * a)
 
         def start(motion: Motion, tau: Array) -> Array:
-            """Before the first sample it moved on evenly."""
+            """Before the first sample it moved with the same acceleration."""
             ago = np.arange(1, _ROWS + 1) * delay * _CLOSEST
-            rows = [np.stack([motion.t - back, motion.q[:, j] - back * motion.dq[:, j], motion.dq[:, j]], axis=-1) for back in ago]
-            return np.concatenate([motion.t[:, None], motion.q[:, [j]], *rows], axis=1)
+            q, v, a = motion.q[:, j], motion.dq[:, j], motion.ddq[:, j]
+            rows = [np.stack([0.0 * q - back, q - back * (v - 0.5 * back * a), v - back * a], axis=-1) for back in ago]
+            return np.concatenate([0.0 * q[:, None], q[:, None], *rows], axis=1)
 
         def update(motion: Motion, command: Array, states: Array) -> Array:
-            if motion.t[0] - states[0, 2] < 0.999 * _CLOSEST * delay:
+            if states[0, 0] - states[0, 2] < 0.999 * _CLOSEST * delay:
                 return states
-            now = np.stack([motion.t, motion.q[:, j], motion.dq[:, j]], axis=-1)
+            now = np.stack([states[:, 0], motion.q[:, j], motion.dq[:, j]], axis=-1)
             return np.concatenate([states[:, :2], now, states[:, 2:-3]], axis=1)
 
         def rate(motion: Motion, command: Array, states: Array) -> Array:
@@ -109,12 +109,12 @@ def _cubic(t: Array, x: Array, slope: Array, k: Indices, at: Array) -> Array:
 
 
 def _read(states: Array, delay: float) -> Array:
-    """The position (replicas,) that is `delay` old; all replicas share one clock."""
+    """The position (replicas,) that is `delay` old; the clocks of all replicas run alike."""
     now, q = states[:, 0], states[:, 1]
     t, x, v = (states[:, k::3].T[::-1] for k in (2, 3, 4))  # (rows, replicas), the oldest first
     wanted = float(now[0]) - delay
     k = int(np.searchsorted(t[:, 0], wanted, side="right")) - 1
     if k < len(t) - 1:
         return np.asarray(_cubic(t[:, 0], x, v, np.array([max(k, 0)]), np.array([wanted]))[0])
-    since, back = wanted - t[-1], now - t[-1]
+    since, back = now - delay - t[-1], now - t[-1]
     return np.asarray(x[-1] + since * v[-1] + (since / back) ** 2 * (q - x[-1] - back * v[-1]) if back[0] > 0.0 else q)

@@ -10,7 +10,7 @@ joints before it, which a disc of J_m on a parallel axis would feel too. All arr
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,11 +51,16 @@ class DriveApart:
         seen[:, self.index] += states[:, 0]
         return seen
 
-    def settled(self, motion: Motion, tau: Array) -> Array:
+    def settled(self, motion: Motion, tau: Array) -> Motion:
         """Where the links are when the drive rests at the first position under `tau`."""
         q = motion.q.copy()
-        q[:, self.index] -= self.ahead(tau[:, self.index])
-        return q
+        q[:, self.index] -= self._rests(motion, tau)
+        return replace(motion, q=q)
 
     def start(self, motion: Motion, tau: Array) -> Array:
-        return np.stack([self.ahead(tau[:, self.index]), motion.dq[:, self.index]], axis=-1)
+        return np.stack([self._rests(motion, tau), motion.dq[:, self.index]], axis=-1)
+
+    def _rests(self, motion: Motion, tau: Array) -> Array:
+        """Angle ahead under what of `tau` reaches the link, as if that did not change."""
+        speed, acceleration = motion.dq[:, self.index], motion.ddq[:, self.index]
+        return self.ahead(tau[:, self.index] - self.friction(motion, speed) - self.inertia * acceleration)

@@ -10,7 +10,7 @@ Effects enter through their hooks, in the order in which they act; what is frict
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -167,18 +167,18 @@ class MovingPlant:
             yield hook, own, torque
             torque = hook.actuator(torque, motion, states[:, own]) if hook.actuator else torque
 
-    def settled(self, t: Array, q: Array, dq: Array) -> Array:
-        """Where the arm truly is (joints, replicas) when its encoders first read q (joints, replicas)."""
-        motion = self.motion(t, q, dq)
+    def settled(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Array:
+        """True position and speed (2 joints, replicas) when the encoders first tell q, dq and ddq, each (joints, replicas)."""
+        motion = Motion(t, q.T, dq.T, self._zeros if ddq is None else ddq.T)
         for hook, _ in reversed(self._hooked):
             if hook.settled:
-                motion = replace(motion, q=hook.settled(motion, self.plant.needed(motion)))
-        return motion.q.T
+                motion = hook.settled(motion, self.plant.needed(motion))
+        return np.concatenate([motion.q.T, motion.dq.T])
 
-    def at_start(self, t: Array, q: Array, dq: Array) -> Array:
+    def at_start(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Array:
         """The states (replicas, states) before the first sample."""
         states = np.zeros((self.replicas, self.n_states))
-        motion = self.motion(t, q, dq)
+        motion = Motion(t, q.T, dq.T, self._zeros if ddq is None else ddq.T)
         for hook, own in self._hooked:
             if hook.start:
                 states[:, own] = hook.start(motion, self.plant.needed(motion))

@@ -65,7 +65,7 @@ def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = 
     integrator = _integrator(moving, experiment.sample_time, steps)
     state = np.ascontiguousarray(np.repeat(np.concatenate([experiment.q0, experiment.dq0])[:, None], replicas, axis=1))
     t = np.full(replicas, experiment.start_time)
-    state[:n] = moving.settled(t, state[:n], state[n:])
+    state[:] = moving.settled(t, state[:n], state[n:])
     states = moving.at_start(t, state[:n], state[n:])
     shape = (experiment.n_samples, n, replicas)
     counted, commanded, motion = np.empty(shape), np.empty(shape), np.empty((shape[0], 2 * n, replicas))

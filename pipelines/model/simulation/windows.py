@@ -97,8 +97,10 @@ def _follow(plant: Plant, motion: Motion, tau: Array, sample_time: float, first:
     n = tau.shape[1]
     state = np.ascontiguousarray(np.concatenate([motion.q[first], motion.dq[first]], axis=1).T)
     t = motion.t[first].copy()
-    state[:n] = moving.settled(t, state[:n], state[n:])
-    states = moving.at_start(np.full_like(t, motion.t[0]), state[:n], state[n:])  # memories count from the start of the log
+    ddq = motion.ddq[first].T
+    state[:] = moving.settled(t, state[:n], state[n:], ddq)
+    # memories count from the start of the log
+    states = moving.at_start(np.full_like(t, motion.t[0]), state[:n], state[n:], ddq)
     out = np.empty((length, 2 * n, len(first)))
     for k in range(length):
         out[k] = state

@@ -28,7 +28,7 @@ from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.joint_elasticity import JointElasticity
 from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Plant, run
+from pipelines.model.simulation import Experiment, Plant, run, simulate_windows
 from tests.model.effects.on_bench import arm, fault, faulty, healthy, machine, planned, rms
 from tests.model.simulation.arms import KD, KP, experiment
 
@@ -192,6 +192,21 @@ def test_an_arm_at_rest_stays_at_rest(acting: Acting) -> None:
     np.testing.assert_allclose(q[0], [0.3, -0.7, 0.9], atol=1e-6)
     assert np.abs(tau - tau[0]).max() < 0.02 * np.abs(tau).max()
     assert np.abs(q - q[0]).max() < 1e-4
+
+
+@pytest.mark.parametrize(("name", "apart"), [("time_delay", 0.15), ("encoder_eccentricity", 0.03), ("encoder_crosstalk", 0.03)])
+def test_windows_start_where_the_arm_truly_was(name: str, apart: float) -> None:
+    """Of the position error of 50 ms windows hardly anything stays, where a wrong encoder tells how they start."""
+    effect, values = sealed(name, 2)
+    recording = faulty(name, 2)
+    spline = make_interp_spline(recording.t, recording.q, k=7, axis=0)
+    motion = Motion(recording.t, *(spline(recording.t, k) for k in range(3)))
+    usable = (recording.t > 0.7) & (recording.t < 1.1)
+    error = []
+    for model in (arm(), arm().extended(Acting.of(effect, values))):
+        found = simulate_windows(Plant.of(model), motion, recording.tau, SAMPLE_TIME, 50, usable).q
+        error.append(rms((found - recording.q)[np.isfinite(found[:, 0])]))
+    assert error[1] < apart * error[0]
 
 
 @pytest.mark.parametrize("other", [
