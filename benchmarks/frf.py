@@ -70,14 +70,16 @@ def accuracy(numbers: Iterable[int], folder: Path) -> None:
             (measured,) = measured_responses([log])
             modes = fitted_modes(measured)
             for kind, frequency, damping in true_modes(case, log):
-                near = [m for m in modes.modes if m.kind == kind and abs(m.frequency.value - frequency) < 0.1 * frequency]
+                near = [m for m in (*modes.modes, *modes.traces)
+                        if m.kind == kind and abs(m.frequency.value - frequency) < 0.1 * frequency]
                 if not near:
                     missed += 1
                     print(f"{log.name}  joint {log.joint}  {kind:14s} {frequency:8.3f} Hz  missed")
                     continue
                 rows.append(_row(log, min(near, key=lambda m: abs(m.frequency.value - frequency)), frequency, damping))
     off, damped, inside, damping_inside = (np.array(column) for column in zip(*rows, strict=True))
-    print(f"{len(rows)} modes, {missed} missed. Inside 95 % bands: frequency {inside.mean():.2f}, damping {damping_inside.mean():.2f}")
+    print(f"{len(rows)} modes, {missed} missed. Inside 95 % bands: frequency {inside.mean():.2f}, "
+          f"damping {damping_inside.mean():.2f}")
     for name, values, bar in (("frequency", off, 0.01), ("damping", damped, 0.15)):
         print(f"{name}: worst {100.0 * values.max():.2f} %, median {100.0 * np.median(values):.3f} %, within {100.0 * bar:g} %: "
               f"{(values < bar).sum()}")
@@ -87,7 +89,9 @@ def _row(log: ExperimentLog, mode: Mode, frequency: float, damping: float) -> tu
     f, d = mode.frequency, mode.damping
     off, damped = abs(f.value / frequency - 1.0), abs(d.value / damping - 1.0)
     print(f"{log.name}  joint {log.joint}  {mode.kind:14s} {frequency:8.3f} Hz  found {f.value:8.3f} ± {f.std:.3f} "
-          f"({100.0 * off:5.2f} %)   damping {damping:.4f}  found {d.value:.4f} ± {d.std:.4f} ({100.0 * damped:5.1f} %)", flush=True)
+          f"({100.0 * off:5.2f} %)   damping {damping:.4f}  found {d.value:.4f} ± {d.std:.4f} ({100.0 * damped:5.1f} %)"
+          f"{'' if mode.distinct else '  trace'}",
+          flush=True)
     return off, damped, abs(f.value - frequency) < 1.96 * f.std, abs(d.value - damping) < 1.96 * d.std
 
 
@@ -112,7 +116,8 @@ def disturbance(folder: Path, torque: float = 12.0, duration: float = 60.0) -> N
     """White torque noise of `torque` [N m] rms at joint 1, twice the excitation's."""
     case = accuracy_case(0, duration)
     noisy = replace(case.machine, amplifier_noise=(torque, *case.machine.amplifier_noise[1:]))
-    case = replace(case, name=f"disturbed-{torque:g}-{duration:g}", machine=noisy, faults=(), strength=1.0, excited=case.excited[:1])
+    case = replace(case, name=f"disturbed-{torque:g}-{duration:g}", machine=noisy, faults=(), strength=1.0,
+                   excited=case.excited[:1])
     (log,) = logs_of(case, folder)
     (measured,) = measured_responses([log])
     truth, fit = truth_of(case, log)[0], fitted_modes(measured).fit

@@ -104,13 +104,19 @@ def _grouping(sure: Sequence[Classified], unsure: Sequence[Undecided]) -> Sectio
 
 
 def _modes(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method]]) -> Section:
-    rows = [(p.joint, posture_words(p.posture, p.joint), mode.kind, with_std(mode.frequency.value, mode.frequency.std),
-             with_std(mode.damping.value, mode.damping.std))
-            for p, own in zip(postures, methods, strict=True) for mode in own["closed-loop"].modes]
-    if not rows:
-        return Section("Modes", ("No response has a mode that noise does not explain.",))
-    return Section("Modes", ("From a rational function fitted to the default response, weighted with its variance.",),
-                   (Table(("joint", "posture", "kind", "frequency [Hz]", "damping ratio"), tuple(rows), "Value ± std."),))
+    columns = ("joint", "posture", "kind", "frequency [Hz]", "damping ratio")
+
+    def rows(which: str) -> tuple[tuple[str | int, ...], ...]:
+        return tuple((p.joint, posture_words(p.posture, p.joint), mode.kind, with_std(mode.frequency.value, mode.frequency.std),
+                      with_std(mode.damping.value, mode.damping.std))
+                     for p, own in zip(postures, methods, strict=True) for mode in getattr(own["closed-loop"], which))
+
+    tables = [Table(columns, found, caption) for found, caption in (
+        (rows("modes"), "Value ± std."),
+        (rows("traces"), "Traces: an antiresonance and a resonance that nearly cancel. No grouping rests on them.")) if found]
+    text = "From a rational function fitted to the default response, weighted with its variance." if tables else \
+        "No response has a mode that noise does not explain."
+    return Section("Modes", (text,), tuple(tables))
 
 
 def _joint(joint: int, own: Sequence[tuple[Posture, Mapping[str, Method]]], drawn: Sequence[int]) -> Section:

@@ -9,7 +9,7 @@ resonance above it is a part that gives way; what it carries drops out above it,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,9 @@ BAND = (4.0, 250.0)  # [Hz] below it friction and gravity are at work, above it 
 _OF_RATE = 0.3  # highest, of the rate
 _STIFFEST = 0.35  # damping ratio beyond which a pair is no mode
 _SURE = 0.05  # relative std of a frequency that is known at all
+# Relative std of a damping beside noise: the slope of friction, the joint's and that of held joints, depends on how far the speed
+# swings. On the bench, with swings of a tenth of the turn, it changes damping by 2 to 6 %.
+_BY_FRICTION = 0.03
 _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
@@ -52,6 +55,7 @@ class Modes:
     """Of one response."""
 
     modes: tuple[Mode, ...]  # distinct ones, by frequency
+    traces: tuple[Mode, ...]  # of pairs that nearly cancel: seen, but no grouping rests on them
     pairs: tuple[Pair, ...]
     single: tuple[Mode, ...]  # that have no partner
     level: Known  # of the rigid body above friction and below the modes, beside the model's: 1 where its inertia is right
@@ -86,7 +90,8 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     relative = relative_acceleration(measured)
     part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
     fit = fit_rational(part.frequency, part.response, part.variance, correlated=part.correlated)
-    modes = tuple(m for m in fit.modes() if _is_mode(m))
+    modes = tuple(_with_friction(m) for m in fit.modes() if _is_mode(m))
+    traces = tuple(_with_friction(m) for m in fit.modes() if not m.distinct and _is_mode(replace(m, distinct=True)))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
@@ -94,7 +99,7 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     above = Known(level.value * rise, float(np.hypot(level.std * rise, level.value * rise * _rise_std(pairs))))
     smooth = np.arange(_STRAIGHT[0], min(_STRAIGHT[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
-    return Modes(modes, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
+    return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
                  _inertia(measured, level), _friction_below(relative, level), fit.misfit,
                  (float(part.frequency[0]), float(part.frequency[-1])), fit)
 
@@ -150,6 +155,12 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
 
 def _is_mode(mode: Mode) -> bool:
     return mode.distinct and abs(mode.damping.value) < _STIFFEST and mode.frequency.std < _SURE * mode.frequency.value
+
+
+def _with_friction(mode: Mode) -> Mode:
+    """Its damping as uncertain as friction makes it, beside the noise."""
+    d = mode.damping
+    return replace(mode, damping=Known(d.value, float(np.hypot(d.std, _BY_FRICTION * abs(d.value)))))
 
 
 def _paired(modes: tuple[Mode, ...]) -> tuple[tuple[Pair, ...], tuple[Mode, ...]]:

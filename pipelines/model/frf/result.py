@@ -62,6 +62,7 @@ class Method:
     averages: float
     coherence_below_0_7_hz: tuple[Band, ...]
     modes: tuple[ModeFound, ...]
+    traces: tuple[ModeFound, ...]  # of pairs that nearly cancel
     difference: float | None  # largest from the default where both are reliable, as a share of it; None of the default itself
     difference_at: float | None  # [Hz]
     curve: Curve  # input → q
@@ -128,15 +129,15 @@ class Undecided:
 def methods_of(seen: Seen) -> tuple[Method, ...]:
     """Closed-loop, direct, and indirect where the controller is described."""
     m = seen.measured
-    modes = tuple(_mode(one) for one in seen.modes.modes)
-    several = [("closed-loop", m.plant, modes), ("direct", m.direct, ())]
+    modes, traces = (tuple(_mode(one) for one in several) for several in (seen.modes.modes, seen.modes.traces))
+    several = [("closed-loop", m.plant, modes, traces), ("direct", m.direct, (), ())]
     if m.indirect is not None:
-        several.append(("indirect", m.indirect, ()))
+        several.append(("indirect", m.indirect, (), ()))
     found = []
-    for name, response, own in several:
+    for name, response, own, faint in several:
         off = (None, None) if name == "closed-loop" else difference(m.plant, response)
         found.append(Method(m.joint, m.first.posture, name, response.method, tuple(t.name for t in m.turned), response.resolution,
-                            response.averages, bands_below(response.frequency, response.coherence, COHERENCE), own, *off,
+                            response.averages, bands_below(response.frequency, response.coherence, COHERENCE), own, faint, *off,
                             Curve.of(response)))
     return tuple(found)
 

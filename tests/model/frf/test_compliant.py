@@ -45,7 +45,7 @@ def modes_of(pairs: list[tuple[float, float]], inertia: float, delay: float = 0.
 
     found = tuple(Pair(mode("antiresonance", a), mode("resonance", r)) for a, r in pairs)
     every = tuple(m for p in found for m in (p.antiresonance, p.resonance))
-    return Modes(every, found, (), Known(1.0, 1e-3), Known(1.0, 1e-3), Known(delay, 2e-6), flat, Known(inertia, 1e-3), 0.0, 1.0,
+    return Modes(every, (), found, (), Known(1.0, 1e-3), Known(1.0, 1e-3), Known(delay, 2e-6), flat, Known(inertia, 1e-3), 0.0, 1.0,
                  (4.0, 250.0), _NONE)
 
 
