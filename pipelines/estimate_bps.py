@@ -106,7 +106,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         recipe.check(log)
     motions, said = _examined(identify, settings)
     judges, said_too = _examined(validate, settings)
-    recipe = with_cutoff(recipe, motions, columns)
+    recipe = with_cutoff(recipe, motions)
     means, floors = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
     fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
     judged = judge(fitted, means[len(motions):], settings.blocks)

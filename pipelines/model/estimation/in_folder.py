@@ -55,7 +55,7 @@ def _fit(motions: Motions, how: Reconstruction, friction: tuple[Acting, ...]) ->
     columns = nominal_columns(robot, friction=not friction)
     unknown = tuple(Parameter(p.name, 0.0, None, p.unit, origin="assumed") for p in columns.body.parameters)
     recipe = Recipe(how, known=Arm(robot.name, columns.body, unknown, friction).friction_torque if friction else None)
-    recipe = with_cutoff(recipe, motions, columns)
+    recipe = with_cutoff(recipe, motions)
     means, _ = averaged(motions, how, recipe.cutoff_hz)
     return fit_logs(means, columns, recipe)
 

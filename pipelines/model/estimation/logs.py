@@ -95,7 +95,7 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
     """
     for log, _ in motions:
         recipe.check(log)
-    recipe = with_cutoff(recipe, motions, columns)
+    recipe = with_cutoff(recipe, motions)
     equations = equations_of(motions, recipe, columns, rows)
     _fast_enough(equations, motions)
     _enough(equations, motions[0][0])
@@ -103,7 +103,7 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
     return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, equations), weighted)
 
 
-def with_cutoff(recipe: Recipe, motions: Motions, columns: Columns) -> Recipe:
+def with_cutoff(recipe: Recipe, motions: Motions) -> Recipe:
     """`recipe` with the cut-off for these logs, where none is given: the highest that any of them asks for."""
     if recipe.found or recipe.cutoff_hz is not None:
         return recipe

@@ -149,7 +149,7 @@ def fit_several(identify: Motions, validate: Motions, recipe: Recipe, law: Law |
     """
     robot = identify[0][0].robot
     columns = nominal_columns(robot, friction=False, offset=False)
-    recipe = with_cutoff(recipe, identify, columns)
+    recipe = with_cutoff(recipe, identify)
     rows, others = (tuple(equations_of(part, recipe, columns)) if part else () for part in (identify, validate))
     laws = (law,) if law is not None else tuple(one for one in LADDER if one.pointwise and not one.sees_load)
     ladders = tuple(climb(Judge(RowEquations(_Row(rows, j)), RowEquations(_Row(others, j)) if others else None), laws)
