@@ -71,7 +71,7 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     columns = _columns(logs, arm)
     how = Reconstruction()
     fitted, judging, referring = (motions_of(part, how) for part in (logs.identify, logs.validate, logs.reference))
-    recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed), (*fitted, *referring), columns)
+    recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed), (*fitted, *referring))
     count = len(fitted)
     return Prepared(logs, columns, recipe, fitted, judging, referring, gather(fitted, columns, recipe),
                     gather(judging, columns, recipe, first=count) if judging else None,
