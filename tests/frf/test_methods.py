@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.log.experiment import Signal
 from pipelines.model.frf.findings import frf_findings
 from pipelines.model.frf.modes import fitted_modes
 from pipelines.model.frf.responses import How, Measured, measured_responses
@@ -68,6 +69,24 @@ def test_a_strong_disturbance_misleads_the_direct_method_alone() -> None:
     inside = found.plant.within(1.0, 100.0)
     off = np.abs(inside.response / loop.response(inside.frequency) - 1.0) / np.sqrt(inside.variance) * np.abs(inside.response)
     assert np.mean(off**2) < 1.3  # no more than its variance says: no bias
+
+
+@pytest.mark.parametrize("law", ["computed-torque", "pd"])
+def test_the_delay_of_a_controller_is_known(law: str) -> None:
+    """A sample between what it read and the torque it leads to, as the log says: no delay of the plant, by either method."""
+    loop = Loop(rigid(1.0), law=law, late=1)
+    log = loop.log()
+    assert log.controller is not None
+    signals = dict(log.signals)
+    if law == "pd":  # torque is logged as it acts
+        acting = np.concatenate([np.zeros((1, 1)), log.tau[:-1]])
+        signals["tau"] = Signal(acting, "N m", "torque")
+    (found,) = measured_responses([replace(log, signals=signals, controller=replace(log.controller, delay=1))])
+    assert fitted_modes(found).delay.value == pytest.approx(0.0, abs=1e-5)
+    truth = loop if law == "computed-torque" else replace(loop, late=0)
+    assert found.indirect is not None
+    assert error(truth, found.plant, 3.0, 60.0) < 0.01
+    assert error(truth, found.indirect, 3.0, 60.0) < 0.01
 
 
 @pytest.mark.parametrize("late", [0, 1, 5])
