@@ -135,6 +135,7 @@ class Data:
 
     logs: tuple[LogData, ...]
     first: int = 0  # number of the first log among all that are diagnosed: of what happens in one log only
+    known: Array | None = None  # (rows,) [N m] torque that is subtracted: of standing effects
 
     @property
     def n_joints(self) -> int:
@@ -161,7 +162,8 @@ class Data:
 
     @cached_property
     def y(self) -> Array:
-        return self._counted(np.concatenate([one.y.ravel() for one in self.logs]))
+        measured = np.concatenate([one.y.ravel() for one in self.logs])
+        return self._counted(measured if self.known is None else measured - self.known)
 
     @property
     def rows(self) -> int:

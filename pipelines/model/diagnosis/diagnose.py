@@ -17,16 +17,18 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import extended_arm, findings, rejected, sure
+from pipelines.model.diagnosis.findings import absorbed_finding, extended_arm, findings, rejected, sure
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.result import Diagnosis, Finding, ResidualRms, Threshold
+from pipelines.model.diagnosis.result import Diagnosis, Finding, ResidualRms, Threshold, Verdict
 from pipelines.model.diagnosis.search import Case, Explored, Found, clean, held_out_left, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.since import Since, since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin, drive_noise, make_twin, replayable, white
 from pipelines.model.diagnosis.verdict import Ruling, rule
@@ -48,6 +50,9 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     prepared = prepare(logs, chosen, arm)
+    if prepared.reference is not None:
+        say("comparing with the reference logs")
+        return _changed(prepared, since_reference(prepared, prepared.reference, chosen), chosen)
     case = _case(prepared, chosen)
     say("looking for the greatest causes")
     rough = provisional(case)
@@ -95,6 +100,29 @@ def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen
             bounds = Thresholds.of_twin(twin, case.families, model.nominal, rough[0].before.weight)
             return _Floored(twin.rms, "twin", twin, bounds, twin.noise)
     return _Floored(white(prepared.data, left), "blocks", None, None, nan)
+
+
+def _changed(prepared: Prepared, since: Since, chosen: DiagnosisSettings) -> Diagnosis:
+    """What is different since the reference logs."""
+    now = replace(prepared, data=since.case.data, judge=since.case.judge)
+    found = search(since.case, chosen.most)
+    ruling = _believed(found, now, rule(found, since.floor), chosen)
+    floored = _Floored(since.floor, "reference logs", None, None, np.full(prepared.data.n_joints, np.nan))
+    told = _told(now, since.case, found, ruling, floored, chosen)
+    told = replace(told, question="what has changed", standing=since.standing)
+    if told.extended is not None:
+        told = replace(told, extended=replace(told.extended, effects=(*since.acting, *told.extended.effects)))
+    return told if since.absorbed is None else _with_absorbed(told, since.absorbed)
+
+
+def _with_absorbed(told: Diagnosis, moved: Absorbed) -> Diagnosis:
+    """A cause that the base parameters show is a finding as well."""
+    one = absorbed_finding(moved, told)
+    findings = tuple(sorted((one, *told.findings), key=lambda finding: -finding.explained))
+    verdict: Verdict = "unknown" if told.verdict == "unknown" else "cause"
+    if verdict == "unknown":
+        return told
+    return replace(told, verdict=verdict, findings=findings, summary=_sentence(Ruling("cause", (), ""), findings))
 
 
 def _believed(found: Found, prepared: Prepared, ruling: Ruling, chosen: DiagnosisSettings) -> Ruling:

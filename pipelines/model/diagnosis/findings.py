@@ -6,16 +6,17 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.exact import Refined
 from pipelines.model.diagnosis.gains import simulation_errors, torque_gain
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.numbers import acting, parameters
-from pipelines.model.diagnosis.result import BeforeAfter, Finding, Gain, Rejected, Rival
+from pipelines.model.diagnosis.result import BeforeAfter, Diagnosis, Finding, Gain, Rejected, Rival, TorqueGain
 from pipelines.model.diagnosis.search import Found, Step, Tried
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
-__all__ = ["agreement", "extended_arm", "findings", "rejected", "sure"]
+__all__ = ["absorbed_finding", "agreement", "extended_arm", "findings", "rejected", "sure"]
 
 _ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
@@ -53,6 +54,17 @@ def _finding(found: Found, step: Step, best: Tried, place: int, covariance: Arra
     return Finding(effect.name, effect.joint, effect.title, numbers, explained(step, found, floor),
                    best.visibility, rivals, effect.experiment if rivals else None, gain, "residual", float(own[joint]), of_rated,
                    proof(step.before, best.done, effect.joint) if draw else None)
+
+
+def absorbed_finding(moved: Absorbed, told: Diagnosis) -> Finding:
+    """A cause that the base parameters took in: its gain is that over the parameters of the reference logs."""
+    joints = len(told.residual_rms.floor)
+    before, after = moved.rms
+    gain = Gain(TorqueGain(before, after, np.full((joints, 2), np.nan)), None, "none", None)
+    torque = float(np.sqrt(np.max(np.maximum(before**2 - after**2, 0.0))))
+    effect = moved.effect
+    return Finding(effect.name, effect.joint, effect.title, moved.parameters, moved.explained, 0.0, (), None, gain,
+                   "base parameters", torque, np.nan, None)
 
 
 def _without(done: Refined, place: int) -> Array:

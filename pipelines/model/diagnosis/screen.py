@@ -21,7 +21,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Screened", "screen", "screen_family"]
+__all__ = ["Screened", "gains_of", "screen", "screen_family"]
 
 _INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
 _USUAL = 0.25  # of the shapes reach less
@@ -71,7 +71,7 @@ def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arra
                 continue
             for laid in lay_family(data, replace(family, shapes=shapes), arm):
                 only = data.log_of[laid.rows] == place
-                gains, seen, size = _gains(replace(laid, table=np.where(only, laid.table, 0.0)), fit, residual[None])
+                gains, seen, size = gains_of(replace(laid, table=np.where(only, laid.table, 0.0)), fit, residual[None])
                 reach.append(float(np.median(size)))
                 width = laid.table.shape[1]
                 top = int(np.argmax(gains[:, 0]))
@@ -86,7 +86,7 @@ def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arr
     wanted = fit.residual[None] if residuals is None else residuals
     gains, visible, reach, width = [], [], [], 0
     for laid in lay_family(data, family, arm):
-        gain, eta, size = _gains(laid, fit, wanted)
+        gain, eta, size = gains_of(laid, fit, wanted)
         gains.append(gain)
         width = laid.table.shape[1]
         visible.append(eta)
@@ -97,7 +97,7 @@ def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arr
                     float(eta.max()), float(np.quantile(np.concatenate(reach), _USUAL)), width)
 
 
-def _gains(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array, Array]:
+def gains_of(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array, Array]:
     """(shapes, residuals) gains; (shapes,) visibility, and size of the first column."""
     shapes, k, _ = laid.table.shape
     c = laid.table * fit.weights[laid.rows]

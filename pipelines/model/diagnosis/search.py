@@ -11,7 +11,7 @@ out. Rivals are ranked by the error they leave on held-out rows; of those that l
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +52,7 @@ class Case:
     families: tuple[Family, ...]
     thresholds: Thresholds | None  # None: a share of the residual
     blocks: int = 10
+    changed: Callable[[Refined], tuple[Sequence[Screened], Thresholds]] | None = None  # what has changed since the reference logs
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,13 +152,17 @@ def _explored(case: Case, now: Refined) -> Explored:
 
 def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
     now, screened = explored.before, explored.screened
-    thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
-    passes = {id(one) for one, bound in zip(screened, thresholds.gain, strict=True) if one.gain[0] > bound}
+    judged: Sequence[Screened] = screened
+    if case.changed is not None:
+        judged, thresholds = case.changed(now)
+    else:
+        thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
+    passes = {id(one) for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True) if seen.gain[0] > bound}
     tried = [one for one in explored.tried if id(one.screened) in passes]
     best = _fewest(tried) if more else None
     other = _other([one for one in screened if id(one) in passes], best, now)
     best = None if other is not None else best
-    trials = _ledger(screened, thresholds, explored.tried, best, now, number)
+    trials = _ledger(screened, judged, thresholds, explored.tried, best, now, number)
     return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials, other)
 
 
@@ -276,22 +281,22 @@ def _reweighted(done: Refined) -> Refined:
     return done
 
 
-def _ledger(screened: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried], best: Tried | None, now: Refined,
-            number: int) -> tuple[Trial, ...]:
+def _ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
+            best: Tried | None, now: Refined, number: int) -> tuple[Trial, ...]:
     exact = {id(one.screened): one for one in tried}
     rows: list[Trial] = []
-    order = sorted(range(len(screened)), key=lambda k: -screened[k].gain[0])
+    order = sorted(range(len(screened)), key=lambda k: -judged[k].gain[0])
     for k in order:
-        one = screened[k]
+        one, gain = screened[k], float(judged[k].gain[0])
         fitted = exact.get(id(one))
         accepted = best is not None and fitted is best
-        if fitted is None and one.gain[0] <= thresholds.gain[k] and len(rows) >= 12:
+        if fitted is None and gain <= thresholds.gain[k] and len(rows) >= 12:
             continue
-        reason = ("accepted" if accepted else "below its threshold" if one.gain[0] <= thresholds.gain[k] else
+        reason = ("accepted" if accepted else "below its threshold" if gain <= thresholds.gain[k] else
                   "weaker than others" if fitted is None else
                   "impossible numbers" if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else "explains less than the one accepted")
         gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
-        rows.append(Trial(number, one.cause, one.joint, float(one.gain[0] / now.rss), float(thresholds.gain[k] / now.rss),
+        rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
                           float(one.visibility[0]), gained, accepted, reason))
     return tuple(rows)

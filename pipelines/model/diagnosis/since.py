@@ -1,0 +1,105 @@
+"""The second question: what has changed since the reference logs.
+
+    since = since_reference(prepared, settings)
+    since.case         the later logs less the standing effects, with the gate that lets pass only what has changed
+    since.floor        what the nominal model and the standing effects leave of the reference logs
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.absorbed import Absorbed, absorbed
+from pipelines.model.diagnosis.candidates import families, lay_one, whole_motion
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.nominal import fit_columns, fit_nominal, law_slopes, rows_of
+from pipelines.model.diagnosis.result import Standing, Value
+from pipelines.model.diagnosis.screen import Screened
+from pipelines.model.diagnosis.search import Case
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.standing import Chosen, apart, changes, joined, standing_set
+from pipelines.model.diagnosis.thresholds import Thresholds
+
+__all__ = ["Since", "since_reference"]
+
+
+@dataclass(frozen=True, eq=False)
+class Since:
+    """What is asked with reference logs."""
+
+    case: Case
+    floor: Array  # (joints,) [N m]
+    standing: tuple[Standing, ...]
+    acting: tuple[Acting, ...]  # the same, for a model
+    absorbed: Absorbed | None  # what the base parameters show
+
+
+def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings) -> Since:
+    """Standing effects, the gate for changes, and causes that base parameters show."""
+    columns, fit = fit_nominal(reference, prepared.columns)
+    arm = Exact.start(columns, fit).arm
+    data, later = joined(reference, prepared.data)
+    every = families(columns.laws, whole_motion(data), arm, chosen.without)
+    standing = standing_set(reference, fit, every, arm)
+    base = rows_of(data, columns)
+    nominal = np.concatenate([base, *law_slopes(data, columns, fit.beta[:len(base)])[0]])
+    common = _torques(data, standing, arm)
+    whole = fit_columns(data, np.concatenate([apart(nominal, later), common]))
+    shared = whole.beta[2 * len(nominal):]
+    sizes = _split(shared, standing)
+    now = replace(prepared.data, known=_known(prepared.data, standing, sizes, arm))
+    judge = prepared.judge and replace(prepared.judge, known=_known(prepared.judge, standing, sizes, arm))
+    start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
+
+    def changed(found: Refined) -> tuple[Sequence[Screened], Thresholds]:
+        more = np.zeros((0, data.rows))
+        places = [k for place in range(len(found.model.effects)) for k in found.of_effect(place)]
+        if places:
+            more = np.zeros((len(places), data.rows))
+            more[:, later] = found.slopes[places]
+        return changes(data, later, nominal, common, more, found.weight, every, arm)
+
+    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed)
+    kept = len(columns.kept)
+    moved = absorbed(data, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
+    pairs = list(zip(standing, sizes, strict=True))
+    return Since(case, reference.rms(whole.left[~later]), tuple(_told(one, size, arm) for one, size in pairs),
+                 tuple(_acting(one, size, arm) for one, size in pairs), moved)
+
+
+def _torques(data: Data, standing: Sequence[Chosen], arm: Arm) -> Array:
+    """(amplitudes, rows) columns of all standing effects."""
+    return np.concatenate([np.zeros((0, data.rows)), *(lay_one(data, one.effect, arm) for one in standing)])
+
+
+def _split(amplitudes: Array, standing: Sequence[Chosen]) -> list[Array]:
+    ends = np.cumsum([len(one.amplitudes) for one in standing])[:-1]
+    return np.split(amplitudes, ends) if standing else []
+
+
+def _known(data: Data, standing: Sequence[Chosen], sizes: Sequence[Array], arm: Arm) -> Array:
+    """(rows,) [N m] of the standing effects."""
+    torque = np.zeros(data.rows)
+    for one, size in zip(standing, sizes, strict=True):
+        torque += size @ lay_one(data, one.effect, arm)
+    return torque
+
+
+def _acting(one: Chosen, size: Array, arm: Arm) -> Acting:
+    joint = one.effect.joint
+    return Acting.of(one.effect, one.effect.values(size), revolute=joint is None or arm.robot.revolute[joint - 1])
+
+
+def _told(one: Chosen, size: Array, arm: Arm) -> Standing:
+    turning = one.effect.joint is None or arm.robot.revolute[one.effect.joint - 1]
+    units = {q.name: q.unit_at(turning) for q in one.effect.parameters}
+    values = one.effect.reported(one.effect.values(size))
+    numbers = {name: Value(value, None, units.get(name, "1")) for name, value in values.items()}
+    return Standing(one.effect.name, one.effect.joint, numbers, one.gain)

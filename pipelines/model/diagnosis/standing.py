@@ -1,0 +1,173 @@
+"""With reference logs: what has changed since, and what was there from the first day.
+
+    standing = standing_set(reference)              columns that explain what the reference logs leave, at most ten
+    change = Change(...)                            screens every cause by a column that acts after the reference only
+
+The rows of reference and later logs stand in one system: each with its own nominal model, the standing columns with common
+coefficients, a cause as a common column and one that is zero in the reference: only what the second gains has changed. Amplitudes
+fitted apart and subtracted do not answer that. What a cause gains where nothing changed, the second half of the reference logs
+against the first, or some of them against the others, is what it has to exceed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
+from pipelines.model.diagnosis.screen import Screened, gains_of, screen
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.effects.base import Effect
+
+__all__ = ["Chosen", "changes", "joined", "standing_set"]
+
+Mask = npt.NDArray[np.bool_]
+
+_MOST = 10
+_WORTH = 0.02  # of the squared residual of a joint, that a standing column takes away at least
+_TIMES, _LEAST = 3.0, 0.02  # times what nothing gains; of the squared residual of a joint
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """One effect of the standing set."""
+
+    effect: Effect
+    gain: float  # share of the squared residual of its joint that it took away
+    amplitudes: Array
+
+
+def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> tuple[Chosen, ...]:
+    """Effects that explain what the reference logs leave, one after the other, each in its best shape of one screening.
+
+    Pati, Rezaiifar & Krishnaprasad 1993: orthogonal matching pursuit. A scale of torque is none of them: at all joints
+    together the torque would explain itself.
+    """
+    found = [one for one in screen(data, fit, families, arm) if not one.family.event and not one.shape[0].needs]
+    tables = [fit.project(lay_one(data, one.shape[0], arm)) for one in found]
+    residual, basis = fit.residual, np.zeros((0, data.rows))
+    powers = np.bincount(data.joint, residual**2, minlength=data.n_joints)
+    chosen: list[tuple[int, float]] = []
+    while len(chosen) < _MOST:
+        best, most, left = -1, 0.0, np.zeros((0, data.rows))
+        for k, table in enumerate(tables):
+            if k in [place for place, _ in chosen]:
+                continue
+            own = orthonormal(table - (table @ basis.T) @ basis)
+            gain = float(np.sum(np.square(own @ residual)))
+            joint = found[k].joint
+            gain /= max(float(powers.mean() if joint is None else powers[joint - 1]), 1e-300)
+            if gain > most:
+                best, most, left = k, gain, own
+        if most < _WORTH:
+            break
+        chosen.append((best, most))
+        basis = np.concatenate([basis, left])
+        residual = residual - (left @ residual) @ left
+    if not chosen:
+        return ()
+    stacked = np.concatenate([tables[k] for k, _ in chosen])
+    solved, *_ = np.linalg.lstsq(stacked.T, fit.residual, rcond=1e-8)
+    out, first = [], 0
+    for k, gain in chosen:
+        width = len(tables[k])
+        out.append(Chosen(found[k].shape[0], gain, solved[first:first + width]))
+        first += width
+    return tuple(out)
+
+
+def joined(reference: Data, later: Data) -> tuple[Data, Mask]:
+    """The rows of both, and which of them are later ones."""
+    data = Data((*reference.logs, *later.logs))
+    return data, data.log_of >= len(reference.logs)
+
+
+def apart(table: Array, later: Mask) -> Array:
+    """Columns with coefficients of their own before and after: (2 k, rows)."""
+    return np.concatenate([np.where(later, 0.0, table), np.where(later, table, 0.0)])
+
+
+def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array, weight: Array, families: Sequence[Family],
+            arm: Arm) -> tuple[list[Screened], Thresholds]:
+    """Every cause by what its change gains, and what it has to exceed.
+
+    Args:
+        data: rows of the reference logs, then of the later ones; `later` says which.
+        nominal: (k, rows) columns of the nominal model, with coefficients of their own before and after.
+        common: (m, rows) columns of the standing set.
+        more: (n, rows) slopes of the effects found so far, zero in the reference.
+        weight: (joints,) before and after alike.
+    """
+    fit = fit_columns(data, np.concatenate([apart(nominal, later), common, more]), weight=weight)
+    masks = _nothing(data, ~later)
+    before = replace(data, logs=data.logs[:int(data.log_of[~later].max()) + 1])
+    rows = ~later
+    still = [fit_columns(before, np.concatenate([apart(nominal[:, rows], mask[rows]), common[:, rows]]), data.y[rows], weight)
+             for mask in masks]
+    found, own = [], []
+    ratio = float(later.sum()) / max(float(rows.sum()) / 2.0, 1.0)
+    for family in families:
+        if family.event:
+            one = Screened(family, np.zeros(1), family.shapes[:1], np.ones(1), 1.0, 0.0, 1)
+            found.append(one)
+            own.append(np.inf)
+            continue
+        one, chance = _screened(data, later, fit, masks, still, family, arm)
+        found.append(one)
+        own.append(max(1.0, ratio) * chance)
+    return found, _bounds(families, np.array(own), fit)
+
+
+def _nothing(data: Data, reference: Mask) -> list[Mask]:
+    """Parts of the reference that are taken for later, though nothing changed: second halves, and every other log."""
+    middle = np.zeros(data.rows, dtype=bool)
+    for log in np.unique(data.log_of[reference]).tolist():
+        own = data.log_of == log
+        middle[own] = data.t[own] > np.median(data.t[own])
+    masks = [middle & reference]
+    if len(np.unique(data.log_of[reference])) > 1:
+        masks.append((data.log_of % 2 == 1) & reference)
+    return masks
+
+
+def _screened(data: Data, later: Mask, fit: Fit, masks: Sequence[Mask], still: Sequence[Fit], family: Family,
+              arm: Arm) -> tuple[Screened, float]:
+    gained, eta, chance, width, rows = [], [], 0.0, 0, ~later
+    for laid in lay_family(data, family, arm):
+        here = np.zeros(data.rows, dtype=bool)
+        here[laid.rows] = True
+        changed = np.where(later[laid.rows], laid.table, 0.0)
+        both = replace(laid, table=np.concatenate([laid.table, changed], axis=1))
+        one, _, _ = gains_of(laid, fit, fit.residual[None])
+        two, seen, _ = gains_of(both, fit, fit.residual[None])
+        gained.append(two[:, 0] - one[:, 0])
+        eta.append(seen)
+        width = laid.table.shape[1]
+        inside = rows[laid.rows]
+        for mask, own in zip(masks, still, strict=True):
+            part = replace(laid, table=laid.table[:, :, inside], rows=np.flatnonzero(here[rows]))
+            moved = np.where(mask[laid.rows][inside], part.table, 0.0)
+            alone, _, _ = gains_of(part, own, own.residual[None])
+            pair, _, _ = gains_of(replace(part, table=np.concatenate([part.table, moved], axis=1)), own, own.residual[None])
+            chance = max(chance, float((pair - alone).max()))
+    gain, visible = np.concatenate(gained), np.concatenate(eta)
+    best = int(np.argmax(gain))
+    return Screened(family, gain[best:best + 1], (family.shapes[best],), visible[best:best + 1], float(visible.max()), 0.0,
+                    width), chance
+
+
+def _bounds(families: Sequence[Family], own: Array, fit: Fit) -> Thresholds:
+    joint = np.array([f.joint or 0 for f in families])
+    left = np.bincount(fit.data.joint, fit.residual**2, minlength=fit.data.n_joints)
+    least = _LEAST * np.append(left.mean(), left)
+    there = [own[(joint == j) & np.isfinite(own)] for j in range(fit.data.n_joints + 1)]
+    usual = np.array([np.median(some) if len(some) else 0.0 for some in there])
+    gain = np.maximum(_TIMES * np.maximum(own, usual[joint]), least[joint])
+    return Thresholds(gain, own, "reference logs", fit.weight, tuple(f.joint for f in families))
