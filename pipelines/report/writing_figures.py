@@ -46,7 +46,8 @@ def split_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None
         axes = figures.joint_axes(drawing, course.model.shape[1])
         for j, axis in enumerate(axes):
             for name, color in _PARTS:
-                axis.plot(*figures.envelope(course.t, getattr(course, name)[:, j], 800), color=color, linewidth=0.9, label=name)
+                axis.plot(*figures.envelope(course.t, getattr(course, name)[:, j], 800), color=color, linewidth=0.9,
+                          label=name.capitalize() if name == "coriolis" else name)
             axis.set_title(printable(joints[j], 60), pad=3.0)
             axis.margins(x=0.01, y=0.08)
             axis.locator_params(axis="y", nbins=4)

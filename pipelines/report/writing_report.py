@@ -1,4 +1,4 @@
-"""The report on the writing task: does the model hold where it was not fitted?"""
+"""The report on the writing task: whether the model holds where it was not fitted, and where it does not."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pipelines.report.writing_figures import error_map_figure, executed_figure, 
 __all__ = ["writing_report"]
 
 _MOST_LETTERS = 40  # rows of the table of letters
+_FELT = 0.5  # of what is left, from which on further effects are worth a column
 _PARTS = ("inertia", "coriolis", "gravity", "friction", "effects")
 
 
@@ -91,7 +92,7 @@ def _key_figures(result: Result) -> Table | None:
 
 
 def _torque_section(result: Result) -> Section:
-    felt = any((log.parts_rms["effects"] > 1e-2 * log.rms).any() for log in result.logs)
+    felt = any((log.parts_rms["effects"] > _FELT * log.rms).any() for log in result.logs)
     parts = [name for name in _PARTS if felt or name != "effects"]
     rows: list[tuple[Cell, ...]] = [
         (f"{log.name}, {result.joints[j]}", *map(_short, (log.signal_rms[j], log.rms[j], 100 * log.relative_error[j],
