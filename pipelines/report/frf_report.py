@@ -213,9 +213,11 @@ def _recorded(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method
         number = 1 + sum(q.joint == p.joint for q in postures[:k])
         default = own["closed-loop"]
         rows.append((p.joint, number, posture_words(p.posture, p.joint), ", ".join(p.logs), p.controller, p.speed, p.swing,
-                     100.0 * p.left_out, default.estimator, default.resolution, default.averages, p.distortion))
+                     100.0 * p.left_out, default.estimator, default.resolution, default.averages, p.distortion, p.detected_even,
+                     p.detected_odd))
     text = ("The reference is subtracted. Start, reversal and stop are left out, and half a second after each: there friction "
             "jumps. At constant speed its mean is a constant that no spectrum shows.",)
     return Section("How it was measured", text, (Table(
         ("joint", "no.", "posture", "logs", "controller", "speed [rad/s]", "its std [rad/s]", "left out [%]", "estimator",
-         "resolution [Hz]", "averages", "variance between realisations / noise"), tuple(rows)),))
+         "resolution [Hz]", "averages", "variance between realisations / noise", "power at even lines left out / noise",
+         "at odd lines / noise"), tuple(rows)),))

@@ -44,6 +44,7 @@ class Loop:
     seconds: float = 40.0
     period: int | None = 2000  # [samples] of v; None: random
     encoder: float = 1e-6  # [rad]
+    odd: bool = False  # v has odd lines alone, and not every one: the others detect distortion
     late: int = 0  # samples by which the measured position is late
     seed: int = 1
 
@@ -89,6 +90,8 @@ class Loop:
             return np.asarray(self.strength * rng.standard_normal(samples))
         spectrum = np.zeros(self.period // 2 + 1, dtype=np.complex128)
         lines = np.arange(2, int(0.25 * self.period))
+        if self.odd:
+            lines = lines[(lines % 2 == 1) & (lines % 5 != 0)]
         spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
         one = np.fft.irfft(spectrum, self.period)
         return np.resize(self.strength * one / one.std(), samples)

@@ -98,6 +98,20 @@ def test_a_delay_is_a_delay(late: int) -> None:
     assert found.seen[0].modes.delay.value == pytest.approx(late * 1e-3, abs=2e-5)
 
 
+def test_detection_lines_tell_even_from_odd() -> None:
+    """A square of the position shows at the even lines that v leaves out, a cube at the odd ones, a linear plant at neither."""
+    loop = replace(LINK, odd=True, disturbance=0.02)
+    log = loop.log()
+    e = log.q - log["q_ref"]
+    for power, seen, unseen in ((2, 0, 1), (3, 1, 0)):
+        bent = log.q + 0.2 * e**power / np.abs(e).max() ** (power - 1)
+        signals = {**log.signals, "q": Signal(bent, "rad", "position")}
+        (found,) = measured_responses([replace(log, signals=signals)])
+        assert (found.detected[seen] or 0.0) > 20.0 * (found.detected[unseen] or 1.0)
+    (found,) = measured_responses([log])
+    assert all(value is not None and value < 3.0 for value in found.detected)
+
+
 def test_modes_of_a_link_on_a_spring() -> None:
     """Frequencies within 0.1 %, damping within 3 %, inertia and level of the rigid body within 1 %."""
     found = frf_findings([LINK.log()])

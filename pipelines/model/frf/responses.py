@@ -26,7 +26,7 @@ from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Tur
 from pipelines.signal.cross_spectra import CrossSpectra, cross_spectra
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
 from pipelines.signal.local_polynomial import local_polynomial
-from pipelines.signal.multisine_response import MultisineResponses, multisine_responses
+from pipelines.signal.multisine_response import DetectionLines, MultisineResponses, multisine_responses
 
 __all__ = ["ESTIMATORS", "How", "Measured", "double_integrator", "measured_responses"]
 
@@ -70,6 +70,7 @@ class Measured:
     sensitivity: FrequencyResponse  # v → u
     with_reversal: FrequencyResponse | None  # u → q from the whole log, None where it is too short
     distortion: float | None  # what differs between realisations over what noise explains, median of variances; None of one
+    detected: tuple[float | None, float | None]  # power of the position at even and odd lines that v leaves out, over the noise's
 
     @property
     def first(self) -> Turned:
@@ -113,7 +114,7 @@ def _together(a: Turned, b: Turned) -> bool:
 def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     first = turned[0]
     stretches = [s for one in turned for s in one.stretches]
-    several, distortion = _excited(turned, stretches, how)
+    several, distortion, detected = _excited(turned, stretches, how)
     plant = _reliable(closed_loop(several, POSITION - 1, INPUT - 1))
     sensitivity = several.of(INPUT - 1)
     late, _ = loop_delay(first.controller, first.quantity)
@@ -122,11 +123,12 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     smooth = continuous_controller(first.controller, first.joint, plant.frequency) if first.controller else None
     both = [None if c is None else indirect(sensitivity.times(shift), c / shift) for c in (sampled, smooth)]
     return Measured(turned, plant, _direct([s.signals for s in stretches], turned, how), both[0], both[1],
-                    closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion)
+                    closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion, detected)
 
 
-def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch], how: How) -> tuple[Responses, float | None]:
-    """v → (u, q, τ), and the distortion where there are realisations."""
+def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch],
+             how: How) -> tuple[Responses, float | None, tuple[float | None, float | None]]:
+    """v → (u, q, τ), the distortion where there are realisations, and what detection lines show."""
     first, signals = turned[0], [s.signals for s in stretches]
     outputs = (INPUT, POSITION, TORQUE)
     periods = {one.period for one in turned}
@@ -138,12 +140,24 @@ def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch], how: How)
                             remedy="inject a periodic multisine for two periods or more, or take another estimator")
     if how.estimator == "multisine" or (how.estimator == "auto" and periodic and first.period is not None):
         assert first.period is not None
-        return _of_multisine(multisine_responses(whole, first.rate, first.period, V, outputs))
+        found = multisine_responses(whole, first.rate, first.period, V, outputs)
+        return *_of_multisine(found), _detected(found.detection)
     if how.estimator == "welch":
-        return _welch(signals, turned, how, V, outputs), None
+        return _welch(signals, turned, how, V, outputs), None, (None, None)
     spacing = how.resolution or 0.25
     frequency = np.arange(np.ceil(_LOWEST / spacing), np.floor(_HIGHEST * first.rate / spacing) + 1) * spacing
-    return _known(local_polynomial(signals, first.rate, frequency, V, outputs)), None
+    return _known(local_polynomial(signals, first.rate, frequency, V, outputs)), None, (None, None)
+
+
+def _detected(lines: DetectionLines | None) -> tuple[float | None, float | None]:
+    """Even and odd distortion of the position: mean power at the lines left out over the noise there."""
+    if lines is None:
+        return None, None
+    inside = lines.frequency >= _LOWEST
+    power, noise = lines.power[:, POSITION - 1], np.maximum(lines.noise[:, POSITION - 1], 1e-300)
+    kinds = [inside & lines.odd, inside & ~lines.odd]
+    odd, even = (float(np.median(power[k] / noise[k])) if k.any() else None for k in kinds)
+    return even, odd
 
 
 def _of_multisine(found: MultisineResponses) -> tuple[Responses, float | None]:

@@ -85,6 +85,8 @@ class Posture:
     friction_left: float | None  # of the input, half its difference between the directions
     friction_below: float  # [Hz] below which friction changes the magnitude by more than a tenth
     distortion: float | None  # variance between realisations and directions over that of noise
+    detected_even: float | None  # power at lines that v leaves out, over that of noise
+    detected_odd: float | None
     expected_level: float | None  # of the rigid body: acceleration per input
     expected_inertia: float | None  # [kg m^2]
     expected_from: str
@@ -173,7 +175,8 @@ def posture_of(seen: Seen) -> Posture:
     return Posture(m.joint, first.posture, first.revolute, first.quantity, first.controller.law if first.controller else "unknown",
                    tuple(t.name for t in m.turned), first.sample_time, first.speed, max(t.swing for t in m.turned),
                    float(np.mean([t.left_out for t in m.turned])), float(np.mean(left)) if left else None, modes.friction_below,
-                   m.distortion, seen.expected.level, seen.expected.inertia, seen.expected.source, modes.level, modes.level_above,
+                   m.distortion, *m.detected,
+                   seen.expected.level, seen.expected.inertia, seen.expected.source, modes.level, modes.level_above,
                    modes.inertia, modes.delay, modes.misfit, modes.band, Curve.of(relative), fit, Curve.of(m.compliance),
                    None if m.with_reversal is None else Curve.of(m.with_reversal), _continuous(seen))
 
