@@ -16,7 +16,7 @@ __all__ = ["LoadFriction"]
 
 @dataclass(frozen=True)
 class LoadFriction(Effect):
-    """τ = µ |τ_0| tanh(w v), with τ_0 the torque of the joint without it: Coulomb friction Fc + µ |τ_0|."""
+    """τ = µ |τ_l| tanh(w v), τ_l what the joint transmits: its torque without friction. Coulomb friction is Fc + µ |τ_l| then."""
 
     sharpness: float = 100.0  # w [s/rad]
 
@@ -34,7 +34,8 @@ class LoadFriction(Effect):
     friction = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, np.abs(self.own(self.predicted(motion, arm))) * np.tanh(self.sharpness * self.own(motion.dq)))
+        load = self.own(self.predicted(motion, arm)) - self.own(arm.friction_torque(motion))
+        return self.on_own_row(arm, np.abs(load) * np.tanh(self.sharpness * self.own(motion.dq)))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
@@ -47,21 +48,23 @@ class LoadFriction(Effect):
         return np.asarray(values["mu"] * abs(load) * np.tanh(values["sharpness"] * dq))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
-        """The load is the torque of everything inside it, other effects included."""
+        """The load is the torque of everything inside it, friction apart and other effects included."""
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
         own, side = self.own(tau), np.tanh(values["sharpness"] * self.own(motion.dq))
-        tau[:, self._index] = own + values["mu"] * np.abs(own) * side
+        load = own - self.own(arm.friction_torque(motion))
+        tau[:, self._index] = own + values["mu"] * np.abs(load) * side
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        """What the drive applies, τ, is the load τ_0 and the friction it causes: τ_0 = τ/(1 + µ sign(τ) tanh(w v)).
+        """What the drive applies, τ, is friction f, the load τ_l and what that causes: τ_l = (τ - f)/(1 + µ sign(τ - f) tanh(w v)).
 
         Solved for the load, because the load holds the acceleration that is being computed.
         """
         def applied(command: Array, motion: Motion, _: Array) -> Array:
-            left = command.copy()
-            side = np.sign(self.own(command)) * np.tanh(values["sharpness"] * self.own(motion.dq))
-            left[..., self._index] = self.own(command) / (1.0 + values["mu"] * side)
+            left, friction = command.copy(), self.own(arm.friction_torque(motion))
+            passed = self.own(command) - friction
+            side = np.sign(passed) * np.tanh(values["sharpness"] * self.own(motion.dq))
+            left[..., self._index] = friction + passed / (1.0 + values["mu"] * side)
             return left
 
         return Hooks(actuator=applied)
