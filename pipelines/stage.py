@@ -15,13 +15,13 @@ import platform
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from pipelines import __version__
-from pipelines.errors import Check, EnvironmentFault, InputRejected, RrridError, clean
+from pipelines.errors import Check, EnvironmentFault, InputRejected, RrridError, UsageError, clean
 from pipelines.log.atomic import replace_folder, staging_folder, write_file
 from pipelines.log.files import PROVENANCE, Opened, expanded, find_logs, hash_file, open_log
 from pipelines.log.places import given_names, keep_apart, refuse_foreign, renamed, short_names, slug, tilde, written_by
@@ -30,7 +30,8 @@ from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.report.report import Report
 
-__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "read_logs", "refuse_foreign", "run_stage", "slug", "tilde"]
+__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "read_by_role", "read_logs", "refuse_foreign", "run_stage",
+           "slug", "tilde"]
 
 _NAMED = 6  # rejected files, in one error
 
@@ -135,6 +136,32 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     return Inputs(tuple(opened), tuple(rejected), checks, paths, {o.path: o.sha256 for o in opened}, robot=robot,
                   label=_label(request.paths),
                   robot_name=names[0] if len(names) == 1 else "several" if names else "unknown")
+
+
+def read_by_role(request: Request, settings: object, named: Mapping[str, Sequence[str]]) -> Inputs:
+    """The same with `named`: role -> paths. A log named for a role has it, whatever it says of itself; the others that say they
+    have this role are left out.
+
+    Raises:
+        UsageError: C02, no input at all, or a log named for two roles; C04, no such file.
+    """
+    paths = {role: tuple(Path(path).expanduser().absolute() for path in given) for role, given in named.items() if given}
+    every = tuple(dict.fromkeys((*request.paths, *(path for given in paths.values() for path in given))))
+    if not every:
+        raise UsageError("C02", "no logs", where="LOGS", remedy="name logs, or folders of logs")
+    inputs = read_logs(dataclasses.replace(request, paths=every), settings)
+    roles: dict[Path, str] = {}
+    for role, given in paths.items():
+        for file in find_logs(given)[0]:
+            if roles.setdefault(file, role) != role:
+                raise UsageError("C02", f"{file.name} is named for {roles[file]} and for {role}", where=f"--{role}",
+                                 remedy="name it for one of them")
+    kept = [(opened, roles.get(opened.path, opened.log.role)) for opened in inputs.logs
+            if opened.path in roles or opened.log.role not in paths]
+    logs = tuple(opened if opened.log.role == role else dataclasses.replace(opened, log=dataclasses.replace(opened.log, role=role))
+                 for opened, role in kept)
+    beside = tuple(path for given in paths.values() for path in given)
+    return dataclasses.replace(inputs, logs=logs, folders=(*inputs.folders, *beside))
 
 
 def _all_of(rejected: list[Rejected]) -> RrridError:

@@ -24,7 +24,7 @@ Average = Annotated[bool | None, typer.Option("--average/--no-average",
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
 STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation",
-          "validate-writing", "frf")
+          "validate-writing", "frf", "diagnose")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
                   pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -281,6 +281,36 @@ def frf(
     _go(STAGE, tuple(logs), common, {
         "estimator": estimator, "resolution": resolution, "low": low, "high": high, "model": model,
         "postures": whole_numbers(posture, "--posture")})
+
+
+@app.command(cls=StageCommand)
+@with_common
+def diagnose(
+    common: Common,
+    logs: Annotated[list[Path] | None, typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
+                                                      readable=False)] = None,
+    identify: Annotated[list[str] | None, typer.Option(help="Logs to fit, whatever they say of themselves. Repeatable.")] = None,
+    validate: Annotated[list[str] | None, typer.Option(help="Logs that judge. Repeatable.")] = None,
+    reference: Annotated[list[str] | None, typer.Option(help="Logs of the arm as it was before. Repeatable.")] = None,
+    without: Annotated[list[str] | None, typer.Option(help="Cause that it is not, you know: cogging. Repeatable.")] = None,
+    model: Annotated[str | None, typer.Option(help="model.json whose friction laws are taken. [Coulomb and viscous]")] = None,
+    replicas: Annotated[int | None, typer.Option(help="Simulated twins that say what is normal; 0: none. [10]")] = None,
+    most: Annotated[int | None, typer.Option(help="Causes to look for, at most. [4]")] = None,
+    blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
+    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
+    min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the twins' noise. [1]")] = None,
+    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Diagnose torque that looks misplaced.")] = None,
+) -> None:
+    """Say what the simulation gets wrong, why, what to check, and how much better the model becomes."""
+    from pipelines.diagnose import STAGE
+
+    _go(STAGE, tuple(logs or ()), common, {
+        "identify": tuple(identify or ()) or None, "validate": tuple(validate or ()) or None,
+        "reference": tuple(reference or ()) or None, "without": tuple(without or ()) or None, "model": model,
+        "replicas": replicas, "most": most, "blocks": blocks, "filter": filter, "decimate": decimate,
+        "min_speed": numbers(min_speed, "--min-speed"), "seed": seed, "allow_mismatch": allow_mismatch})
 
 
 @app.command()

@@ -1,0 +1,149 @@
+"""Diagnose an arm: what its simulation gets wrong, why, and how much better it becomes.
+
+Reads    logs of any experiment: "identify" to fit, "validate" to judge, "reference" as it was before; optionally a model
+Writes   result.json, result.h5, report.html
+Source   Kostić et al. 2004, Sections III and IV, for the model; causes.md and diagnosis.md for what it lacks
+
+Gates come first: swapped columns, a flipped sign, a wrong scale or unsynchronised clocks are refused with their repair named,
+before any physics is blamed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+from pipelines.errors import NothingMatched, UsageError, did_you_mean
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.model_file import read_model
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.gates import examined, refuse_leak
+from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.outcome import Result
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects import effect_names
+from pipelines.report.diagnosis_report import diagnosis_report
+from pipelines.report.report import Report
+from pipelines.stage import Inputs, Request, Stage, read_by_role
+
+__all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
+
+_FEWEST_BLOCKS = 2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which logs do what, what is left out, and how long to look."""
+
+    identify: tuple[str, ...] = ()  # paths of logs to fit, instead of those that say so
+    validate: tuple[str, ...] = ()  # that judge
+    reference: tuple[str, ...] = ()  # of the arm as it was before
+    model: str | None = None  # a model file, whose friction laws the nominal model takes
+    without: tuple[str, ...] = ()  # causes that it cannot be, the user says
+    replicas: int = DiagnosisSettings.replicas  # of the simulated twin; 0: none
+    most: int = DiagnosisSettings.most  # findings
+    blocks: int = DiagnosisSettings.blocks  # held out in turn where no log is
+    filter: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
+    decimate: int | None = None  # every so-manieth sample; None: from the filter
+    min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
+    seed: int = DiagnosisSettings.seed  # of the twin's noise
+    allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion is diagnosed
+
+
+@dataclass(frozen=True)
+class Material:
+    """What was read beside the logs."""
+
+    arm: Arm | None
+    tell: Callable[[str], None]
+
+
+def read(request: Request, settings: Settings) -> Inputs:
+    """The logs in their roles, and the model whose friction laws are to be taken.
+
+    Raises:
+        UsageError: C02, no logs, or a log with two roles; C04, no such file.
+    """
+    inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
+                                              "reference": settings.reference})
+    if settings.model is None:
+        return replace(inputs, material=Material(None, request.tell))
+    path = Path(settings.model).absolute()
+    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    arm = Arm.from_model(read_model(settings.model), path)
+    return replace(inputs, sources=(*inputs.sources, *sources), material=Material(arm, request.tell))
+
+
+def compute(inputs: Inputs, settings: Settings) -> Result:
+    """Gates, then the search.
+
+    Raises:
+        NothingMatched: C06, no log to fit.
+        UsageError: C01, C02, settings that do not fit, logs of several robots, or a model of another one.
+        InputRejected: the doctor rejects a log: its first reason; S13, S14, S15, T06, torque and motion of a log do not belong
+            together; T04, no stretch of a log can be used; T08, too few equations are left; D14, one recording in two roles.
+    """
+    _refuse_strange(settings)
+    given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)
+    logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
+    chosen = _chosen(logs, inputs.label)
+    if given.arm is not None and given.arm.n_joints != chosen.identify[0].n_joints:
+        raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has "
+                         f"{chosen.identify[0].n_joints}", where="--model", remedy="give a model of this robot")
+    given.tell("examining the logs")
+    said = examined((*chosen.identify, *chosen.validate, *chosen.reference, *chosen.frf), settings.allow_mismatch)
+    engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
+                               settings.decimate, settings.min_speed, settings.seed)
+    found = diagnose(chosen, engine, given.arm, given.tell)
+    robot = chosen.identify[0].robot
+    return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
+                  joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
+                  without=settings.without, doctor=said)
+
+
+def _chosen(logs: Sequence[ExperimentLog], label: str) -> Logs:
+    if len({log.robot_text for log in logs}) > 1:
+        raise UsageError("C02", "logs of several robots", where=label,
+                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+    chosen = Logs.by_role(logs)
+    if not chosen.identify:
+        kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
+        raise NothingMatched("C06", f"no excitation, free or writing log of role identify; there are: {kinds}", where=label,
+                             remedy="record an excitation, or name the logs to fit: --identify PATH")
+    refuse_leak(chosen.identify, chosen.validate)
+    refuse_leak(chosen.reference, (*chosen.identify, *chosen.validate))
+    return chosen
+
+
+def _refuse_strange(settings: Settings) -> None:
+    """C01, C02 for a setting that makes no sense."""
+    for cause in settings.without:
+        if cause not in effect_names():
+            raise UsageError("C01", f"'{cause}' is not a cause{did_you_mean(cause, effect_names())}", where="--without",
+                             remedy=f"the causes are {', '.join(effect_names())}")
+    if settings.blocks < _FEWEST_BLOCKS:
+        raise UsageError("C02", f"{settings.blocks} blocks", where="--blocks", remedy="give 2 or more")
+    if settings.replicas < 0 or settings.replicas > 1000:
+        raise UsageError("C02", f"{settings.replicas} replicas", where="--replicas", remedy="give 0 to 1000")
+    if settings.most < 1:
+        raise UsageError("C02", f"{settings.most} findings at most", where="--most", remedy="give 1 or more")
+    if settings.seed < 0:
+        raise UsageError("C02", f"the seed {settings.seed} is negative", where="--seed", remedy="give 0 or more")
+    if settings.filter is not None and not (math.isfinite(settings.filter) and settings.filter > 0.0):
+        raise UsageError("C02", f"a low-pass at {settings.filter:g} Hz", where="--filter", remedy="give a frequency above 0")
+
+
+def _exit_code(result: Result, check: bool) -> int:
+    return int(check and result.verdict != "nothing-wrong")
+
+
+def report(result: Result) -> Report:
+    """The verdict and what to check, the proof of every finding, the picture of what is wrong, rivals, ledger and limits."""
+    return diagnosis_report(result)
+
+
+STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, None, _exit_code,
+              lambda result: result.doctor)

@@ -1,0 +1,46 @@
+"""What has to be in order before any physics is blamed: the doctor's checks, and columns, signs, scales and clocks mixed up.
+
+    said = examined(logs)           what the doctor remarks of each log; InputRejected where no diagnosis makes sense
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from pipelines.errors import Check, InputRejected
+from pipelines.log.derive import recording
+from pipelines.log.doctor.checks import Subject, check_log
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.plausibility import mismatches
+
+__all__ = ["examined", "refuse_leak"]
+
+
+def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tuple[Check, ...]:
+    """What the doctor says of the logs, checks that found nothing apart.
+
+    Raises:
+        InputRejected: its first reason to reject a log; S13, S14, S15, T06: torque and motion of a log do not belong together,
+            with the repair, unless `allow_mismatch`.
+    """
+    said: list[Check] = []
+    for log in logs:
+        subject = Subject(recording(log))
+        checks = [check for check in check_log(subject) if check.level != "ok"]
+        if reject := next((check for check in checks if check.level == "reject"), None):
+            raise reject.as_error()
+        against = mismatches(subject)
+        if not allow_mismatch and (gate := next((check for check in against if check.gate), None)):
+            raise replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch").as_error()
+        said += [replace(check, gate=False) for check in (*checks, *against)]
+    return tuple(said)
+
+
+def refuse_leak(fitted: Sequence[ExperimentLog], judging: Sequence[ExperimentLog]) -> None:
+    """D14: what a model was fitted to must not judge it."""
+    seen = {log.q.tobytes() + log.tau.tobytes(): log for log in fitted}
+    for log in judging:
+        if (same := seen.get(log.q.tobytes() + log.tau.tobytes())) is not None:
+            raise InputRejected("D14", f"leak: {same.name} and {log.name} hold the same samples with roles {same.role} and "
+                                f"{log.role}", where=log.source or log.name, remedy="judge on another recording")

@@ -1,0 +1,133 @@
+"""The picture of what is wrong, before any name: measured over predicted, and the residual over everything it may depend on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.model.diagnosis.result import Curve, Diagnosis, Evidence, Spectrum
+from pipelines.report import style
+from pipelines.report.diagnosis_words import floor_words
+from pipelines.report.figures import envelope, joint_axes, joint_size
+from pipelines.report.report import Figure, Section, Table
+from pipelines.report.sections import joint_signal_figure
+from pipelines.report.style import format_number, format_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["picture_sections"]
+
+_COLUMNS = 3  # small figures side by side
+_SHOWN = 6  # curves of a joint
+
+
+def picture_sections(found: Diagnosis, rated: Sequence[float]) -> list[Section]:
+    """One section for each log that is shown."""
+    return [_section(found, one, rated, k) for k, one in enumerate(found.evidence)]
+
+
+def _section(found: Diagnosis, one: Evidence, rated: Sequence[float], number: int) -> Section:
+    suffix = f"-{number + 1}" if number else ""
+    return Section(f"What is wrong, before any name: {one.log}", (floor_words(found),), (_above(found, one, rated), _tells(one)),
+                   tuple(_figures(one, suffix)))
+
+
+def _above(found: Diagnosis, one: Evidence, rated: Sequence[float]) -> Table:
+    rows = []
+    for j in range(len(one.above_floor)):
+        residual = float(found.residual_rms.identify[j])
+        share = 100.0 * residual / rated[j] if j < len(rated) and math.isfinite(rated[j]) else None
+        low, high = one.band[j]
+        band = f"{format_number(float(low), 2)} to {format_number(float(high), 2)}" if np.isfinite([low, high]).all() else None
+        rows.append((j + 1, _digits(residual), _digits(share), _digits(float(found.residual_rms.floor[j])),
+                     _digits(100.0 * float(one.above_floor[j])), band))
+    columns = ("joint", "residual, rms [N m]", "[% of rated]", "floor [N m]", "power above the floor [%]", "mostly between [Hz]")
+    return Table(columns, tuple(rows), "Of the nominal model, refitted to these logs.")
+
+
+def _digits(x: float | None) -> float | None:
+    return None if x is None or not math.isfinite(x) else float(f"{x:.3g}")
+
+
+def _tells(one: Evidence) -> Table:
+    """What of each joint's residual goes with which signal."""
+    best = sorted(one.curves, key=lambda c: (c.joint, -c.explained))
+    rows = [(c.joint, c.against, _digits(100.0 * c.explained)) for c in best]
+    return Table(("joint", "signal", "of the residual's power that follows it [%]"), tuple(rows),
+                 "The residual averaged in bins of each signal: what survives averaging depends on it.")
+
+
+def _figures(one: Evidence, suffix: str) -> list[Figure]:
+    joints = one.residual.shape[1]
+    found = [Figure(f"torque-predicted{suffix}", "Torque, measured and predicted by the nominal model.",
+                    lambda drawing: _compared(joint_axes(drawing, joints), one), joint_size(joints)),
+             joint_signal_figure(f"residual{suffix}", "Residual over time: measured minus predicted torque.", one.t, one.residual,
+                                 "N m", quantity="residual")]
+    if one.simulated_t is not None and one.simulated_position_error is not None:
+        found.append(joint_signal_figure(f"position-error{suffix}", "What the simulation gets wrong: simulated minus measured "
+                                         "position.", one.simulated_t, one.simulated_position_error, "rad",
+                                         quantity="simulated − measured"))
+    for over, words in (("order", "Orders of the joint's angle: a line is a torque that repeats every so-manieth turn."),
+                        ("frequency", "Spectrum of the residual, and of the floor.")):
+        spectra = [s for s in one.spectra if s.over == over]
+        if spectra:
+            found.append(Figure(f"residual-{over}{suffix}", words, _spectra(spectra), (6.0, 0.8 + 1.2 * len(spectra))))
+    for joint in range(1, joints + 1):
+        curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:_SHOWN]
+        if curves:
+            rows = -(-len(curves) // _COLUMNS)
+            found.append(Figure(f"residual-{joint}-over{suffix}", f"Residual of joint {joint} over the signals it follows most, "
+                                "the strongest first: mean in bins, shaded its spread.", _small(curves), (6.0, 0.6 + 1.7 * rows)))
+    return found
+
+
+def _compared(axes: Sequence[Axes], one: Evidence) -> None:
+    for j, axis in enumerate(axes):
+        axis.plot(*envelope(one.t, one.measured[:, j]), color=style.SKY, linewidth=3.0, label="measured")
+        axis.plot(*envelope(one.t, one.predicted[:, j]), color=style.VERMILLION, linewidth=0.9, label="predicted")
+        axis.set_title(f"joint {j + 1}", pad=3.0)
+        axis.margins(x=0.01, y=0.1)
+        axis.locator_params(axis="y", nbins=4)
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
+    axes[-1].set_xlabel("time [s]")
+    if figure := axes[0].get_figure():
+        figure.supylabel("torque [N m]", fontsize="medium")
+
+
+def _spectra(spectra: Sequence[Spectrum]) -> Callable[[Drawing], None]:
+    def draw(drawing: Drawing) -> None:
+        for axis, one in zip(joint_axes(drawing, len(spectra)), spectra, strict=True):
+            if one.floor is not None:
+                axis.fill_between(one.x, 0.0, one.floor, color=style.GREY, alpha=0.3, linewidth=0.0, label="floor")
+            axis.plot(one.x, one.amplitude, color=style.BLUE, linewidth=1.0, label="residual")
+            axis.set_title(f"joint {one.joint}", pad=3.0)
+            axis.margins(x=0.01)
+            axis.set_ylim(bottom=0.0)
+            axis.locator_params(axis="y", nbins=4)
+        first = drawing.axes[0]
+        first.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
+        drawing.axes[-1].set_xlabel(f"{'order' if spectra[0].over == 'order' else 'frequency'} [{format_unit(spectra[0].unit)}]")
+        drawing.supylabel("amplitude [N m]", fontsize="medium")
+
+    return draw
+
+
+def _small(curves: Sequence[Curve]) -> Callable[[Drawing], None]:
+    def draw(drawing: Drawing) -> None:
+        rows = -(-len(curves) // _COLUMNS)
+        axes = drawing.subplots(rows, _COLUMNS, sharey=True, squeeze=False).ravel()
+        for axis, one in zip(axes, curves, strict=False):
+            axis.fill_between(one.x, one.mean - one.spread, one.mean + one.spread, color=style.SKY, alpha=0.35, linewidth=0.0)
+            axis.plot(one.x, one.mean, color=style.BLUE, linewidth=1.2)
+            axis.set_xlabel(f"{one.against} [{format_unit(one.unit)}]", fontsize="small")
+            axis.locator_params(nbins=4)
+        for axis in axes[len(curves):]:
+            axis.set_visible(False)
+        drawing.supylabel("residual [N m]", fontsize="medium")
+
+    return draw

@@ -1,0 +1,206 @@
+"""The report of a diagnosis: the verdict and what to check, the proof, the picture of what is wrong, rivals, ledger, limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from pipelines.model.diagnosis.outcome import Result
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Value
+from pipelines.model.effects import find_effect
+from pipelines.report.diagnosis_picture import picture_sections
+from pipelines.report.diagnosis_proof import proof_figures
+from pipelines.report.diagnosis_words import cause_at, floor_words, held_out_words, per_joint, title_of, told_value
+from pipelines.report.report import Report, Section, Table, Tone
+from pipelines.report.sections import checks_table
+from pipelines.report.style import format_number
+
+__all__ = ["diagnosis_report", "finding_sections"]
+
+_LEDGER = 40  # lines
+_TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
+
+
+def diagnosis_report(result: Result) -> Report:
+    """Verdict, key figures, findings with their proof, evidence, limits."""
+    sections = [*finding_sections(result, result.rated), *_unknown(result), *picture_sections(result, result.rated),
+                *_standing(result), *_others(result), *_limits(result), _basis(result), *_doctor(result)]
+    return Report("Diagnosis", _verdict(result), _TONES[result.verdict], _key_figures(result), tuple(sections))
+
+
+def _verdict(result: Result) -> str:
+    """One sentence; what to check stands in the first section."""
+    if result.verdict == "nothing-wrong":
+        since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
+        return f"Nothing{since}, as far as these logs can tell: what they could have shown stands below."
+    if result.verdict == "unknown":
+        return f"Something is wrong that has no name here: {result.reason}."
+    first, *more = result.findings
+    changed = "What has changed: " if result.question == "what has changed" else ""
+    others = f"; and {', '.join(cause_at(one.cause, one.joint) for one in more)}" if more else ""
+    return f"{changed}{first.title}{_at(first.joint)}, {_size(first)}{others}."
+
+
+def _at(joint: int | None) -> str:
+    return "" if joint is None else f" at joint {joint}"
+
+
+def _size(one: Finding) -> str:
+    rated = f" ({format_number(100.0 * one.of_rated, 2)} % of the rated torque)" if math.isfinite(one.of_rated) else ""
+    return f"{format_number(one.torque_rms, 2)} N m rms of torque that the model does not have{rated}"
+
+
+def _key_figures(result: Result) -> Table:
+    """Joint by joint: the residual before, after and its floor; the tip once."""
+    before, after = result.residual_rms, result.after_rms
+    rows = []
+    for j in range(len(before.floor)):
+        rated = result.rated[j] if j < len(result.rated) and math.isfinite(result.rated[j]) else math.nan
+        rows.append((j + 1, *(float(f"{x:.3g}") for x in (before.validate[j], after.validate[j], before.floor[j])),
+                     _rounded(100.0 * before.validate[j] / rated), _rounded(100.0 * after.validate[j] / rated)))
+    return Table(("joint", "held-out torque error now [N m]", "after extension [N m]", "floor [N m]", "now [% of rated]",
+                  "after [% of rated]"), tuple(rows), f"Root mean square. {floor_words(result)}")
+
+
+def _rounded(x: float) -> float | None:
+    return float(f"{x:.3g}") if math.isfinite(x) else None
+
+
+def finding_sections(found: Diagnosis, rated: tuple[float, ...]) -> list[Section]:
+    """One section for each finding: what it is, what to check, what it is worth, its proof."""
+    del rated
+    return [_finding(number, one) for number, one in enumerate(found.findings, 1)]
+
+
+def _finding(number: int, one: Finding) -> Section:
+    kind = find_effect(one.cause)
+    text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one)]
+    if one.rivals:
+        names = ", ".join(f"{cause_at(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
+        text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
+    tables = [_numbers(one.parameters), _gain(one)]
+    return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text), tuple(tables),
+                   tuple(proof_figures(number, one)))
+
+
+def _sentence(text: str) -> str:
+    """It begins large and ends in a full stop."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def _worth(one: Finding) -> str:
+    simulation = {"closed-loop": "simulated in closed loop, with the controller of the logs",
+                  "windowed": "simulated over short windows from smoothed states, for the logs do not know their controller",
+                  "none": "not simulated"}[one.gain.simulation]
+    tip = one.gain.tip_error_rms
+    said = ""
+    if tip is not None:
+        before, after = (1e3 * float(np.ravel(x)[0]) for x in (tip.before, tip.after))
+        said = f" The simulated tip is {format_number(before, 3)} mm off without it and {format_number(after, 3)} mm with it"
+        said += f", {simulation}."
+    return (f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above the floor; the refitted model could "
+            f"hide {format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{said} "
+            f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it.")
+
+
+def _numbers(parameters: dict[str, Value]) -> Table:
+    rows = tuple((name, told_value(value), value.unit) for name, value in parameters.items())
+    return Table(("parameter", "value ± std", "unit"), rows, "What was identified.")
+
+
+def _gain(one: Finding) -> Table:
+    gain = one.gain
+    rows = []
+    for j in range(len(gain.validate_torque_rms.before)):
+        torque = gain.validate_torque_rms
+        low, high = torque.ci95[j]
+        position = gain.simulated_position_rms
+        rows.append((j + 1, _rounded(torque.before[j]), _rounded(torque.after[j]),
+                     f"{format_number(float(low), 2)} to {format_number(float(high), 2)}",
+                     None if position is None else _rounded(position.before[j]),
+                     None if position is None else _rounded(position.after[j])))
+    return Table(("joint", "torque error without [N m]", "with [N m]", "change, 95 % [N m]",
+                  "simulated position error without [rad]", "with [rad]"), tuple(rows),
+                 "Gain on held-out time, root mean square, beside the findings before it.")
+
+
+def _unknown(result: Result) -> list[Section]:
+    if result.verdict != "unknown":
+        return []
+    near = sorted((t for t in result.ledger if math.isfinite(t.exact_gain)), key=lambda t: -t.exact_gain)[:5]
+    names = ", ".join(f"{cause_at(t.cause, t.joint)} ({format_number(100.0 * t.exact_gain, 3)} % of the residual)" for t in near)
+    tried = f" The nearest explanations, none of them good enough: {names}." if near else ""
+    return [Section("Why there is no name", (
+        _sentence(result.reason) + tried,
+        "A wrong name costs more than none. What follows shows where and when the residual stands above its floor."))]
+
+
+def _standing(result: Result) -> list[Section]:
+    if not result.standing:
+        return []
+    rows = tuple((title_of(one.cause), one.joint, ", ".join(f"{name} {told_value(v)} {v.unit}".strip()
+                                                             for name, v in one.parameters.items()),
+                  _rounded(100.0 * one.explained)) for one in result.standing)
+    return [Section("What the reference logs show as well", ("It is part of this robot and no news; the extended model has it.",),
+                    (Table(("effect", "joint", "parameters", "explains [%]"), rows),))]
+
+
+def _others(result: Result) -> list[Section]:
+    """Rejected hypotheses and the ledger."""
+    sections = []
+    if result.rejected:
+        rows = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
+        sections.append(Section("Rejected", ("They came close, and are not believed.",), (Table(("cause", "joint", "why"), rows),)))
+    shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
+    shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
+    if shown:
+        rows = tuple((t.step, title_of(t.cause), t.joint, _rounded(100.0 * t.gain), _rounded(100.0 * t.threshold),
+                      _rounded(100.0 * t.exact_gain), _rounded(t.visibility), "accepted" if t.accepted else t.reason)
+                     for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
+        tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
+        more = len(result.ledger) - len(rows)
+        text = (f"{more} more, all weaker, stand in result.json.",) if more > 0 else ()
+        sections.append(Section("Ledger of hypotheses", text, (Table(
+            ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
+            "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
+            "believed.", tones),)))
+    return sections
+
+
+def _limits(result: Result) -> list[Section]:
+    """What these logs can and cannot tell."""
+    sections = []
+    if result.detectable:
+        rows = tuple((title_of(one.cause), one.joint, one.parameter, told_value(one.smallest), one.smallest.unit)
+                     for one in result.detectable)
+        sections.append(Section("What would have been found", ("With 95 %, had it been there; nothing smaller can be excluded.",),
+                                (Table(("cause", "joint", "parameter", "smallest", "unit"), rows),)))
+    if result.not_testable:
+        rows = tuple((title_of(one.cause), one.joint, one.reason, one.record) for one in result.not_testable)
+        sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
+                                (Table(("cause", "joint", "why", "what to record"), rows),)))
+    return sections
+
+
+def _basis(result: Result) -> Section:
+    """Where floor and thresholds come from, and what judged."""
+    origins = sorted({one.origin for one in result.thresholds})
+    text = [floor_words(result), held_out_words(result), f"Thresholds come from {' and '.join(origins) or 'nothing'}."]
+    if result.replicas:
+        text.append(f"The twin is the fitted model run {result.replicas} times through the same controllers, references, encoders "
+                    f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")
+    if result.without:
+        text.append(f"Left out, because you said so: {', '.join(map(title_of, result.without))}.")
+    best: dict[tuple[str, int | None], float] = {(one.cause, one.joint): one.gain for one in result.thresholds}
+    rows = tuple((title_of(cause), joint, _rounded(100.0 * gain)) for (cause, joint), gain in sorted(
+        best.items(), key=lambda item: (item[0][0], item[0][1] or 0)))
+    table = Table(("cause", "joint", "share of the squared residual to exceed [%]"), rows, "Thresholds.")
+    return Section("What this rests on", tuple(text), (table,) if rows else ())
+
+
+def _doctor(result: Result) -> Iterable[Section]:
+    if result.doctor:
+        yield Section("What the log doctor remarks", (), (checks_table(result.doctor),))
