@@ -19,6 +19,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.compliance import Compliance, compliance
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import absorbed_finding, extended_arm, findings, rejected, sure
@@ -52,8 +53,12 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     prepared = prepare(logs, chosen, arm)
     if prepared.reference is not None:
         say("comparing with the reference logs")
-        return _changed(prepared, since_reference(prepared, prepared.reference, chosen), chosen)
+        since = since_reference(prepared, prepared.reference, chosen)
+        stiff = compliance(logs.frf, since.case.model.nominal)
+        return _responding(_changed(prepared, replace(since, case=_nameable(since.case, stiff)), chosen), stiff)
     case = _case(prepared, chosen)
+    stiff = compliance(logs.frf, case.model.nominal)
+    case = _nameable(case, stiff)
     say("looking for the greatest causes")
     rough = provisional(case)
     say("simulating the twin")
@@ -62,7 +67,20 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     case = replace(case, thresholds=floored.thresholds)
     found = search(case, chosen.most, rough)
     ruling = _believed(found, prepared, rule(found, floored.rms), chosen)
-    return _told(prepared, case, found, ruling, floored, chosen)
+    return _responding(_told(prepared, case, found, ruling, floored, chosen), stiff)
+
+
+def _nameable(case: Case, stiff: Compliance | None) -> Case:
+    """Where frequency responses show a rigid arm, what gives way is a gap, which the residual then names."""
+    return replace(case, nameable=(*case.nameable, "reversals")) if stiff is not None and stiff.rigid else case
+
+
+def _responding(told: Diagnosis, stiff: Compliance | None) -> Diagnosis:
+    """With what the frequency responses name; causes that the residual names stay beside them."""
+    if stiff is None or not stiff.findings:
+        return told
+    findings = (*told.findings, *stiff.findings)
+    return replace(told, verdict="cause", findings=findings, reason="", summary=_sentence(Ruling("cause", (), ""), findings))
 
 
 def _case(prepared: Prepared, chosen: DiagnosisSettings) -> Case:
@@ -163,4 +181,5 @@ def _sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:
     first = named[0]
     where = "" if first.joint is None else f" at joint {first.joint}"
     more = f", and {len(named) - 1} more" if len(named) > 1 else ""
-    return f"{first.title}{where}: {first.torque_rms:.2g} N m of torque that the model does not have{more}."
+    size = f": {first.torque_rms:.2g} N m of torque that the model does not have" if np.isfinite(first.torque_rms) else ""
+    return f"{first.title}{where}{size}{more}."

@@ -52,6 +52,7 @@ class Case:
     families: tuple[Family, ...]
     thresholds: Thresholds | None  # None: a share of the residual
     blocks: int = 10
+    nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Callable[[Refined], tuple[Sequence[Screened], Thresholds]] | None = None  # what has changed since the reference logs
 
 
@@ -145,7 +146,7 @@ def _explored(case: Case, now: Refined) -> Explored:
     order = sorted((one for one in screened if one.gain[0] >= _LEAST * now.rss
                     and (one.family.event or (one.cause, one.joint) not in taken)), key=lambda one: -one.gain[0])
     error = held_out(now, case)
-    able = [one for one in order if one.family.shapes[0].evidence == "residual"]
+    able = [one for one in order if one.family.shapes[0].evidence in case.nameable]
     tried = [_fitted(case, now, one, error) for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
     return Explored(now, error, tuple(screened), tuple(sorted(tried, key=lambda one: one.error)))
 
@@ -160,15 +161,15 @@ def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
     passes = {id(one) for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True) if seen.gain[0] > bound}
     tried = [one for one in explored.tried if id(one.screened) in passes]
     best = _fewest(tried) if more else None
-    other = _other([one for one in screened if id(one) in passes], best, now)
+    other = _other([one for one in screened if id(one) in passes], best, now, case.nameable)
     best = None if other is not None else best
     trials = _ledger(screened, judged, thresholds, explored.tried, best, now, number)
     return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials, other)
 
 
-def _other(passing: Sequence[Screened], best: Tried | None, now: Refined) -> Screened | None:
+def _other(passing: Sequence[Screened], best: Tried | None, now: Refined, nameable: Sequence[str]) -> Screened | None:
     """What gives way explains more than all that the residual can name, to first order even."""
-    there = [one for one in passing if one.family.shapes[0].evidence != "residual"]
+    there = [one for one in passing if one.family.shapes[0].evidence not in nameable]
     most = max(there, key=lambda one: one.gain[0], default=None)
     taken = 0.0 if best is None else now.rss - best.done.rss
     return most if most is not None and most.gain[0] > _MORE * taken else None

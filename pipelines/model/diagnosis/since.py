@@ -66,7 +66,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
             more[:, later] = found.slopes[places]
         return changes(data, later, nominal, common, more, found.weight, every, arm)
 
-    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed)
+    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed)
     kept = len(columns.kept)
     moved = absorbed(data, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
     pairs = list(zip(standing, sizes, strict=True))

@@ -172,7 +172,7 @@ class Effect(ABC):
     needs: ClassVar[tuple[str, ...]] = ()  # what beyond position and torque it takes to see it: "reference log"
     fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
-    evidence: ClassVar[Literal["residual", "frequency responses", "base parameters", "none"]] = "residual"
+    evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
 

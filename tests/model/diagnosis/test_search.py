@@ -1,0 +1,125 @@
+"""The search on logs of which the truth is known: the cause, its place and its numbers; nothing where nothing is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis.candidates import Family, families, whole_motion
+from pipelines.model.diagnosis.exact import Exact, refine
+from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.screen import screen, screen_family
+from pipelines.model.diagnosis.search import Case, search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects import all_effects, find_effect
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import hidden, wave
+
+QUICK = ("cogging", "torque_offset", "spring", "time_delay", "quadratic_drag")
+
+
+def case_of(prepared: Prepared) -> Case:
+    """With few causes, so that it is quick."""
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    others = tuple(kind.name for kind in all_effects() if kind.name not in QUICK)
+    every = families(columns.laws, whole_motion(prepared.data), model.arm, others)
+    return Case(prepared.data, prepared.judge, model, fit.weight, every, None)
+
+
+@pytest.fixture(scope="module")
+def waving() -> Case:
+    return case_of(prepare(Logs((hidden(1, wave), hidden(2, wave)), (hidden(3, wave, "validate"),)), DiagnosisSettings()))
+
+
+def test_cogging_is_found_at_its_joint_with_its_numbers(waving: Case) -> None:
+    found = search(waving, 1)
+    best = found.steps[0].best
+    assert best is not None
+    assert (best.effect.name, best.effect.joint) == ("cogging", 2)
+    values = best.done.model.effects[0].values
+    assert values["order"] == pytest.approx(11.0, abs=0.01)
+    assert values["amplitude"] == pytest.approx(0.1, rel=0.03)
+    assert values["phase"] == pytest.approx(0.6, abs=0.05)
+
+
+def test_what_is_left_is_noise(waving: Case) -> None:
+    """The drives' 20, 10 and 5 mN m, as far as the low-pass lets them through."""
+    assert (search(waving, 1).final.rms < np.array([0.012, 0.006, 0.004])).all()
+
+
+def test_nothing_is_worth_a_step_without_a_cause() -> None:
+    case = case_of(prepare(Logs((hidden(1), hidden(2)), (hidden(3, None, "validate"),)), DiagnosisSettings()))
+    assert search(case, 2).steps[0].best is None
+
+
+def test_a_delay_is_fitted_exactly() -> None:
+    """Position 3 ms late at joint 3: to first order the torque is a slope, exactly it is another moment."""
+    late = 3
+    logs = []
+    for seed, role in ((1, "identify"), (2, "identify"), (3, "validate")):
+        log = hidden(seed, None, role)
+        q = log.q.copy()
+        q[late:, 2] = q[:-late, 2]
+        logs.append(replace(log, signals={**log.signals, "q": replace(log.signals["q"], values=q)}))
+    found = search(case_of(prepare(Logs(tuple(logs[:2]), (logs[2],)), DiagnosisSettings())), 1)
+    best = found.steps[0].best
+    assert best is not None
+    assert (best.effect.name, best.effect.joint) == ("time_delay", 3)
+    assert best.done.model.effects[0].values["delay"] == pytest.approx(0.003, abs=5e-5)
+
+
+def test_an_invisible_cause_has_no_visibility(waving: Case) -> None:
+    """A rotor's inertia at joint 1 is p7 of the arm, at joint 3 it is not."""
+    now = refine(waving.model, waving.data, waving.weight)
+    eta = []
+    for joint in (1, 3):
+        effect = find_effect("rotor_inertia")(joint=joint)
+        eta.append(screen_family(waving.data, now.fit, Family("rotor_inertia", joint, (effect,)), now.model.arm).best_visibility)
+    assert eta[0] < 1e-3
+    assert eta[1] > 0.5
+
+
+def test_the_gain_of_a_screening_is_that_of_least_squares(waving: Case) -> None:
+    """gᵀ G⁻¹ g is how much numpy's least squares takes off the squared residual with the columns added."""
+    now = refine(waving.model, waving.data, waving.weight)
+    family = next(f for f in waving.families if f.cause == "spring" and f.joint == 2)
+    found = screen(waving.data, now.fit, [family], now.model.arm)[0]
+    columns = waving.data.lay(lambda motion: found.shape[0].columns(motion, now.model.arm))
+    table = np.concatenate([now.slopes, columns]) * now.weights
+    _, rss, *_ = np.linalg.lstsq((table / np.linalg.norm(table, axis=1)[:, None]).T, now.residual, rcond=1e-12)
+    base = now.slopes * now.weights
+    size = np.linalg.norm(base, axis=1)
+    _, before, *_ = np.linalg.lstsq((base[size > 0] / size[size > 0, None]).T, now.residual, rcond=1e-12)
+    assert found.gain[0] == pytest.approx(float(before[0] - rss[0]), rel=0.02)
+
+
+def test_an_event_belongs_to_its_log() -> None:
+    """A push at the tip for 0.3 s in the second of two logs is found there, at its time."""
+    def push(motion: Motion) -> np.ndarray:  # type: ignore[type-arg]
+        from tests.model.diagnosis.arms import arm
+
+        window = np.where((motion.t > 3.0) & (motion.t < 3.3), np.sin(np.pi * (motion.t - 3.0) / 0.3), 0.0)
+        step, out = 1e-6, np.zeros_like(motion.q)
+        for j in range(3):
+            moved = motion.q.copy()
+            moved[:, j] += step
+            jacobian = (arm().body.tip(moved) - arm().body.tip(motion.q)) / step
+            out[:, j] = -window * (jacobian @ np.array([0.0, 6.0, 10.0]))
+        return out
+
+    prepared = prepare(Logs((hidden(1), hidden(2, push)), (hidden(3, None, "validate"),)), DiagnosisSettings())
+    case = case_of(prepared)
+    arm_now = case.model.arm
+    family = families((), whole_motion(case.data), arm_now, tuple(k.name for k in all_effects() if k.name != "contact"))
+    found = search(replace(case, families=(*case.families, *family)), 1)
+    best = found.steps[0].best
+    assert best is not None
+    assert best.effect.name == "contact"
+    assert best.log == 1
+    values = best.done.model.effects[0].values
+    assert values["start"] == pytest.approx(3.0, abs=0.01)
+    assert values["force"] == pytest.approx(np.hypot(6.0, 10.0), rel=0.05)
