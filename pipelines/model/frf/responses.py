@@ -23,7 +23,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
-from pipelines.signal.cross_spectra import CrossSpectra, cross_spectra
+from pipelines.signal.cross_spectra import cross_spectra
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
 from pipelines.signal.local_polynomial import local_polynomial
 from pipelines.signal.multisine_response import DetectionLines, MultisineResponses, multisine_responses
@@ -228,11 +228,15 @@ def _segments(turned: tuple[Turned, ...], lengths: Sequence[int], how: How) -> _
 def _welch(stretches: Sequence[Array], turned: tuple[Turned, ...], how: How, source: int, outputs: Sequence[int]) -> Responses:
     first = turned[0]
     segments = _segments(turned, [len(x) for x in stretches], how)
-    spectra = _excited_bins(cross_spectra(stretches, first.rate, segments.samples), source)
-    found = spectra.responses(source, outputs)
+    spectra = cross_spectra(stretches, first.rate, segments.samples)
+    power = spectra.density[:, source, source].real
+    excited = power > _NO_POWER * power.max()
+    density = spectra.density.copy()
+    density[~excited, source, source] = power.max()  # of a bin that is left out below
+    found = replace(spectra, density=density).responses(source, outputs)
     number = np.rint(found.frequency * segments.samples * first.sample_time)
     inside = (found.frequency >= _LOWEST) & (found.frequency <= _HIGHEST * first.rate)
-    return _where(found, inside & (number % segments.every == 0))
+    return _where(found, inside & excited[1:] & (number % segments.every == 0))
 
 
 def _direct(signals: Sequence[Array], turned: tuple[Turned, ...], how: How) -> FrequencyResponse:
@@ -246,14 +250,6 @@ def _with_reversal(turned: tuple[Turned, ...], how: How) -> FrequencyResponse | 
     if sum(len(x) for x in known) < _SEGMENTS * round(turned[0].rate / (how.resolution or 0.25)):
         return None
     return closed_loop(_welch(known, turned, how, V, (INPUT, POSITION)))
-
-
-def _excited_bins(spectra: CrossSpectra, source: int) -> CrossSpectra:
-    """Without the bins where the source has no power beside its strongest. The first two tell the resolution and stay."""
-    power = spectra.density[:, source, source].real
-    kept = power > _NO_POWER * power.max()
-    kept[:2] = True
-    return replace(spectra, frequency=spectra.frequency[kept], density=spectra.density[kept])
 
 
 def double_integrator(frequency: Array, sample_time: float, delay: int = 0) -> Array:
