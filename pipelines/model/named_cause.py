@@ -16,7 +16,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import Effect
 
-__all__ = ["acting_cause"]
+__all__ = ["acting_cause", "wanted_cause"]
 
 
 def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") -> Acting:
@@ -33,6 +33,31 @@ def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") ->
     joint, numbers = _place(text, kind, rest, len(revolute), where)
     values = _values(text, kind, kind(joint=joint), numbers, where)
     return Acting.of(kind(joint=joint), values, origin="assumed", revolute=joint is None or revolute[joint - 1])
+
+
+def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> tuple[Effect, dict[str, float]]:
+    """The cause that `text` names, to be fitted, and where its non-linear numbers start: "cogging:2", "cogging:2:order=18".
+
+    Raises:
+        UsageError: C01, no such cause or number; C02, a joint or number that does not fit, or one that every fit finds anew.
+    """
+    name, *rest = text.split(":")
+    if name not in effect_names():
+        raise UsageError("C01", f"'{name}' is not a cause{did_you_mean(name, effect_names())}", where=where,
+                         remedy=f"the causes are {', '.join(effect_names())}")
+    kind = find_effect(name)
+    joint, numbers = _place(text, kind, rest, len(revolute), where)
+    effect = kind(joint=joint)
+    if not numbers:
+        return effect, {}
+    values = _values(text, kind, effect, numbers, where)
+    given = [part.partition("=")[0].strip() for part in numbers.split(",") if part.strip()]
+    shapes = [q.name for q in kind.parameters if q.shape and not q.derived]
+    if linear := [one for one in given if one not in shapes]:
+        raise UsageError("C02", f"'{text}': {', '.join(linear)} is fitted, whatever it is said to be", where=where,
+                         remedy=f"a start can be given to {', '.join(shapes)}" if shapes else f"write {text.split(':')[0]}"
+                                f"{'' if joint is None else f':{joint}'}")
+    return effect, {one: values[one] for one in given}
 
 
 def _place(text: str, kind: type[Effect], rest: list[str], joints: int, where: str) -> tuple[int | None, str]:

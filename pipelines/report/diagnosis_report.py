@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-import numpy as np
-
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Value
 from pipelines.model.effects import find_effect
@@ -98,7 +96,7 @@ def _worth(one: Finding) -> str:
     tip = one.gain.tip_error_rms
     said = ""
     if tip is not None:
-        before, after = (1e3 * float(np.ravel(x)[0]) for x in (tip.before, tip.after))
+        before, after = 1e3 * tip.before, 1e3 * tip.after
         said = f" The simulated tip is {format_number(before, 3)} mm off without it and {format_number(after, 3)} mm with it"
         said += f", {simulation}."
     return (f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above the floor; the refitted model could "

@@ -12,7 +12,7 @@ from pipelines.model.diagnosis.exact import Refined
 from pipelines.model.diagnosis.gains import simulation_errors, torque_gain
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.numbers import acting, parameters
-from pipelines.model.diagnosis.result import BeforeAfter, Diagnosis, Finding, Gain, Rejected, Rival, TorqueGain
+from pipelines.model.diagnosis.result import BeforeAfter, Diagnosis, Finding, Gain, Rejected, Rival, TipError, TorqueGain
 from pipelines.model.diagnosis.search import Found, Step, Tried
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
@@ -38,7 +38,7 @@ def findings(found: Found, ruling: Ruling, prepared: Prepared, floor: Array, blo
         known = after.how != "none"
         gain = Gain(torque_gain(step.before, step.best.done, prepared.judge, blocks),
                     BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how,
-                    BeforeAfter(np.array([before.tip_rms]), np.array([after.tip_rms])) if known else None)
+                    TipError(before.tip_rms, after.tip_rms) if known else None)
         out.append(_finding(found, step, step.best, place, covariance, floor, gain, draw))
     return tuple(sorted(out, key=lambda one: -one.explained))
 

@@ -14,7 +14,7 @@ from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
 
 __all__ = ["BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof", "Rejected",
-           "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TorqueGain", "Trial", "Value", "Verdict"]
+           "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial", "Value", "Verdict"]
 
 Verdict = Literal["cause", "nothing-wrong", "unknown"]
 
@@ -55,13 +55,21 @@ class BeforeAfter:
 
 
 @dataclass(frozen=True)
+class TipError:
+    """How far the simulated tip is from the measured one [m], root mean square, without and with the finding."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
 class Gain:
     """How much better the model is with a finding than with those before it, on what was held out."""
 
     validate_torque_rms: TorqueGain
     simulated_position_rms: BeforeAfter | None  # [rad]; None where nothing could be simulated
     simulation: Literal["closed-loop", "windowed", "none"]
-    tip_error_rms: BeforeAfter | None  # [m] one number each
+    tip_error_rms: TipError | None
 
 
 @dataclass(frozen=True)

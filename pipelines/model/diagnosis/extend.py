@@ -1,0 +1,204 @@
+"""Extend the nominal model by causes that somebody names, refit everything, and accept them by what was held out alone.
+
+    found = extend(logs, (Wanted(effect), …), settings, arm)
+    found.accepted, found.extended, found.gain
+
+No threshold and no twin: the cause was named. It is accepted where its gain on held-out torque is beyond its bootstrap interval,
+where the logs agree on its size, and where the simulated arm comes nearer to the measured one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from pipelines.errors import UsageError
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
+from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.findings import extended_arm, findings, sure
+from pipelines.model.diagnosis.gains import simulation_errors, torque_gain
+from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.result import BeforeAfter, Finding, Gain, Rejected, ResidualRms, TipError
+from pipelines.model.diagnosis.search import Case, Found, held_out_left, search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.twin import white
+from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.effects.base import Effect
+from pipelines.model.estimation.logs import Motions
+from pipelines.model.parameter import Parameter
+
+__all__ = ["Extended", "Wanted", "extend"]
+
+_ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A cause to extend the model by, and where its non-linear numbers start."""
+
+    effect: Effect
+    start: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def place(self) -> str:
+        return place_of(self.effect.name, self.effect.joint)
+
+
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """A model extended."""
+
+    arm: Arm | None  # with everything refitted; None where no cause was accepted
+    findings: tuple[Finding, ...]  # accepted
+    rejected: tuple[Rejected, ...]
+    gain: Gain | None  # of all accepted together
+    before: ResidualRms
+    after: ResidualRms
+    held_out: Literal["logs", "blocks"]
+    standing: tuple[Acting, ...]  # what the reference logs show as well
+    motions: Motions  # fitted, then judging
+    fitted: int  # of them
+
+
+def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | None = None, arm: Arm | None = None,
+           tell: Callable[[str], None] | None = None) -> Extended:
+    """The nominal model with the wanted causes, as far as the held-out logs bear them out.
+
+    Args:
+        arm: whose friction laws the nominal model takes, fitted anew; Coulomb and viscous friction where left out.
+
+    Raises:
+        InputRejected: no log can be fitted (S01, T04, T08).
+        UsageError: C02, a cause that no model of these logs can take up.
+    """
+    chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
+    prepared = prepare(logs, chosen, arm)
+    case, prepared, standing = _case(prepared, chosen)
+    every = tuple(_family(case, one) for one in wanted)
+    left, refused = list(every), dict[tuple[str, int | None], str]()
+    while True:
+        say(f"fitting {', '.join(place_of(f.cause, f.joint) for f in left) or 'the nominal model'}")
+        found, named, why = _tried(replace(case, families=tuple(left)), prepared, chosen)
+        refused |= why
+        if not why:
+            break
+        left = [one for one in left if (one.cause, one.joint) not in why]
+    return _told(found, named, refused, prepared, standing, chosen)
+
+
+def _case(prepared: Prepared, chosen: DiagnosisSettings) -> tuple[Case, Prepared, tuple[Acting, ...]]:
+    """The nominal model on these logs, beside what the reference logs show as well."""
+    if prepared.reference is not None:
+        since = since_reference(prepared, prepared.reference, chosen)
+        case = replace(since.case, changed=None, nameable=_ALL)
+        return case, replace(prepared, data=case.data, judge=case.judge), since.acting
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    return (Case(prepared.data, prepared.judge, Exact.start(columns, fit), fit.weight, (), None, chosen.blocks, _ALL), prepared, ())
+
+
+def _family(case: Case, one: Wanted) -> Family:
+    laws = case.model.columns.laws
+    every = families(laws, whole_motion(case.data), case.model.arm)
+    mine = next((f for f in every if (f.cause, f.joint) == (one.effect.name, one.effect.joint)), None)
+    if mine is None:
+        law = one.effect.name in {law.name for law in laws}
+        raise UsageError("C02", f"{one.place}: the nominal model has it already" if law else
+                         f"{one.place}: within one session the base parameters take it up", where="--with",
+                         remedy="name a cause that the nominal model lacks" if law else
+                         "estimate-bps on logs with it gives a model that has it")
+    if mine.event:
+        raise UsageError("C02", f"{one.place} happens once: no model of the arm holds it", where="--with",
+                         remedy="leave the moment out of the logs instead")
+    shape: dict[str, Any] = dict(one.start)
+    return replace(mine, shapes=tuple(dict.fromkeys(replace(s, **shape) for s in mine.shapes)))
+
+
+def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[Found, tuple[Finding, ...],
+                                                                            dict[tuple[str, int | None], str]]:
+    """Fitted one after the other, the strongest first; and why some of them are not accepted."""
+    none = np.zeros(len(case.families))
+    free = Thresholds(none, none, "none: the cause was named", case.weight, tuple(f.joint for f in case.families))
+    found = search(replace(case, thresholds=free), len(case.families))
+    steps = [step for step in found.steps if step.best is not None]
+    ruling = Ruling("cause", tuple(range(len(steps))), "")
+    told = findings(found, ruling, prepared, white(case.data, found.final.left), chosen.blocks, chosen.evidence)
+    why: dict[tuple[str, int | None], str] = {}
+    for step in steps:
+        if step.best is not None and (doubt := sure(step, prepared, chosen.blocks)):
+            why[step.best.effect.name, step.best.effect.joint] = doubt
+    for one in told:
+        if (one.cause, one.joint) not in why and not _nearer(one.gain):
+            why[one.cause, one.joint] = "the simulated arm with it is no nearer to the measured one"
+    taken = {(one.cause, one.joint) for one in told}
+    why |= {(f.cause, f.joint): "it takes nothing off the held-out error" for f in case.families
+            if (f.cause, f.joint) not in taken}
+    return found, told, why
+
+
+def _nearer(gain: Gain) -> bool:
+    position = gain.simulated_position_rms
+    return position is None or float(np.linalg.norm(position.after)) < float(np.linalg.norm(position.before))
+
+
+def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], prepared: Prepared,
+          standing: tuple[Acting, ...], chosen: DiagnosisSettings) -> Extended:
+    judge, final = prepared.judge, found.final
+    floor = white(final.data, final.left)
+    rms = [ResidualRms(one.rms, (one.data if judge is None else judge).rms(held_out_left(one, judge, chosen.blocks)), floor)
+           for one in (found.nominal, final)]
+    rejected = tuple(Rejected(cause, joint, reason) for (cause, joint), reason in refused.items())
+    arm = gain = None
+    if named:
+        arm = with_uncertainty(extended_arm(found, Ruling("cause", tuple(range(len(named))), "")), final)
+        arm = replace(arm, effects=(*standing, *arm.effects))
+        gain = _gain(found, prepared, chosen)
+    return Extended(arm, named, rejected, gain, rms[0], rms[1], "blocks" if judge is None else "logs", standing,
+                    (*prepared.motions, *prepared.judging), len(prepared.motions))
+
+
+def _gain(found: Found, prepared: Prepared, chosen: DiagnosisSettings) -> Gain:
+    """Of everything that was accepted, together."""
+    motions = prepared.judging or prepared.motions
+    before, after = simulation_errors([found.nominal.model.arm, found.final.model.arm], motions)
+    known = after.how != "none"
+    return Gain(torque_gain(found.nominal, found.final, prepared.judge, chosen.blocks),
+                BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how,
+                TipError(before.tip_rms, after.tip_rms) if known else None)
+
+
+def with_uncertainty(arm: Arm, done: Refined) -> Arm:
+    """The arm with the standard deviations of its base parameters and friction laws."""
+    std = np.sqrt(np.maximum(np.diagonal(done.covariance()), 0.0))
+    columns = done.model.columns
+    place = {i: k for k, i in enumerate(columns.kept)}
+    base = tuple(replace(p, std=float(std[place[i]])) if i in place else p for i, p in enumerate(arm.base))
+    return replace(arm, base=base, friction=_friction(arm, done, std))
+
+
+def _friction(arm: Arm, done: Refined, std: Array) -> tuple[Acting, ...]:
+    """Amplitudes have the deviation of their column; a shape moves by its logarithm."""
+    columns = done.model.columns
+    first, count = len(columns.kept), len(done.model.beta)
+    shapes = {(place, name): float(std[count + k]) for k, (kind, place, name) in enumerate(done.names) if kind == 0}
+    found, kept = [], iter(arm.friction)
+    for place, law in enumerate(columns.laws):
+        linear = [q.name for q in law.parameters if not q.shape]
+        own = {name: float(std[first + k]) for k, name in enumerate(linear)}
+        first += len(linear)
+        if not law.friction:
+            continue
+        acting = next(kept)
+
+        def deviation(p: Parameter, own: Mapping[str, float] = own, place: int = place) -> float | None:
+            return own[p.name] if p.name in own else shapes[place, p.name] * abs(p.value) if (place, p.name) in shapes else p.std
+
+        found.append(replace(acting, parameters=tuple(replace(p, std=deviation(p)) for p in acting.parameters)))
+    return tuple(found)
