@@ -11,17 +11,15 @@ before any physics is blamed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from pipelines.errors import NothingMatched, UsageError, did_you_mean
-from pipelines.log.experiment import ExperimentLog
+from pipelines.errors import UsageError, did_you_mean
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.gates import examined, refuse_leak
-from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.gates import examined, logs_of_roles
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import effect_names
@@ -88,8 +86,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """
     _refuse_strange(settings)
     given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)
-    logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
-    chosen = _chosen(logs, inputs.label)
+    chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
     if given.arm is not None and given.arm.n_joints != chosen.identify[0].n_joints:
         raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has "
                          f"{chosen.identify[0].n_joints}", where="--model", remedy="give a model of this robot")
@@ -102,20 +99,6 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
                   without=settings.without, doctor=said)
-
-
-def _chosen(logs: Sequence[ExperimentLog], label: str) -> Logs:
-    if len({log.robot_text for log in logs}) > 1:
-        raise UsageError("C02", "logs of several robots", where=label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
-    chosen = Logs.by_role(logs)
-    if not chosen.identify:
-        kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
-        raise NothingMatched("C06", f"no excitation, free or writing log of role identify; there are: {kinds}", where=label,
-                             remedy="record an excitation, or name the logs to fit: --identify PATH")
-    refuse_leak(chosen.identify, chosen.validate)
-    refuse_leak(chosen.reference, (*chosen.identify, *chosen.validate))
-    return chosen
 
 
 def _refuse_strange(settings: Settings) -> None:
@@ -146,4 +129,4 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, None, _exit_code,
-              lambda result: result.doctor)
+              lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result))

@@ -24,7 +24,7 @@ Average = Annotated[bool | None, typer.Option("--average/--no-average",
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
 STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation",
-          "validate-writing", "frf", "diagnose")
+          "validate-writing", "frf", "diagnose", "extend")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=False,
                   pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -311,6 +311,33 @@ def diagnose(
         "reference": tuple(reference or ()) or None, "without": tuple(without or ()) or None, "model": model,
         "replicas": replicas, "most": most, "blocks": blocks, "filter": filter, "decimate": decimate,
         "min_speed": numbers(min_speed, "--min-speed"), "seed": seed, "allow_mismatch": allow_mismatch})
+
+
+@app.command(cls=StageCommand)
+@with_common
+def extend(
+    common: Common,
+    logs: Annotated[list[Path] | None, typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
+                                                      readable=False)] = None,
+    with_: Annotated[list[str] | None, typer.Option("--with", help="CAUSE:JOINT, or CAUSE:JOINT:NAME=VALUE with a start for a "
+                                                    "non-linear number: cogging:2:order=18. Repeatable.")] = None,
+    identify: Annotated[list[str] | None, typer.Option(help="Logs to fit, whatever they say of themselves. Repeatable.")] = None,
+    validate: Annotated[list[str] | None, typer.Option(help="Logs that judge. Repeatable.")] = None,
+    reference: Annotated[list[str] | None, typer.Option(help="Logs of the arm as it was before. Repeatable.")] = None,
+    model: Annotated[str | None, typer.Option(help="model.json to extend: its effects are kept, and fitted anew.")] = None,
+    blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
+    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
+    min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
+    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Fit torque that looks misplaced.")] = None,
+) -> None:
+    """Extend the model by named causes, refit everything, and judge it on held-out logs."""
+    from pipelines.extend import STAGE
+
+    _go(STAGE, tuple(logs or ()), common, {
+        "causes": tuple(with_ or ()) or None, "identify": tuple(identify or ()) or None,
+        "validate": tuple(validate or ()) or None, "reference": tuple(reference or ()) or None, "model": model, "blocks": blocks,
+        "filter": filter, "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "allow_mismatch": allow_mismatch})
 
 
 @app.command()

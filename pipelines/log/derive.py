@@ -26,7 +26,7 @@ __all__ = ["created", "derive", "derived_by", "recording"]
 _STEPS = "steps"  # every command that derived something, first to last, with its settings
 _BEFORE = "recording"  # what /derived held before rrrid derived anything from the recording
 _OWN = "own"  # derived signals that the recording had already; a log without it had none
-_DERIVING = ("reconstruct", "estimate-bps", "validate-writing", "diagnose")
+_DERIVING = ("reconstruct", "estimate-bps", "validate-writing", "diagnose", "extend")
 
 
 def created(recorded: str | None = None) -> str:

@@ -6,16 +6,16 @@ import math
 from collections.abc import Iterable
 
 from pipelines.model.diagnosis.outcome import Result
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Value
+from pipelines.model.diagnosis.result import Finding, Gain, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_proof import proof_figures
-from pipelines.report.diagnosis_words import cause_at, floor_words, held_out_words, per_joint, title_of, told_value
+from pipelines.report.diagnosis_words import cause_at, floor_words, held_out_words, per_joint, title_of, told_value, torque_errors
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
 
-__all__ = ["diagnosis_report", "finding_sections"]
+__all__ = ["diagnosis_report", "finding_section", "gain_table"]
 
 _LEDGER = 40  # lines
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
@@ -23,9 +23,11 @@ _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    sections = [*finding_sections(result, result.rated), *_unknown(result), *picture_sections(result, result.rated),
-                *_standing(result), *_others(result), *_limits(result), _basis(result), *_doctor(result)]
-    return Report("Diagnosis", _verdict(result), _TONES[result.verdict], _key_figures(result), tuple(sections))
+    found = [finding_section(number, one) for number, one in enumerate(result.findings, 1)]
+    sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
+                *_limits(result), _basis(result), *_doctor(result)]
+    return Report("Diagnosis", _verdict(result), _TONES[result.verdict],
+                  torque_errors(result.residual_rms, result.after_rms, result.rated, floor_words(result)), tuple(sections))
 
 
 def _verdict(result: Result) -> str:
@@ -50,35 +52,21 @@ def _size(one: Finding) -> str:
     return f"{format_number(one.torque_rms, 2)} N m rms of torque that the model does not have{rated}"
 
 
-def _key_figures(result: Result) -> Table:
-    """Joint by joint: the residual before, after and its floor; the tip once."""
-    before, after = result.residual_rms, result.after_rms
-    rows = []
-    for j in range(len(before.floor)):
-        rated = result.rated[j] if j < len(result.rated) and math.isfinite(result.rated[j]) else math.nan
-        rows.append((j + 1, *(float(f"{x:.3g}") for x in (before.validate[j], after.validate[j], before.floor[j])),
-                     _rounded(100.0 * before.validate[j] / rated), _rounded(100.0 * after.validate[j] / rated)))
-    return Table(("joint", "held-out torque error now [N m]", "after extension [N m]", "floor [N m]", "now [% of rated]",
-                  "after [% of rated]"), tuple(rows), f"Root mean square. {floor_words(result)}")
-
-
 def _rounded(x: float) -> float | None:
     return float(f"{x:.3g}") if math.isfinite(x) else None
 
 
-def finding_sections(found: Diagnosis, rated: tuple[float, ...]) -> list[Section]:
-    """One section for each finding: what it is, what to check, what it is worth, its proof."""
-    del rated
-    return [_finding(number, one) for number, one in enumerate(found.findings, 1)]
-
-
-def _finding(number: int, one: Finding) -> Section:
+def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
+    """What it is, what to check, what it is worth, its proof; `offer` says how to extend the model by it."""
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one)]
+    if offer and one.origin == "residual":
+        text.append(f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it")
     if one.rivals:
         names = ", ".join(f"{cause_at(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
-    tables = [_numbers(one.parameters), _gain(one)]
+    tables = [_numbers(one.parameters),
+              gain_table(one.gain, "Gain on held-out time, root mean square, beside the findings before it.")]
     return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text), tuple(tables),
                    tuple(proof_figures(number, one)))
 
@@ -100,8 +88,7 @@ def _worth(one: Finding) -> str:
         said = f" The simulated tip is {format_number(before, 3)} mm off without it and {format_number(after, 3)} mm with it"
         said += f", {simulation}."
     return (f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above the floor; the refitted model could "
-            f"hide {format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{said} "
-            f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it.")
+            f"hide {format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{said}")
 
 
 def _numbers(parameters: dict[str, Value]) -> Table:
@@ -109,8 +96,8 @@ def _numbers(parameters: dict[str, Value]) -> Table:
     return Table(("parameter", "value ± std", "unit"), rows, "What was identified.")
 
 
-def _gain(one: Finding) -> Table:
-    gain = one.gain
+def gain_table(gain: Gain, caption: str) -> Table:
+    """Joint by joint: torque and simulated position, without and with."""
     rows = []
     for j in range(len(gain.validate_torque_rms.before)):
         torque = gain.validate_torque_rms
@@ -121,8 +108,7 @@ def _gain(one: Finding) -> Table:
                      None if position is None else _rounded(position.before[j]),
                      None if position is None else _rounded(position.after[j])))
     return Table(("joint", "torque error without [N m]", "with [N m]", "change, 95 % [N m]",
-                  "simulated position error without [rad]", "with [rad]"), tuple(rows),
-                 "Gain on held-out time, root mean square, beside the findings before it.")
+                  "simulated position error without [rad]", "with [rad]"), tuple(rows), caption)
 
 
 def _unknown(result: Result) -> list[Section]:
@@ -186,7 +172,7 @@ def _limits(result: Result) -> list[Section]:
 def _basis(result: Result) -> Section:
     """Where floor and thresholds come from, and what judged."""
     origins = sorted({one.origin for one in result.thresholds})
-    text = [floor_words(result), held_out_words(result), f"Thresholds come from {' and '.join(origins) or 'nothing'}."]
+    text = [floor_words(result), held_out_words(result.held_out), f"Thresholds come from {' and '.join(origins) or 'nothing'}."]
     if result.replicas:
         text.append(f"The twin is the fitted model run {result.replicas} times through the same controllers, references, encoders "
                     f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.result import Diagnosis, Value
+from pipelines.model.diagnosis.result import Diagnosis, ResidualRms, Value
 from pipelines.model.effects import effect_names, find_effect
+from pipelines.report.report import Table
 from pipelines.report.style import format_number, with_std
 
-__all__ = ["cause_at", "floor_words", "held_out_words", "per_joint", "title_of", "told_value"]
+__all__ = ["cause_at", "floor_words", "held_out_words", "per_joint", "title_of", "told_value", "torque_errors"]
 
 _FLOORS = {
     "twin": "The floor is what the simulated twin leaves: the fitted model run through the same experiment and the same analysis.",
@@ -46,8 +50,23 @@ def floor_words(found: Diagnosis) -> str:
     return _FLOORS.get(found.floor_origin, f"The floor comes from {found.floor_origin}.")
 
 
-def held_out_words(found: Diagnosis) -> str:
-    """What judged."""
-    if found.held_out == "logs":
+def held_out_words(held_out: str) -> str:
+    """What judged: "logs" or "blocks"."""
+    if held_out == "logs":
         return "Held-out errors are those of logs of role validate, to which nothing was fitted."
     return "No log has the role validate: contiguous blocks of time were held out, one after the other."
+
+
+def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: str = "") -> Table:
+    """Joint by joint: the held-out torque error before and after, in N m and in percent of the rated torque, and the floor."""
+    rows = []
+    for j in range(len(before.floor)):
+        limit = rated[j] if j < len(rated) and math.isfinite(rated[j]) else math.nan
+        both = float(before.validate[j]), float(after.validate[j])
+        rows.append((j + 1, *(_digits(x) for x in (*both, float(before.floor[j]))), *(_digits(100.0 * x / limit) for x in both)))
+    return Table(("joint", "held-out torque error now [N m]", "extended [N m]", "floor [N m]", "now [% of rated]",
+                  "extended [% of rated]"), tuple(rows), f"Root mean square. {floor}".strip())
+
+
+def _digits(x: float) -> float | None:
+    return float(f"{x:.3g}") if math.isfinite(x) else None

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from pipelines.errors import Check, InputRejected
+from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.log.derive import recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.plausibility import mismatches
 
-__all__ = ["examined", "refuse_leak"]
+__all__ = ["examined", "logs_of_roles"]
 
 
 def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tuple[Check, ...]:
@@ -37,7 +38,29 @@ def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tup
     return tuple(said)
 
 
-def refuse_leak(fitted: Sequence[ExperimentLog], judging: Sequence[ExperimentLog]) -> None:
+def logs_of_roles(logs: Sequence[ExperimentLog], label: str) -> Logs:
+    """The logs by what they are for; plans are none.
+
+    Raises:
+        NothingMatched: C06, no log to fit.
+        UsageError: C02, logs of several robots.
+        InputRejected: D14, one recording in two roles.
+    """
+    known = [log for log in logs if log.origin != "planned"]
+    if len({log.robot_text for log in known}) > 1:
+        raise UsageError("C02", "logs of several robots", where=label,
+                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+    chosen = Logs.by_role(known)
+    if not chosen.identify:
+        kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in known})) or "none"
+        raise NothingMatched("C06", f"no excitation, free or writing log of role identify; there are: {kinds}", where=label,
+                             remedy="record an excitation, or name the logs to fit: --identify PATH")
+    _refuse_leak(chosen.identify, chosen.validate)
+    _refuse_leak(chosen.reference, (*chosen.identify, *chosen.validate))
+    return chosen
+
+
+def _refuse_leak(fitted: Sequence[ExperimentLog], judging: Sequence[ExperimentLog]) -> None:
     """D14: what a model was fitted to must not judge it."""
     seen = {log.q.tobytes() + log.tau.tobytes(): log for log in fitted}
     for log in judging:

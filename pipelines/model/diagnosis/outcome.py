@@ -1,13 +1,17 @@
-"""What the stage `diagnose` leaves: the diagnosis, and what its report says besides."""
+"""What the stages `diagnose` and `extend` leave: what was found, and what their reports say besides."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 from pipelines.errors import Check
-from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.model_file import ModelFile
+from pipelines.log.results import NOT_STORED
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
 
-__all__ = ["Result"]
+__all__ = ["Extension", "Result"]
 
 
 @dataclass(frozen=True)
@@ -19,3 +23,24 @@ class Result(Diagnosis):
     rated: tuple[float, ...] = ()  # [N m] rated torque of each; infinite where nobody knows it
     without: tuple[str, ...] = ()  # causes that were left out
     doctor: tuple[Check, ...] = ()
+
+
+@dataclass(frozen=True)
+class Extension:
+    """A model extended, or why it was not."""
+
+    accepted: bool  # every cause that was named
+    causes: tuple[str, ...]  # as they were named
+    findings: tuple[Finding, ...]  # accepted
+    rejected: tuple[Rejected, ...]
+    gain: Gain | None  # of all accepted together
+    residual_rms: ResidualRms  # before
+    after_rms: ResidualRms
+    held_out: Literal["logs", "blocks"]
+    standing: tuple[str, ...]  # effects that the reference logs show as well; the model has them
+    robot: str
+    joints: tuple[str, ...]
+    rated: tuple[float, ...]  # [N m]
+    doctor: tuple[Check, ...]
+    model: ModelFile | None  # None where nothing was accepted
+    derived: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED, repr=False)

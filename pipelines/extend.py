@@ -1,0 +1,167 @@
+"""Extend the model by named causes, refit everything, and say what it gains on held-out logs.
+
+Reads    logs of roles "identify", "validate" and "reference"; the causes; optionally a model, whose effects are kept
+Writes   model.json where every rule of acceptance is kept, result.json, result.h5, logs/ with the model's torque, report.html
+Source   causes.md for the causes; Kostić et al. 2004, eq. (4), (12)-(15), for the rest
+
+A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its size, and where
+the simulated arm comes nearer to the measured one. What is not accepted is named with the reason; there is no way around it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pipelines.errors import NothingMatched, UsageError
+from pipelines.log.canonical import digest_of
+from pipelines.log.derive import derive, recording
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import write_log
+from pipelines.log.model_file import Source, read_model, write_model
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.extend import Extended, Wanted, extend
+from pipelines.model.diagnosis.gates import examined, logs_of_roles
+from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.outcome import Result as Diagnosed
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects import find_effect
+from pipelines.model.estimation.logs import Motions
+from pipelines.model.estimation.outcome import torques, validity
+from pipelines.model.motion import Reconstructed
+from pipelines.model.named_cause import wanted_cause
+from pipelines.report.extension_report import extension_report
+from pipelines.report.report import Report
+from pipelines.stage import Inputs, Request, Stage, read_by_role, slug
+
+__all__ = ["STAGE", "Extension", "Settings", "compute", "read", "report"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """By what the model is extended, and which logs do what."""
+
+    causes: tuple[str, ...] = ()  # CAUSE[:JOINT[:NAME=VALUE,…]]; the values are where non-linear numbers start
+    identify: tuple[str, ...] = ()  # paths of logs to fit, instead of those that say so
+    validate: tuple[str, ...] = ()  # that judge
+    reference: tuple[str, ...] = ()  # of the arm as it was before
+    model: str | None = None  # a model file: its friction laws and its effects are fitted anew
+    blocks: int = DiagnosisSettings.blocks  # held out in turn where no log is
+    filter: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
+    decimate: int | None = None  # every so-manieth sample; None: from the filter
+    min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
+    allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
+
+
+@dataclass(frozen=True)
+class Material:
+    """What was read beside the logs."""
+
+    arm: Arm | None
+    tell: Callable[[str], None]
+
+
+def read(request: Request, settings: Settings) -> Inputs:
+    """The logs in their roles, and the model to extend.
+
+    Raises:
+        UsageError: C02, no cause, no logs, or a log with two roles; C04, no such file.
+    """
+    if not settings.causes:
+        raise UsageError("C02", "no cause", where="--with", remedy="name one, as diagnose does: --with cogging:2")
+    inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
+                                              "reference": settings.reference})
+    if settings.model is None:
+        return replace(inputs, material=Material(None, request.tell))
+    path = Path(settings.model).absolute()
+    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    arm = Arm.from_model(read_model(settings.model), path)
+    return replace(inputs, sources=(*inputs.sources, *sources), material=Material(arm, request.tell))
+
+
+def compute(inputs: Inputs, settings: Settings) -> Extension:
+    """Gates, fit, judgement.
+
+    Raises:
+        NothingMatched: C06, no log to fit; within `run`, nothing that diagnose found.
+        UsageError: C01, C02, causes or settings that do not fit, logs of several robots, a model of another one.
+        InputRejected: as `diagnose`.
+    """
+    given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)
+    chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
+    robot = chosen.identify[0].robot
+    if given.arm is not None and given.arm.n_joints != robot.n_joints:
+        raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has {robot.n_joints}",
+                         where="--model", remedy="give a model of this robot")
+    wanted = [*_kept(given.arm), *(Wanted(*wanted_cause(text, robot.revolute)) for text in settings.causes)]
+    if isinstance(inputs.material, Diagnosed) and not settings.causes:
+        wanted = _found(inputs.material, inputs.label)
+    said = examined((*chosen.identify, *chosen.validate, *chosen.reference), settings.allow_mismatch)
+    engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
+                               min_speed=settings.min_speed)
+    found = extend(chosen, tuple({one.place: one for one in wanted}.values()), engine, given.arm, given.tell)
+    name = chosen.identify[0].robot_name
+    model = None if found.arm is None else replace(found.arm, name=name).to_model(
+        validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),
+        notes=(f"fitted by rrrid extend, with {', '.join(_place(one.cause, one.joint) for one in found.findings)}",))
+    return Extension(
+        accepted=not found.rejected, causes=tuple(one.place for one in wanted), findings=found.findings, rejected=found.rejected,
+        gain=found.gain, residual_rms=found.before, after_rms=found.after, held_out=found.held_out,
+        standing=tuple(one.place for one in found.standing), robot=name, joints=tuple(joint.name for joint in robot.joints),
+        rated=tuple(joint.torque for joint in robot.joints), doctor=said, model=model, derived=_derived(found, settings))
+
+
+def _place(cause: str, joint: int | None) -> str:
+    return cause if joint is None else f"{cause}:{joint}"
+
+
+def _kept(arm: Arm | None) -> list[Wanted]:
+    """The effects that the model has already: they are fitted anew beside the others."""
+    return [Wanted(acting.effect, {q.name: acting.values[q.name] for q in acting.effect.parameters if q.shape and not q.derived})
+            for acting in (arm.effects if arm is not None else ())]
+
+
+def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
+    """What `diagnose` named out of the residual, within `run`; what frequency responses tell has no place in these equations."""
+    named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings if one.origin == "residual"
+             and not find_effect(one.cause).per_log]
+    if not named:
+        raise NothingMatched("C06", f"diagnose found nothing to extend the model by: {diagnosed.verdict}", where=label,
+                             remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
+    return named
+
+
+def _sources(motions: Motions) -> tuple[Source, ...]:
+    return tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
+
+
+def _derived(found: Extended, settings: Settings) -> tuple[tuple[str, ExperimentLog], ...]:
+    """Every log with the torque of the extended model and what it leaves."""
+    if found.arm is None:
+        return ()
+    return tuple((slug(log.name), _with_torque(log, motion, found.arm, settings.causes)) for log, motion in found.motions)
+
+
+def _with_torque(log: ExperimentLog, motion: Reconstructed, arm: Arm, causes: Sequence[str]) -> ExperimentLog:
+    parts = torques(arm, log, motion)
+    total = parts.total
+    return derive(log, "extend", {"causes": list(causes)}, {"tau_model": total, "tau_effects": parts.effects,
+                                                            "tau_residual": log.tau - total})
+
+
+def write(result: Extension, folder: Path, request: Request) -> None:
+    """model.json, and every log with the model's torque."""
+    if result.model is not None:
+        write_model(folder / "model.json", result.model)
+    for name, log in result.derived or ():
+        write_log(folder / f"logs/{name}.{request.format}", log)
+
+
+def report(result: Extension) -> Report:
+    """The verdict, the gain, every cause with its proof, what was not accepted and why."""
+    return extension_report(result)
+
+
+STAGE = Stage("extend", "Extend the model by named causes", Settings, compute, report, read, write,
+              lambda result, check: int(check and not result.accepted), lambda result: result.doctor)

@@ -1,0 +1,61 @@
+"""The report of an extension: what it gains on held-out logs, every cause with its proof, what was not accepted and why."""
+
+from __future__ import annotations
+
+from pipelines.model.diagnosis.outcome import Extension
+from pipelines.report.diagnosis_report import finding_section, gain_table
+from pipelines.report.diagnosis_words import cause_at, held_out_words, title_of, torque_errors
+from pipelines.report.report import Report, Section, Table, Tone
+from pipelines.report.sections import checks_table
+from pipelines.report.style import format_number
+
+__all__ = ["extension_report"]
+
+
+def extension_report(result: Extension) -> Report:
+    """Verdict, key figures, one section a cause, what was refused."""
+    tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
+    sections = [finding_section(number, one, offer=False) for number, one in enumerate(result.findings, 1)]
+    if result.rejected:
+        rows = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
+        sections.insert(0, Section("Not accepted", ("The held-out logs do not bear it out. There is no way around that.",),
+                                   (Table(("cause", "joint", "why"), rows),)))
+    sections.append(_basis(result))
+    if result.doctor:
+        sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
+    return Report("Extension", _verdict(result), tone, torque_errors(result.residual_rms, result.after_rms, result.rated),
+                  tuple(sections))
+
+
+def _verdict(result: Extension) -> str:
+    refused = ", ".join(cause_at(one.cause, one.joint) for one in result.rejected)
+    if not result.findings:
+        return f"Not accepted: {refused}; no model was written. {_first_reason(result)}"
+    named = ", ".join(cause_at(one.cause, one.joint) for one in result.findings)
+    gain = result.gain
+    told = ""
+    if gain is not None and gain.tip_error_rms is not None:
+        tip = gain.tip_error_rms
+        after, before = (format_number(1e3 * x, 2) for x in (tip.after, tip.before))
+        told = f"; the simulated tip is {after} mm off instead of {before} mm"
+    but = f" Not accepted: {refused}." if refused else ""
+    return f"The model with {named} is better on held-out logs{told}.{but}"
+
+
+def _first_reason(result: Extension) -> str:
+    reason = result.rejected[0].reason if result.rejected else "no cause was named"
+    return f"{reason[:1].upper()}{reason[1:]}."
+
+
+def _basis(result: Extension) -> Section:
+    text = [held_out_words(result.held_out),
+            "A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its "
+            "size, and where the simulated arm comes nearer to the measured one."]
+    if result.standing:
+        text.append(f"The reference logs show as well, and the model has: {', '.join(result.standing)}.")
+    if result.model is not None:
+        text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --like LOG\" "
+                    "simulates it.")
+    tables = (gain_table(result.gain, "Gain of all accepted causes together, on held-out time, root mean square."),) \
+        if result.gain is not None else ()
+    return Section("What this rests on", tuple(text), tables)
