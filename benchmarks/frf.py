@@ -53,9 +53,10 @@ def true_modes(case: Case, log: ExperimentLog) -> list[tuple[str, float, float]]
     several = [truth.modes(_SEEN) for truth in truth_of(case, log)]
     found = []
     for kind, place in (("resonance", 0), ("antiresonance", 1)):
-        for frequency, _ in several[0][place]:
+        for frequency, damping in several[0][place]:
             near = [modes[place][np.argmin(np.abs(modes[place][:, 0] - frequency))] for modes in several if len(modes[place])]
-            if len(near) == len(several) and all(abs(one[0] - frequency) < 0.05 * frequency for one in near):
+            if len(near) == len(several) and all(abs(one[0] - frequency) < 0.05 * frequency
+                                                 and abs(one[1] - damping) < 0.4 * damping for one in near):
                 found.append((kind, float(np.mean([one[0] for one in near])), float(np.mean([one[1] for one in near]))))
     return found
 

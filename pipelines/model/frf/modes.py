@@ -33,6 +33,8 @@ _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
+_STUCK = 3.0  # misfit that a search which found the modes hardly leaves
+_SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
 _LONGEST = 0.05  # [s] no delay is longer
 _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
 
@@ -89,9 +91,9 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     """
     relative = relative_acceleration(measured)
     part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
-    fit = fit_rational(part.frequency, part.response, part.variance, correlated=part.correlated)
+    fit = _fitted(part)
     modes = tuple(_with_friction(m) for m in fit.modes() if _is_mode(m))
-    traces = tuple(_with_friction(m) for m in fit.modes() if not m.distinct and _is_mode(replace(m, distinct=True)))
+    traces = tuple(_with_friction(m) for m in fit.modes() if not m.distinct and _is_trace(m))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
@@ -102,6 +104,16 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
                  _inertia(measured, level), _friction_below(relative, level), fit.misfit,
                  (float(part.frequency[0]), float(part.frequency[-1])), fit)
+
+
+def _fitted(part: FrequencyResponse) -> Rational:
+    """The rational function; where the search got stuck, that without a delay if it is better."""
+    def fit(with_delay: bool) -> Rational:
+        return fit_rational(part.frequency, part.response, part.variance, correlated=part.correlated, freedom=part.freedom,
+                            with_delay=with_delay)
+
+    first = fit(True)
+    return first if first.misfit < _STUCK else min(first, fit(False), key=lambda one: one.description)
 
 
 def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:
@@ -155,6 +167,10 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
 
 def _is_mode(mode: Mode) -> bool:
     return mode.distinct and abs(mode.damping.value) < _STIFFEST and mode.frequency.std < _SURE * mode.frequency.value
+
+
+def _is_trace(mode: Mode) -> bool:
+    return _is_mode(replace(mode, distinct=True)) and mode.damping.value > _SEEN * mode.damping.std
 
 
 def _with_friction(mode: Mode) -> Mode:

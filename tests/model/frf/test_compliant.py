@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -121,6 +123,14 @@ def test_delay_and_rigid() -> None:
     assert "drive_lag" in lag[0].candidates
     rigid, _ = group_joint(2, [modes_of([], 0.5)], 1e-3)
     assert [(one.kind, one.cause) for one in rigid] == [("rigid", None)]
+
+
+def test_modes_that_do_not_explain_are_not_believed() -> None:
+    """A fit that leaves far more than noise names nothing, however well its modes would suit a base."""
+    poor = [replace(modes_of([base_under_arm(28.0, 8.0, j)], j), misfit=30.0) for j in (1.0, 1.2)]
+    found, left = group_joint(1, poor, 1e-3)
+    assert found == []
+    assert "No rational function explains" in left[0].evidence
 
 
 def test_the_base_is_known_again_at_other_joints() -> None:
