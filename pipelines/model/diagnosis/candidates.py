@@ -94,11 +94,13 @@ def whole_motion(data: Data) -> Motion:
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     """The columns of every shape, a few shapes at a time."""
-    width = family.shapes[0].columns(_first_samples(data), arm).shape[2]
+    with np.errstate(all="ignore"):
+        width = family.shapes[0].columns(_first_samples(data), arm).shape[2]
     size = max(1, _AT_ONCE // max(width, 1))
     for first in range(0, len(family.shapes), size):
         some = family.shapes[first:first + size]
-        tables = [[shape.columns(one.motion, arm) for shape in some] for one in data.logs]
+        with np.errstate(all="ignore"):
+            tables = [[_finite(shape.columns(one.motion, arm)) for shape in some] for one in data.logs]
         k = tables[0][0].shape[2]
         acting = np.flatnonzero(np.any([table.any(axis=(0, 2)) for per_log in tables for table in per_log], axis=0))
         laid = []
@@ -110,6 +112,11 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
         if not data.counts.all():
             found = np.where(data.counts[rows], found, 0.0)
         yield Laid(first, found, rows)
+
+
+def _finite(table: Array) -> Array:
+    """Columns that run away, of an arm that is badly known, are none."""
+    return table if np.isfinite(table).all() else np.zeros_like(table)
 
 
 def _first_samples(data: Data) -> Motion:

@@ -113,6 +113,7 @@ class Backlash(Effect):
 
 def _flank(link: float, motor: float) -> tuple[float, float]:
     """Stiffness [N m/rad] and critical damping [N m s/rad] of a closed flank between two inertias [kg m^2]."""
+    link, motor = max(link, 1e-12), max(motor, 1e-12)  # a badly determined arm may feel less than nothing
     k = link * (2.0 * pi * _FLANK_HZ) ** 2
     return k, 2.0 * sqrt(k * motor * link / (motor + link))
 
