@@ -28,8 +28,8 @@ __all__ = ["Design", "Effort", "design", "landscape"]
 _COARSE, _FINE, _FINISH = 8, 10, 20  # samples of a period for each harmonic
 _FEWEST = 200  # samples of a period: fewer do not show what friction does
 _FIFTH = 5  # of the harmonics in the coarse problem
-_FINISHING = (Round(600, 1e-4, 30), Round(2000, 2e-5, 50), Round(4000, 5e-6, 60))
-_FINISH_EVALUATIONS = 200
+_FINISHING = (Round(600, 1e-4, 60), Round(2000, 2e-5, 120), Round(6000, 4e-6, 150), Round(20000, 1e-6, 200))
+_FINISH_EVALUATIONS = (200, 600)  # at least, at most; between them a tenth of the search's
 _SHRINKINGS = 60
 
 
@@ -77,7 +77,7 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
     _refuse_impossible(fine, np.random.default_rng(seed))
     best = Best()
     budget = Budget(effort.seconds, effort.evaluations, lambda done: effort.tell(_progress(task, done, best)),
-                    reserve=2.0 * _FINISH_EVALUATIONS)
+                    reserve=2.0 * _FINISH_EVALUATIONS[1])
     stopped = 0
     try:
         search(coarse, fine, lambda x: fine.space.point(coarse.space.series(x)), budget, np.random.default_rng(seed), best)
@@ -87,7 +87,7 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
         stopped = signal.exit_code
     x = best.x if best.x is not None else fine.start(np.random.default_rng(seed))
     ended = Best()
-    polish(finish, x, _FINISHING, Budget(None, _FINISH_EVALUATIONS), ended)
+    polish(finish, x, _FINISHING, Budget(None, int(np.clip(budget.done // 10, *_FINISH_EVALUATIONS))), ended)
     x = x if ended.x is None else ended.x
     x, factor = _within(task, finish, x)
     trajectory = Trajectory(finish.space.series(x), task.periods)
