@@ -32,6 +32,7 @@ __all__ = ["Data", "LogData", "gather"]
 Indices = npt.NDArray[np.intp]
 
 _PAD = 4.0  # periods of the cut-off a stretch is continued by
+_AMPLE = 24.0  # samples a period of the cut-off, at which columns are worked out at least
 _END = 1.0  # periods of the cut-off left out at either end of a stretch
 
 
@@ -74,14 +75,15 @@ class LogData:
 
     log: ExperimentLog
     equations: LogEquations
-    motion: Motion  # at the kept samples of all runs
-    tau: Array  # [N m] (samples, joints) of the same
+    motion: Motion  # at the kept samples of all runs, of a high rate at every so-manieth
+    y: Array  # [N m] (joints, rows) measured torque
+    weighed: npt.NDArray[np.bool_]  # (joints, rows) which rows count: those of a joint that is not too slow
     pieces: tuple[slice, ...]  # of each run among those samples
     runs: tuple[_Run, ...]
 
     @property
     def n_joints(self) -> int:
-        return int(self.tau.shape[1])
+        return int(self.motion.q.shape[1])
 
     @cached_property
     def rows(self) -> int:
@@ -92,18 +94,6 @@ class LogData:
     def t(self) -> Array:
         """(rows,) [s] of each joint's rows."""
         return np.asarray(self.at_rows(self.motion.t), dtype=np.float64)
-
-    @cached_property
-    def y(self) -> Array:
-        """(joints, rows) measured torque."""
-        return np.concatenate([run.lay_command(self.tau[piece].T) for piece, run in self._parts], axis=1)
-
-    @cached_property
-    def weighed(self) -> npt.NDArray[np.bool_]:
-        """(joints, rows) which rows count: those of a joint that is not too slow."""
-        slow = self.equations.rows.slow
-        kept = np.concatenate([slow[run.part] for run in self.runs])
-        return np.asarray(~self.at_rows(kept).astype(bool).T)
 
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """What `x` (samples, …) is at the moments of the rows, unfiltered."""
@@ -221,16 +211,29 @@ def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Ro
 
 def _of_log(log: ExperimentLog, equations: LogEquations) -> LogData:
     stretches = [equations.stretch(run) for run in equations.runs]
-    tau = np.concatenate([tau for _, tau in stretches])
-    t, q, dq, ddq = (np.concatenate([getattr(m, name) for m, _ in stretches]) for name in ("t", "q", "dq", "ddq"))
-    motion = Motion(t, q, dq, ddq, tau)
-    ends = np.cumsum([0, *(len(tau) for _, tau in stretches)]).tolist()
+    fine = [_run(equations, run) for run in equations.runs]
+    y = np.concatenate([run.lay_command(tau.T) for run, (_, tau) in zip(fine, stretches, strict=True)], axis=1)
+    skip = _skipped(equations)
+    some = [(Motion(m.t[::skip], m.q[::skip], m.dq[::skip], m.ddq[::skip]), tau[::skip]) for m, tau in stretches]
+    tau = np.concatenate([tau for _, tau in some])
+    t, q, dq, ddq = (np.concatenate([getattr(m, name) for m, _ in some]) for name in ("t", "q", "dq", "ddq"))
+    ends = np.cumsum([0, *(len(tau) for _, tau in some)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
-    return LogData(log, equations, motion, tau, pieces,
-                   tuple(_run(equations, run) for run in equations.runs))
+    runs = tuple(_run(equations, run, skip) for run in equations.runs)
+    slow = np.concatenate([equations.rows.slow[run][one.chosen * one.every] for run, one in zip(equations.runs, fine, strict=True)])
+    return LogData(log, equations, Motion(t, q, dq, ddq, tau), y, ~slow.T, pieces, runs)
 
 
-def _run(equations: LogEquations, part: slice) -> _Run:
+def _skipped(equations: LogEquations) -> int:
+    """Every how many samples columns are worked out: far more often than the low-pass leaves anything to be seen."""
+    how = equations.conditioning
+    if how.cutoff_hz is None:
+        return 1
+    most = int(1.0 / (_AMPLE * how.cutoff_hz * equations.found.good.log.sample_time))
+    return max((k for k in range(1, max(most, 1) + 1) if how.decimation % k == 0), default=1)
+
+
+def _run(equations: LogEquations, part: slice, skip: int = 1) -> _Run:
     how, held = equations.conditioning, equations.held
     rate, every = 1.0 / equations.found.good.log.sample_time, how.decimation
     n = part.stop - part.start
@@ -243,7 +246,8 @@ def _run(equations: LogEquations, part: slice) -> _Run:
     bins = np.arange(size // 2 // every + 1)
     turn = 2.0 * np.pi * bins / size
     response = np.ones(len(bins)) if cutoff is None else passed_both_ways(bins * rate / size, cutoff, rate)
-    return _Run(part, held, response, (114.0 + 68.0 * np.cos(turn) - 2.0 * np.cos(2.0 * turn)) / 180.0, size, pad, every, chosen)
+    average = (114.0 + 68.0 * np.cos(turn) - 2.0 * np.cos(2.0 * turn)) / 180.0
+    return _Run(part, held, response, average, size // skip, pad // skip, every // skip, chosen)
 
 
 def quick_size(n: int) -> int:
