@@ -22,10 +22,11 @@ from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.compliance import Compliance, compliance
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import absorbed_finding, extended_arm, findings, rejected, sure
+from pipelines.model.diagnosis.findings import absorbed_finding, extended_arm, findings, rejected
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.pruned import settled
 from pipelines.model.diagnosis.result import Diagnosis, Finding, ResidualRms, Threshold, Verdict
 from pipelines.model.diagnosis.search import Case, Explored, Found, clean, held_out_left, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
@@ -66,7 +67,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     say("looking for causes")
     case = replace(case, thresholds=floored.thresholds)
     found = search(case, chosen.most, rough)
-    ruling = _believed(found, prepared, rule(found, floored.rms), chosen)
+    found, ruling = settled(found, rule(found, floored.rms, floored.twin is not None), case, prepared)
     return _responding(_told(prepared, case, found, ruling, floored, chosen), stiff)
 
 
@@ -124,7 +125,7 @@ def _changed(prepared: Prepared, since: Since, chosen: DiagnosisSettings) -> Dia
     """What is different since the reference logs."""
     now = replace(prepared, data=since.case.data, judge=since.case.judge)
     found = search(since.case, chosen.most)
-    ruling = _believed(found, now, rule(found, since.floor), chosen)
+    found, ruling = settled(found, rule(found, since.floor), since.case, now)
     floored = _Floored(since.floor, "reference logs", None, None, np.full(prepared.data.n_joints, np.nan))
     told = _told(now, since.case, found, ruling, floored, chosen)
     told = replace(told, question="what has changed", standing=since.standing)
@@ -141,15 +142,6 @@ def _with_absorbed(told: Diagnosis, moved: Absorbed) -> Diagnosis:
     if verdict == "unknown":
         return told
     return replace(told, verdict=verdict, findings=findings, summary=_sentence(Ruling("cause", (), ""), findings))
-
-
-def _believed(found: Found, prepared: Prepared, ruling: Ruling, chosen: DiagnosisSettings) -> Ruling:
-    """Only what repeats on held-out time, in the same size in every log."""
-    doubts = [sure(found.steps[k], prepared, chosen.blocks) for k in ruling.named]
-    kept = tuple(k for k, doubt in zip(ruling.named, doubts, strict=True) if not doubt)
-    if ruling.verdict == "cause" and not kept:
-        return Ruling("unknown", (), next(doubt for doubt in doubts if doubt))
-    return replace(ruling, named=kept)
 
 
 def _told(prepared: Prepared, case: Case, found: Found, ruling: Ruling, floored: _Floored, chosen: DiagnosisSettings) -> Diagnosis:

@@ -24,17 +24,18 @@ _TELLS = 9.0  # times its variance, that the power of the predicted part must ha
 
 
 def findings(found: Found, ruling: Ruling, prepared: Prepared, floor: Array, blocks: int, draw: bool) -> tuple[Finding, ...]:
-    """Each named cause, the one that explains most first."""
+    """Each named cause, the one that explains most first; the final model holds them, in the order of their steps."""
     steps = [found.steps[k] for k in ruling.named]
-    arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in steps if step.best is not None)]
+    last = max(ruling.named, default=-1) + 1
+    arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in found.steps[:last] if step.best is not None)]
     motions = prepared.judging or prepared.motions
     simulated = simulation_errors(arms, motions)
     covariance = found.final.covariance()
     out = []
-    for place, step in enumerate(steps):
+    for place, (k, step) in enumerate(zip(ruling.named, steps, strict=True)):
         if step.best is None:
             continue
-        before, after = simulated[place], simulated[place + 1]
+        before, after = simulated[k], simulated[k + 1]
         known = after.how != "none"
         gain = Gain(torque_gain(step.before, step.best.done, prepared.judge, blocks),
                     BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how,
@@ -135,6 +136,6 @@ def extended_arm(found: Found, ruling: Ruling) -> Arm:
     """The arm with what is named, refitted, every effect with its standard deviations."""
     covariance = found.final.covariance()
     final = found.final.model
-    kept = [k for k, one in enumerate(final.effects) if k in ruling.named and one.log is None]
+    kept = [k for k, one in enumerate(final.effects) if k < len(ruling.named) and one.log is None]
     return final.nominal.extended(*(acting(found.final, k, covariance) for k in kept))
 

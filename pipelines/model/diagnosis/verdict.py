@@ -43,8 +43,13 @@ def explained(step: Step, found: Found, floor: Array) -> float:
     return float(np.clip((excess(step.before.rms, floor) - excess(step.best.done.rms, floor)) / max(whole, 1e-12), 0.0, 1.0))
 
 
-def rule(found: Found, floor: Array) -> Ruling:
-    """Which causes are named."""
+def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
+    """Which causes are named.
+
+    Args:
+        known: whether the floor is that of an arm in order, twin or reference; else it is only the noise, which the models of
+            recorded arms never come down to, and what pays on held-out time is named.
+    """
     accepted = [step for step in found.steps if step.best is not None]
     other = next((step.other for step in found.steps if step.other is not None), None)
     joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
@@ -57,6 +62,8 @@ def rule(found: Found, floor: Array) -> Ruling:
         if len(joints):
             return Ruling("unknown", (), f"the residual of {high} stands above the floor, and no cause explains it")
         return Ruling("nothing-wrong", (), "")
+    if not known:
+        return Ruling("cause", tuple(range(len(accepted))), "")
     whole = excess(found.nominal.rms, floor)
     total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
     if whole > 0.1 and total < _HALF:
