@@ -113,8 +113,8 @@ def grouping(numbers: Iterable[int], folder: Path) -> None:
     print(f"{right} of {total} right, {undecided} undecided, {wrong} wrong")
 
 
-def disturbance(folder: Path, torque: float = 12.0, duration: float = 60.0) -> None:
-    """White torque noise of `torque` [N m] rms at joint 1, twice the excitation's."""
+def disturbance(folder: Path, torque: float = 6.0, duration: float = 60.0) -> None:
+    """White torque noise of `torque` [N m] rms at joint 1, as strong as the excitation."""
     case = accuracy_case(0, duration)
     noisy = replace(case.machine, amplifier_noise=(torque, *case.machine.amplifier_noise[1:]))
     case = replace(case, name=f"disturbed-{torque:g}-{duration:g}", machine=noisy, faults=(), strength=1.0,
