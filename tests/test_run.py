@@ -16,10 +16,14 @@ from pipelines.log.files import open_log, write_log
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 
 
+WITHOUT = run.Settings(skip=("diagnose", "extend"))  # they are dear, and have tests of their own
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Outcome[run.Result]:
     """`rrrid run` on the sample logs; every joint was driven alone in one of them."""
-    return run_stage(run.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path_factory.mktemp("run") / "out"), run.Settings())
+    request = Request((samples / "rrr-closed-form",), out=tmp_path_factory.mktemp("run") / "out", no_report=True)
+    return run_stage(run.STAGE, request, WITHOUT)
 
 
 def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result]) -> None:
@@ -50,7 +54,7 @@ def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path:
     for number in (1, 2):
         (tmp_path / "logs").mkdir(exist_ok=True)
         shutil.copy(samples / f"rrr-closed-form/friction-{number}.h5", tmp_path / "logs")
-    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", check=True, no_report=True), run.Settings())
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", check=True, no_report=True), WITHOUT)
     last = next(step for step in outcome.result.stages if step.name == "estimate-bps")
     assert (last.name, last.exit, last.result, outcome.exit_code) == ("estimate-bps", 5, None, 0)
     assert "no excitation or free log" in last.report.verdict
@@ -62,12 +66,12 @@ def test_a_bad_log_costs_itself_alone(samples: Path, tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     for name in ("excitation-1", "excitation-2"):
         shutil.copy(samples / f"rrr-closed-form/{name}.h5", tmp_path / "logs")
-    good = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "good", no_report=True), run.Settings())
+    good = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "good", no_report=True), WITHOUT)
     (tmp_path / "logs/cut.h5").write_bytes((tmp_path / "logs/excitation-1.h5").read_bytes()[:9000])
     log = open_log(tmp_path / "logs/excitation-1.h5").log
     still = {**log.signals, "t": Signal(np.zeros(log.n_samples), "s", "time")}
     write_log(tmp_path / "logs/still.h5", replace(log, name="still", signals=still))
-    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), run.Settings())
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), WITHOUT)
     assert outcome.exit_code == 3
     assert {c.code for c in outcome.checks if c.level == "reject"} == {"RRID-F02", "RRID-T02"}
     assert outcome.json["stages"][3]["result"]["parameters"] == good.json["stages"][3]["result"]["parameters"]
@@ -79,7 +83,7 @@ def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> Non
     shutil.copy(samples / "rrr-closed-form/excitation-1.h5", tmp_path / "logs/a")
     log = open_log(tmp_path / "logs/a/excitation-1.h5").log
     write_log(tmp_path / "logs/b.h5", replace(log, robot_name="other", robot_text=log.robot_text.replace("rrr-tue", "other")))
-    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), run.Settings())
+    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), WITHOUT)
     assert outcome.json["stages"] == []
     assert [group["name"] for group in outcome.json["runs"]] == ["rrr-tue", "other"]
     assert {p.name for p in (tmp_path / "out").iterdir() if p.is_dir()} == {"rrr-tue", "other"}

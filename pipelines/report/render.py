@@ -156,7 +156,7 @@ def _draw(figure: Figure, salt: str) -> tuple[str, bytes]:
         _make_printable(drawing)
         svg, png = io.BytesIO(), io.BytesIO()
         drawing.savefig(svg, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-        drawing.set_layout_engine("none")  # already laid out: the PNG shall be the same picture
+        drawing.set_layout_engine(None)  # already laid out: the PNG shall be the same picture, with no trial drawing before it
         drawing.savefig(png, format="png", dpi=150, metadata={"Software": None})
     return _without_ballast(svg.getvalue().decode()), png.getvalue()
 
