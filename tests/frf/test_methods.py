@@ -92,7 +92,7 @@ def test_the_delay_of_a_controller_is_known(law: str) -> None:
 @pytest.mark.parametrize("late", [0, 1, 5])
 def test_a_delay_is_a_delay(late: int) -> None:
     """Whole samples, also so many that the phase turns round in the band; none is rigid."""
-    found = frf_findings([Loop(rigid(1.0), late=late).log()])
+    found = frf_findings([Loop(rigid(1.0), late=late, disturbance=0.02).log()])
     (one,) = found.classification
     assert one.kind == ("delay" if late else "rigid")
     assert found.seen[0].modes.delay.value == pytest.approx(late * 1e-3, abs=2e-5)

@@ -22,6 +22,7 @@ _DELAY = 0.15  # of the sample time: the smallest delay worth a word
 _SURE = 5.0  # standard deviations of it
 _NEAR = 0.03  # two joints show the same base within such a share of its frequency
 _UNFITTED = 10.0  # misfit beyond which no mode of the fit is believed
+_LEFT = 0.02  # of the response, what it may leave all the same: encoder steps that repeat are in no variance
 _TRACE = 1.3  # rise of a pair that may be only a trace of what another joint, or the base, does
 
 
@@ -52,7 +53,7 @@ class Open:
 
 def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True) -> tuple[list[Finding], list[Open]]:
     """What the responses of one joint (1-based), one a posture, say together."""
-    if (worst := max(m.misfit for m in modes)) > _UNFITTED:
+    if (worst := max((m.misfit for m in modes if m.left > _LEFT), default=0.0)) > _UNFITTED:
         return [], [Open(joint, None, ("joint_elasticity", "base_resonance"),
                          f"No rational function explains the response: what it leaves has {worst:.3g} times the variance of noise.",
                          "weaker excitation or a faster turn, should friction have turned its sign; else longer")]

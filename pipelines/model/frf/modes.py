@@ -33,6 +33,7 @@ _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
+_NARROW = 0.5  # of the resolution, the least width 2 ζ f of a mode
 _STUCK = 3.0  # misfit that a search which found the modes hardly leaves
 _SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
 _LONGEST = 0.05  # [s] no delay is longer
@@ -67,6 +68,7 @@ class Modes:
     inertia: Known | None  # [kg m^2] that the torque moves below the modes
     friction_below: float  # [Hz] below which friction and load change the magnitude by more than a tenth; 0: nowhere
     misfit: float  # 1 where the rational function explains all but the noise
+    left: float  # rms of what it leaves, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
 
@@ -92,8 +94,8 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     relative = relative_acceleration(measured)
     part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
     fit = _fitted(part)
-    modes = tuple(_with_friction(m) for m in fit.modes() if _is_mode(m))
-    traces = tuple(_with_friction(m) for m in fit.modes() if not m.distinct and _is_trace(m))
+    modes = tuple(_with_friction(m) for m in fit.modes() if _is_mode(m, part.resolution))
+    traces = tuple(_with_friction(m) for m in fit.modes() if not m.distinct and _is_trace(m, part.resolution))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
@@ -102,7 +104,7 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     smooth = np.arange(_STRAIGHT[0], min(_STRAIGHT[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
-                 _inertia(measured, level), _friction_below(relative, level), fit.misfit,
+                 _inertia(measured, level), _friction_below(relative, level), fit.misfit, _left(fit, part),
                  (float(part.frequency[0]), float(part.frequency[-1])), fit)
 
 
@@ -114,6 +116,11 @@ def _fitted(part: FrequencyResponse) -> Rational:
 
     first = fit(True)
     return first if first.misfit < _STUCK else min(first, fit(False), key=lambda one: one.description)
+
+
+def _left(fit: Rational, part: FrequencyResponse) -> float:
+    inside = part.within(*_STRAIGHT)
+    return float(np.sqrt(np.mean(np.abs(inside.response / fit.response(inside.frequency) - 1.0) ** 2)))
 
 
 def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:
@@ -165,12 +172,14 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
     return np.asarray(found), np.sqrt(np.diag(inverse) * correlated * max(misfit, 1.0))
 
 
-def _is_mode(mode: Mode) -> bool:
-    return mode.distinct and abs(mode.damping.value) < _STIFFEST and mode.frequency.std < _SURE * mode.frequency.value
+def _is_mode(mode: Mode, resolution: float) -> bool:
+    """One that is known, and not narrower than what the spectrum resolves."""
+    f, damping = mode.frequency, abs(mode.damping.value)
+    return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value and 2.0 * damping * f.value > _NARROW * resolution
 
 
-def _is_trace(mode: Mode) -> bool:
-    return _is_mode(replace(mode, distinct=True)) and mode.damping.value > _SEEN * mode.damping.std
+def _is_trace(mode: Mode, resolution: float) -> bool:
+    return _is_mode(replace(mode, distinct=True), resolution) and mode.damping.value > _SEEN * mode.damping.std
 
 
 def _with_friction(mode: Mode) -> Mode:

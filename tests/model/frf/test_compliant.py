@@ -48,7 +48,7 @@ def modes_of(pairs: list[tuple[float, float]], inertia: float, delay: float = 0.
     found = tuple(Pair(mode("antiresonance", a), mode("resonance", r)) for a, r in pairs)
     every = tuple(m for p in found for m in (p.antiresonance, p.resonance))
     return Modes(every, (), found, (), Known(1.0, 1e-3), Known(1.0, 1e-3), Known(delay, 2e-6), flat, Known(inertia, 1e-3), 0.0, 1.0,
-                 (4.0, 250.0), _NONE)
+                 0.001, (4.0, 250.0), _NONE)
 
 
 def test_frequencies_are_those_of_the_masses() -> None:
@@ -127,7 +127,7 @@ def test_delay_and_rigid() -> None:
 
 def test_modes_that_do_not_explain_are_not_believed() -> None:
     """A fit that leaves far more than noise names nothing, however well its modes would suit a base."""
-    poor = [replace(modes_of([base_under_arm(28.0, 8.0, j)], j), misfit=30.0) for j in (1.0, 1.2)]
+    poor = [replace(modes_of([base_under_arm(28.0, 8.0, j)], j), misfit=30.0, left=0.1) for j in (1.0, 1.2)]
     found, left = group_joint(1, poor, 1e-3)
     assert found == []
     assert "No rational function explains" in left[0].evidence
