@@ -158,9 +158,10 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     derived = tuple(_derived(log, motion, parts, settings) for (log, motion), parts in zip(found.pairs, found.parts, strict=True))
     return Result(
         robot=arm.robot.name, joints=tuple(joint.name for joint in arm.robot.joints), model=said, torque=found.torque,
-        gates=found.gates, logs=found.firsts, cases=found.cases, cases_left_out=found.cases_left_out, drawn=_drawn_from(arm),
-        draws=settings.draws, simulation=error, simulation_left_out=found.simulation_left_out, imitation=done, design=None,
-        doctor=found.checks, derived=derived, online_seconds=found.seconds)
+        gates=found.gates, logs=found.firsts, cases=found.cases, cases_left_out=found.cases_left_out,
+        cases_apart=found.cases_apart, drawn=_drawn_from(arm), draws=settings.draws, simulation=error,
+        simulation_left_out=found.simulation_left_out, imitation=done, design=None, doctor=found.checks, derived=derived,
+        online_seconds=found.seconds)
 
 
 def _model(inputs: Inputs, logs: list[ExperimentLog], judges: list[ExperimentLog]) -> tuple[Arm, str]:
@@ -176,8 +177,9 @@ def _model(inputs: Inputs, logs: list[ExperimentLog], judges: list[ExperimentLog
 
 
 def _drawn_from(arm: Arm) -> str:
-    if arm.uncertainty is not None:
-        return "the covariance of the fit"
+    if (known := arm.uncertainty) is not None:
+        held = arm.friction and {p.name for p in arm.base} >= set(known.names)
+        return f"the covariance of the {'base parameters, friction held as it was fitted before' if held else 'fit'}"
     if any(p.std for p in arm.base):
         return "the standard deviations of the model file's base parameters, as if independent"
     return ""
@@ -215,9 +217,9 @@ def _designed(inputs: Inputs, settings: Settings) -> Result:
     table = controller_table(given.recipe, robot, found.at, found.designed.duration, settings.sample_time)
     return Result(
         robot=robot.name, joints=tuple(joint.name for joint in robot.joints), model="", torque=None,
-        gates=Gates(settings.torque_gate, None, None), logs=(), cases=(), cases_left_out="", drawn="", draws=settings.draws,
-        simulation=None, simulation_left_out="", imitation=None, design=found.designed, derived=(("trajectory", found.log),),
-        table=table)
+        gates=Gates(settings.torque_gate, None, None), logs=(), cases=(), cases_left_out="", cases_apart=(), drawn="",
+        draws=settings.draws, simulation=None, simulation_left_out="", imitation=None, design=found.designed,
+        derived=(("trajectory", found.log),), table=table)
 
 
 def _torque_of(given: Material, robot: RobotDescription, inputs: Inputs) -> Arm | None:

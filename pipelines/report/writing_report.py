@@ -56,7 +56,7 @@ def _verdict(result: Result) -> str:
         said.append(f"with the complete model ahead of the feedback the tip {verb} {_mm(by[6])} mm in x, y, z instead of "
                     f"{_mm(by[1])} mm under feedback alone ({origin})")
     elif result.cases_left_out:
-        said.append(f"the control cases are left out: {result.cases_left_out}")
+        said.append(f"{'some of ' if result.cases else ''}the control cases are left out: {result.cases_left_out}")
     text = "; ".join(said)
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -153,6 +153,9 @@ def _cases_section(result: Result) -> Section:
     if result.cases_left_out:
         some = "Some of the six control cases are" if result.cases else "The six control cases are"
         text.append(f"{some} left out: {result.cases_left_out}.")
+    if result.cases_apart:
+        text.append(f"Not compared: {', '.join(result.cases_apart)}. The controller is none of the six, its gains are others, or "
+                    "it followed another reference.")
     if any(one.origin == "simulated" for one in result.cases):
         base = next(one.logs[0] for one in result.cases if one.origin == "simulated")
         text.append(f"Simulated: on the controller of {base}. The plant is the model plus what it left of the torque of that log, "

@@ -111,6 +111,18 @@ def test_an_unknown_controller_leaves_the_table_out(writing: ExperimentLog, tmp_
     assert found.simulation.simulation == "windowed"
 
 
+def test_what_the_table_lacks_is_named(writing: ExperimentLog, tmp_path: Path) -> None:
+    """A log that follows another reference is not compared; without ddq_ref no case with inertia ahead is simulated."""
+    signals = {name: signal for name, signal in writing.signals.items() if name != "ddq_ref"}
+    moved = with_signal(replace(writing, name="moved"), q_ref=writing["q_ref"] + 1e-3)
+    outcome = validated(tmp_path, {"a": replace(writing, signals=signals), "b": moved}, Settings("rrr", torque_gate=0.5, draws=1))
+    assert [case.case for case in outcome.result.cases] == [1, 2, 4, 5]
+    assert outcome.result.gates.cases is None
+    words = " ".join(next(part for part in outcome.report.sections if "Control cases" in part.title).text)
+    assert "ddq_ref" in words
+    assert "Not compared: moved" in words
+
+
 def test_any_held_out_log_is_validated(writing: ExperimentLog, tmp_path: Path) -> None:
     """Random moves of role validate: the first validation alone; of role identify: nothing matches."""
     other = replace(writing, experiment="free")

@@ -25,6 +25,7 @@ CASES: tuple[tuple[str, ...], ...] = (
     ("friction", "inertia", "coriolis", "gravity"))
 _POINTS = 2000  # of a drawn path
 _SAME = 1e-6  # [rad] references of one task differ by less: the rounding of a recorder
+_SHARED = 0.9  # of the longer log: recorders start and stop by hand, while the arm rests
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,22 @@ def track(log: ExperimentLog, q: Array) -> TipTrack:
 
 def one_task(logs: Sequence[ExperimentLog], like: ExperimentLog) -> list[ExperimentLog]:
     """Those of `logs` that follow the reference of `like` with its gains: only they compare."""
-    return [log for log in logs if log.n_samples == like.n_samples and log.robot_text == like.robot_text
-            and np.abs(log["q_ref"] - like["q_ref"]).max() <= _SAME and _same_gains(log, like)]
+    return [log for log in logs if log.robot_text == like.robot_text and _same_reference(log, like) and _same_gains(log, like)]
+
+
+def _same_reference(one: ExperimentLog, two: ExperimentLog) -> bool:
+    """Whether both follow one reference, counted from where it sets out."""
+    if not np.isclose(one.sample_time, two.sample_time, rtol=1e-9, atol=0.0):
+        return False
+    (a, first), (b, second) = ((log["q_ref"], _sets_out(log["q_ref"])) for log in (one, two))
+    a, b = a[max(0, first - second):], b[max(0, second - first):]
+    shared = min(len(a), len(b))
+    return shared >= _SHARED * max(one.n_samples, two.n_samples) and bool(np.abs(a[:shared] - b[:shared]).max() <= _SAME)
+
+
+def _sets_out(q_ref: Array) -> int:
+    """The first sample at which a reference (samples, joints) is not where it was."""
+    return int(np.argmax((np.abs(q_ref - q_ref[0]) > _SAME).any(axis=1)))
 
 
 def _same_gains(one: ExperimentLog, two: ExperimentLog) -> bool:

@@ -61,6 +61,7 @@ class Result:
     logs: tuple[FirstValidation, ...]
     cases: tuple[Case, ...]
     cases_left_out: str  # why some or all of them are missing, in words
+    cases_apart: tuple[str, ...]  # writing logs that do not compare: another controller, other gains or another reference
     drawn: str  # what the controllers' models of simulated cases were drawn from, in words; empty: nothing
     draws: int
     simulation: SimulationError | None

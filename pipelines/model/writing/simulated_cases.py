@@ -23,7 +23,7 @@ from pipelines.model.simulation.plant import Plant
 from pipelines.model.simulation.replicas import Simulated, run
 from pipelines.model.writing.cases import CASES, Case, TipStd, tip_std, track
 
-__all__ = ["Draws", "simulated_cases", "why_not"]
+__all__ = ["Draws", "possible", "simulated_cases", "why_not"]
 
 _FOLLOWED = ("pd", "pd+feedforward")
 
@@ -45,6 +45,13 @@ def why_not(log: ExperimentLog) -> str:
     except InputRejected as lacking:
         return lacking.message
     return ""
+
+
+def possible(log: ExperimentLog, cases: Sequence[int]) -> tuple[list[int], str]:
+    """Those of `cases` whose feed-forward this log's references tell, and why others are missing."""
+    some = [case for case in cases if "ddq_ref" in log or "inertia" not in CASES[case - 1]]
+    lacking = ", ".join(str(case) for case in cases if case not in some)
+    return some, f"cases {lacking} would have inertia ahead, and {log.name} has no signal ddq_ref; log it" if lacking else ""
 
 
 def simulated_cases(log: ExperimentLog, arm: Arm, left: Array, cases: Sequence[int], draws: Draws) -> dict[int, Case]:

@@ -20,7 +20,7 @@ from pipelines.model.simulation.imitate import How, Imitation, imitate
 from pipelines.model.writing.cases import Case, case_of, measured_cases, one_task
 from pipelines.model.writing.first_validation import FirstValidation, first_validation, online_validation, residual
 from pipelines.model.writing.result import Gates, TorqueError, pooled
-from pipelines.model.writing.simulated_cases import Draws, simulated_cases, why_not
+from pipelines.model.writing.simulated_cases import Draws, possible, simulated_cases, why_not
 
 __all__ = ["Effort", "Validated", "validate"]
 
@@ -51,6 +51,7 @@ class Validated:
     torque: TorqueError | None
     cases: tuple[Case, ...]
     cases_left_out: str
+    cases_apart: tuple[str, ...]  # writing logs that do not compare with those in the table
     imitation: Imitation | None
     simulation_left_out: str
     gates: Gates
@@ -67,12 +68,12 @@ def validate(judges: Sequence[ExperimentLog], arm: Arm, effort: Effort) -> Valid
     parts = [torques(arm, log, motion) for log, motion in pairs]
     firsts, seconds = _first(pairs, parts, arm)
     torque = pooled(firsts)
-    cases, left_out = _cases(pairs, parts, arm, effort)
+    cases, left_out, apart = _cases(pairs, parts, arm, effort)
     imitation, not_simulated = _simulated(pairs, arm, effort)
     gates = Gates(effort.torque_gate, None if torque is None else bool((torque.relative_error < effort.torque_gate).all()),
                   _better(cases))
-    return Validated(pairs, parts, firsts, seconds, torque, cases, left_out, imitation, not_simulated, gates,
-                     (*doctor, *_said(torque, gates, arm.robot.name)))
+    return Validated(pairs, parts, firsts, seconds, torque, cases, left_out, apart, imitation, not_simulated,
+                     gates, (*doctor, *_said(torque, gates, arm.robot.name)))
 
 
 def _examined(logs: list[ExperimentLog]) -> tuple[Pairs, tuple[Check, ...]]:
@@ -98,26 +99,29 @@ def _first(pairs: Pairs, parts: list[ArmTorque], arm: Arm) -> tuple[tuple[FirstV
     return tuple(found), tuple(seconds)
 
 
-def _cases(pairs: Pairs, parts: list[ArmTorque], arm: Arm, effort: Effort) -> tuple[tuple[Case, ...], str]:
-    """Table IV: measured where logs show a case, else simulated; and why some are missing."""
+def _cases(pairs: Pairs, parts: list[ArmTorque], arm: Arm, effort: Effort) -> tuple[tuple[Case, ...], str, tuple[str, ...]]:
+    """Table IV: measured where logs show a case, else simulated; why some are missing; which writing logs do not compare."""
     writing = [k for k, (log, _) in enumerate(pairs) if log.experiment == "writing" and "q_ref" in log]
     if not writing:
-        return (), "no log of experiment writing with a reference is among the held-out ones"
+        return (), "no log of experiment writing with a reference is among the held-out ones", ()
     first = min(writing, key=lambda k: case_of(pairs[k][0]) or 7)
     base = pairs[first][0]
     task = one_task([pairs[k][0] for k in writing], base)
     cases = measured_cases([pairs[k] for k in writing if pairs[k][0] in task])
+    shown = {name for case in cases.values() for name in case.logs}
+    apart = tuple(pairs[k][0].name for k in writing if pairs[k][0].name not in shown)
     missing = [case for case in _CASES if case not in cases]
     reason = ""
     if missing and not effort.simulate:
         reason = "it was not asked to simulate those that nobody recorded"
     elif missing and not (reason := why_not(recording(base))):
+        some, reason = possible(base, missing)
         try:
-            cases |= simulated_cases(recording(base), arm, residual(*pairs[first], parts[first]), missing,
-                                     Draws(effort.draws, effort.seed))
+            cases |= simulated_cases(recording(base), arm, residual(*pairs[first], parts[first]), some,
+                                     Draws(effort.draws, effort.seed)) if some else {}
         except RrridError as problem:  # a model that cannot be simulated is worth saying, and no reason to lose the rest
             reason = problem.message
-    return tuple(cases[case] for case in sorted(cases)), reason
+    return tuple(cases[case] for case in sorted(cases)), reason, apart
 
 
 def _better(cases: tuple[Case, ...]) -> bool | None:

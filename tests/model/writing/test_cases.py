@@ -16,7 +16,7 @@ from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.writing.cases import CASES, case_of, measured_cases, one_task, tip_std
 from pipelines.model.writing.first_validation import residual
-from pipelines.model.writing.simulated_cases import Draws, simulated_cases, why_not
+from pipelines.model.writing.simulated_cases import Draws, possible, simulated_cases, why_not
 from tests.healthy import rows, with_signal
 from tests.model.rigid.serial_arms import ARMS
 from tests.model.writing.judge import TipJudge
@@ -57,6 +57,25 @@ def test_only_one_task_is_compared(logs: list[ExperimentLog]) -> None:
     stiffer = replace(logs[2], controller=replace(controller, kp=1.1 * controller.kp))
     moved = with_signal(logs[3], q_ref=logs[3]["q_ref"] + 1e-3)
     assert [log.name for log in one_task([*logs[:2], stiffer, moved, logs[5]], logs[0])] == ["writing-1", "writing-2", "writing-6"]
+
+
+@pytest.mark.parametrize("part", [slice(0, -15), slice(4, None), slice(7, -30)])
+def test_a_recorder_started_by_hand_is_the_same_task(logs: list[ExperimentLog], part: slice) -> None:
+    """Some samples of rest more or less, before or after: one task; the other half of it is not, nor is another rate."""
+    other = rows(logs[5], part)
+    assert [log.name for log in one_task([logs[0], other], logs[0])] == ["writing-1", "writing-6"]
+    assert [log.name for log in one_task([other, logs[0]], other)] == ["writing-6", "writing-1"]
+    for apart in (rows(logs[5], slice(0, SAMPLES // 2)), replace(logs[5], sample_time=2e-3)):
+        assert [log.name for log in one_task([logs[0], apart], logs[0])] == ["writing-1"]
+
+
+def test_inertia_needs_the_acceleration_of_the_reference(logs: list[ExperimentLog]) -> None:
+    """Many a PD controller logs none: cases 3 and 6 then are not simulated, for their inertia would be nothing."""
+    bare = replace(logs[0], signals={name: signal for name, signal in logs[0].signals.items() if name != "ddq_ref"})
+    assert possible(logs[0], [2, 3, 6]) == ([2, 3, 6], "")
+    some, reason = possible(bare, [2, 3, 4, 5, 6])
+    assert some == [2, 4, 5]
+    assert "ddq_ref" in reason
 
 
 def test_several_logs_of_a_case_are_pooled(logs: list[ExperimentLog]) -> None:
