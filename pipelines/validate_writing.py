@@ -172,17 +172,23 @@ def _model(inputs: Inputs, logs: list[ExperimentLog], judges: list[ExperimentLog
     if isinstance(given, Material) and given.model is not None and (given.named or any(p.value for p in
                                                                                        given.model.base_parameters)):
         return given_model(given.model, judges, given.said), given.said
-    return (model_fitted_here(logs, judges, inputs.label),
-            "fitted here to the logs of role identify: friction first, then the base parameters")
+    arm = model_fitted_here(logs, judges, inputs.label)
+    order = "friction first, then the base parameters" if _friction_held(arm) else "base parameters and friction together"
+    return arm, f"fitted here to the logs of role identify: {order}"
 
 
 def _drawn_from(arm: Arm) -> str:
-    if (known := arm.uncertainty) is not None:
-        held = arm.friction and {p.name for p in arm.base} >= set(known.names)
-        return f"the covariance of the {'base parameters, friction held as it was fitted before' if held else 'fit'}"
+    if arm.uncertainty is not None:
+        return f"the covariance of the {'base parameters, friction held as it was fitted before' if _friction_held(arm) else 'fit'}"
     if any(p.std for p in arm.base):
         return "the standard deviations of the model file's base parameters, as if independent"
     return ""
+
+
+def _friction_held(arm: Arm) -> bool:
+    """Whether the fit took friction as known: its covariance then has no number of it."""
+    numbers = {f"{law.place}:{p.name}" for law in arm.friction for p in law.parameters}
+    return bool(numbers) and arm.uncertainty is not None and numbers.isdisjoint(arm.uncertainty.names)
 
 
 def _refuse_strange(settings: Settings) -> None:

@@ -10,17 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines import validate_writing
 from pipelines.errors import InputRejected, NothingMatched, RrridError, UsageError
 from pipelines.log.canonical import digest_of
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log, write_log
 from pipelines.log.model_file import Source, model_text, read_model, write_model
 from pipelines.log.robot import format_robot
+from pipelines.model.parameter import Uncertainty
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
 from pipelines.model.writing.recognise import read_letters
 from pipelines.stage import Outcome, Request, run_stage
 from pipelines.validate_writing import STAGE, Result, Settings
+from sample_logs.make_model import synthetic_arm
 from tests.cli.commands import rrrid
 from tests.healthy import rows, with_signal
 from tests.model.rigid.serial_arms import ARMS
@@ -121,6 +124,18 @@ def test_what_the_table_lacks_is_named(writing: ExperimentLog, tmp_path: Path) -
     words = " ".join(next(part for part in outcome.report.sections if "Control cases" in part.title).text)
     assert "ddq_ref" in words
     assert "Not compared: moved" in words
+
+
+def test_what_was_drawn_is_named() -> None:
+    """A covariance with friction in it, one of base parameters and offsets alone, a model file, and no uncertainty at all."""
+    arm = synthetic_arm()
+    together = replace(arm, uncertainty=Uncertainty(("p1", f"{arm.friction[0].place}:b"), np.eye(2)))
+    apart = replace(arm, uncertainty=Uncertainty(("p1", "torque_offset:1:offset"), np.eye(2)))
+    told = replace(arm, base=tuple(replace(p, std=0.1) for p in arm.base))
+    assert "friction held" not in validate_writing._drawn_from(together)
+    assert "friction held" in validate_writing._drawn_from(apart)
+    assert "model file" in validate_writing._drawn_from(told)
+    assert validate_writing._drawn_from(replace(arm, base=tuple(replace(p, std=None) for p in arm.base))) == ""
 
 
 def test_any_held_out_log_is_validated(writing: ExperimentLog, tmp_path: Path) -> None:
