@@ -1,0 +1,91 @@
+"""With reference logs only what has changed is a finding; what a load at the tip does to the base parameters is one too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects import effect_names
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import arm, hidden
+
+TRIED = ("quadratic_drag", "torque_offset", "payload")
+SETTINGS = DiagnosisSettings(without=tuple(name for name in effect_names() if name not in TRIED), evidence=False, limits=False)
+MASS, OFFSET = 0.4, 0.05  # [kg], [N m]
+
+
+def push(motion: Motion) -> Array:
+    """A constant torque at joint 3."""
+    return np.tile([0.0, 0.0, OFFSET], (len(motion.t), 1))
+
+
+def weight_at_the_tip(motion: Motion) -> Array:
+    """Jᵀ m (a - g) of a point mass at the tip: slopes and accelerations by differences over the 0.2 ms of the samples."""
+    body, step = arm().body, float(motion.t[1] - motion.t[0])
+    tip = body.tip(motion.q)
+    acceleration = np.zeros_like(tip)
+    acceleration[1:-1] = np.diff(tip, 2, axis=0) / step**2
+    acceleration[[0, -1]] = acceleration[[1, -2]]
+    force = MASS * (acceleration - np.array([0.0, 0.0, -9.8062]))
+    out = np.zeros_like(motion.q)
+    for j in range(3):
+        moved = motion.q.copy()
+        moved[:, j] += 1e-6
+        out[:, j] = np.sum((body.tip(moved) - tip) / 1e-6 * force, axis=1)
+    return out
+
+
+def before(log: ExperimentLog) -> ExperimentLog:
+    return replace(log, role="reference", name=f"{log.name}-before")
+
+
+@pytest.fixture(scope="module")
+def loaded() -> Diagnosis:
+    """The same offset before and after; after it a mass at the tip as well."""
+    def both(motion: Motion) -> Array:
+        return np.asarray(push(motion) + weight_at_the_tip(motion))
+
+    return diagnose(Logs((hidden(1, both), hidden(2, both)), (), (before(hidden(4, push)), before(hidden(5, push)))), SETTINGS)
+
+
+def test_a_load_at_the_tip_is_named_by_the_base_parameters(loaded: Diagnosis) -> None:
+    """Its mass within 3 %."""
+    assert [finding.cause for finding in loaded.findings] == ["payload"]
+    mass = loaded.findings[0].parameters["mass"]
+    assert mass.value == pytest.approx(MASS, rel=0.03)
+    assert loaded.verdict == "cause"
+    assert loaded.findings[0].origin == "base parameters"
+
+
+def test_what_was_there_before_stands(loaded: Diagnosis) -> None:
+    there = [one for one in loaded.standing if (one.cause, one.joint) == ("torque_offset", 3)]
+    assert there
+    assert there[0].parameters["offset"].value == pytest.approx(OFFSET, rel=0.1)
+
+
+def test_nothing_has_changed() -> None:
+    found = diagnose(Logs((hidden(1, push), hidden(2, push)), (), (before(hidden(4, push)), before(hidden(5, push)))), SETTINGS)
+    assert found.verdict == "nothing-wrong"
+    assert found.question == "what has changed"
+    assert not found.findings
+
+
+def test_what_is_new_is_found() -> None:
+    found = diagnose(Logs((hidden(1, push), hidden(2, push)), (), (before(hidden(4)), before(hidden(5)))), SETTINGS)
+    assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 3)]
+
+
+def test_a_load_cannot_be_told_without_reference_logs() -> None:
+    """The base parameters take it in, and the answer says which of them."""
+    found = diagnose(Logs((hidden(1, weight_at_the_tip), hidden(2, weight_at_the_tip))), replace(SETTINGS, replicas=0))
+    assert not found.findings
+    hidden_by = next(one for one in found.not_testable if one.cause == "payload")
+    assert "p3" in hidden_by.reason
+    assert "reference" in hidden_by.reason
