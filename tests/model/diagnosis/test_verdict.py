@@ -1,0 +1,75 @@
+"""What is named, and what is not: near the floor nothing is wrong, far above it without a cause something unknown is."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.verdict import excess, explained, rule
+
+FLOOR = np.array([0.01, 0.01, 0.01])
+
+
+def left(*rms: float) -> Any:
+    return SimpleNamespace(rms=np.array(rms))
+
+
+def found(nominal: Any, *after: Any, other: Any = None) -> Any:
+    """A search that accepted one cause after the other, with what each left."""
+    before, steps = nominal, []
+    for one in after:
+        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=one), other=None))
+        before = one
+    steps.append(SimpleNamespace(before=before, best=None, other=other))
+    return SimpleNamespace(nominal=nominal, steps=steps, final=before)
+
+
+def test_at_the_floor_nothing_is_wrong() -> None:
+    assert rule(found(left(0.011, 0.009, 0.012)), FLOOR).verdict == "nothing-wrong"
+
+
+def test_above_the_floor_without_a_cause_is_unknown() -> None:
+    ruling = rule(found(left(0.011, 0.05, 0.01)), FLOOR)
+    assert ruling.verdict == "unknown"
+    assert "joint 2" in ruling.reason
+
+
+def test_a_cause_that_comes_down_to_the_floor_is_named() -> None:
+    assert rule(found(left(0.01, 0.05, 0.01), left(0.01, 0.011, 0.01)), FLOOR).named == (0,)
+
+
+def test_a_cause_that_explains_less_than_half_is_not() -> None:
+    assert rule(found(left(0.01, 0.05, 0.01), left(0.01, 0.04, 0.01)), FLOOR).verdict == "unknown"
+
+
+def test_what_leaves_much_of_a_joint_is_not_named() -> None:
+    """Half of the amplitude is left: three quarters of the power are explained, and yet it is another cause."""
+    assert rule(found(left(0.01, 0.08, 0.01), left(0.01, 0.04, 0.01)), FLOOR).verdict == "unknown"
+
+
+def test_what_gives_way_is_not_named_by_the_residual() -> None:
+    ruling = rule(found(left(0.01, 0.05, 0.01), other=SimpleNamespace(joint=2)), FLOOR)
+    assert ruling.verdict == "unknown"
+    assert "frequency responses" in ruling.reason
+
+
+def test_two_causes_share_what_stands_above_the_floor() -> None:
+    """Each joint's excess is that of its own cause."""
+    case = found(left(0.01, 0.05, 0.03), left(0.01, 0.01, 0.03), left(0.01, 0.01, 0.01))
+    shares = [explained(step, case, FLOOR) for step in case.steps[:2]]
+    assert shares == pytest.approx([24.0 / 32.0, 8.0 / 32.0])
+    assert rule(case, FLOOR).named == (0, 1)
+
+
+def test_excess_counts_no_joint_below_its_floor() -> None:
+    assert excess(np.array([0.005, 0.02, 0.01]), FLOOR) == pytest.approx(3.0)
+
+
+def test_thresholds_follow_the_weights() -> None:
+    """A gain is squared weighted torque: twice the weight is four times the gain; of the whole arm the largest counts."""
+    one = Thresholds(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 0.3]), "", np.array([1.0, 1.0]), (1, 2, None))
+    np.testing.assert_allclose(one.at(np.array([2.0, 1.0])).gain, [4.0, 2.0, 12.0])
