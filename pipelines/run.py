@@ -15,16 +15,17 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import Check, InputRejected, Level, NothingMatched, RrridError
+from pipelines.errors import Check, InputRejected, Level, NothingMatched, RrridError, UsageError, did_you_mean
 from pipelines.log.files import Opened
-from pipelines.log.results import NOT_STORED
+from pipelines.log.results import FLAT, NOT_STORED
+from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 
 __all__ = ["STAGE", "STEPS", "Group", "Result", "Settings", "Step", "compute", "report"]
 
 # Modules of the stages, in the order they are run.
-STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing", "frf")
+STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing", "frf", "diagnose", "extend")
 
 _WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
 
@@ -34,6 +35,7 @@ class Settings:
     """`stages`: settings of single stages by their names; the others run with their own defaults."""
 
     stages: Mapping[str, Any] = field(default_factory=dict, metadata={"option": False})  # filled by --set and --config
+    skip: tuple[str, ...] = ()  # stages that are left out
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Group:
 
     name: str
     stages: tuple[Step, ...]
+    diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
 
 
 @dataclass(frozen=True)
@@ -61,16 +64,34 @@ class Result:
 
     stages: tuple[Step, ...]
     runs: tuple[Group, ...] = ()
+    diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
 
     @property
     def groups(self) -> tuple[Group, ...]:
-        return self.runs or (Group("", self.stages),)
+        return self.runs or (Group("", self.stages, self.diagnosis),)
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
     """Run every stage on every group of logs."""
-    groups = tuple(Group(name, _stages(part, settings)) for name, part in _apart(inputs))
-    return Result((), groups) if len(groups) > 1 else Result(groups[0].stages)
+    _refuse_strange(settings)
+    done = [(name, _stages(part, settings)) for name, part in _apart(inputs)]
+    groups = tuple(Group(name, steps, _diagnosis(steps)) for name, steps in done)
+    return Result((), groups) if len(groups) > 1 else Result(groups[0].stages, diagnosis=groups[0].diagnosis)
+
+
+def _refuse_strange(settings: Settings) -> None:
+    names = [module.replace("_", "-") for module in STEPS]
+    for name in settings.skip:
+        if name not in names:
+            raise UsageError("C01", f"'{name}' is no stage of a run{did_you_mean(name, names)}", where="--skip",
+                             remedy=f"there are: {', '.join(names)}")
+
+
+def _diagnosis(steps: Iterable[Step]) -> Diagnosis | None:
+    """What the run says is wrong; its series stand with the stage."""
+    found = next((step.result for step in steps if isinstance(step.result, Diagnosis)), None)
+    return None if found is None else dataclasses.replace(
+        found, evidence=(), findings=tuple(dataclasses.replace(one, proof=None) for one in found.findings))
 
 
 def _stages(inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
@@ -78,6 +99,8 @@ def _stages(inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
     steps = []
     for module in STEPS:
         stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
+        if stage.name in settings.skip:
+            continue
         try:
             result = stage.compute(inputs, settings.stages.get(stage.name) or stage.in_run or stage.settings())
         except (NothingMatched, InputRejected) as problem:

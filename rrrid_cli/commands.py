@@ -48,11 +48,14 @@ def about(
 
 @app.command(cls=StageCommand)
 @with_common
-def run(logs: LogPaths, common: Common) -> None:
+def run(
+    logs: LogPaths, common: Common,
+    skip: Annotated[list[str] | None, typer.Option(help="Stage to leave out, such as diagnose. Repeatable.")] = None,
+) -> None:
     """Do the whole workflow on a folder of logs; one report."""
     from pipelines.run import STAGE
 
-    _go(STAGE, tuple(logs), common, {})
+    _go(STAGE, tuple(logs), common, {"skip": tuple(skip or ()) or None})
 
 
 @app.command(cls=StageCommand)

@@ -14,15 +14,14 @@ from typing import Any
 import pytest
 
 from pipelines.errors import Check
-from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log, write_log
 from pipelines.log.results import decode, encode, read_series
 from pipelines.log.table import write_csv
-from pipelines.model.effects import effect_names
 from pipelines.report.report import Report
 from pipelines.stage import Request, Stage, run_stage
 from rrrid_cli.commands import STAGES
 from tests.controlled import controlled_log
+from tests.diagnose.sessions import but, session, written
 from tests.log.recording.good import RECIPE, good, text, write
 from tests.log.recording.good import run as run_import
 from tests.repairs import REPAIRS, Repair
@@ -33,8 +32,6 @@ MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if pa
 _FEW = ("excitation-1", "excitation-2", "hold-1")
 LOGS = {"inspect": _FEW, "reconstruct": ("excitation-1", "hold-1"), "estimate_bps": _FEW, "fit_friction": ("friction-3",),
         "run": ("excitation-1", "excitation-2", "friction-3"), "validate_writing": _FEW}
-# Diagnosing is dear: here two causes are looked for in two seconds of a log.
-_EASY = ("cogging", "torque_offset")
 FORBIDDEN = {"open", "print", "read_text", "write_text", "read_bytes", "write_bytes", "open_log", "write_log", "savefig"}
 
 
@@ -50,12 +47,6 @@ def _recording(folder: Path, samples: Path) -> Path:
     recipe = folder / "recipe.toml"
     recipe.write_text(RECIPE)
     return recipe
-
-
-def cut(log: ExperimentLog, samples: int) -> ExperimentLog:
-    """The beginning of a log."""
-    signals = {name: dataclasses.replace(signal, values=signal.values[:samples]) for name, signal in log.signals.items()}
-    return dataclasses.replace(log, signals=signals, period=None)
 
 
 def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) -> tuple[Any, Any]:
@@ -77,11 +68,8 @@ def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) ->
     if module == "run":
         settings = dataclasses.replace(settings, skip=("diagnose", "extend"))
     if module in ("diagnose", "extend"):
-        paths = (tmp_path / "brief.h5",)
-        log = open_log(samples / "rrr-closed-form/excitation-1.h5").log
-        write_log(paths[0], cut(log, 4000))
-        more = {"without": tuple(sorted(set(effect_names()) - set(_EASY))), "replicas": 0} if module == "diagnose" else {
-            "causes": ("viscous_drift:1",)}
+        paths = (written(tmp_path / "brief", session("cogging", 1, 2.0, 1)),)
+        more = {"without": but("cogging"), "replicas": 0, "most": 1} if module == "diagnose" else {"causes": ("cogging:1",)}
         settings = dataclasses.replace(settings, **more)
     if module == "design_excitation":
         settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()

@@ -15,7 +15,6 @@ from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 
-
 WITHOUT = run.Settings(skip=("diagnose", "extend"))  # they are dear, and have tests of their own
 
 

@@ -5,7 +5,8 @@
 
 A result is a frozen dataclass of plain values, tuples, further dataclasses and arrays. Arrays of at most 64 numbers
 stand in the JSON; longer ones become series, and the JSON says which. Infinite and undefined numbers become null.
-Fields marked `metadata=NOT_STORED` (samples that are written as logs, say) are left out and come back as None.
+Fields marked `metadata=NOT_STORED` (samples that are written as logs, say) are left out and come back as None. The fields of one
+marked `metadata=FLAT` stand beside the others; what is None adds nothing.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ import numpy as np
 from pipelines.log.chunks import store
 from pipelines.log.experiment import Array
 
-__all__ = ["NOT_STORED", "decode", "encode", "json_text", "read_series", "write_series"]
+__all__ = ["FLAT", "NOT_STORED", "decode", "encode", "json_text", "read_series", "write_series"]
 
 NOT_STORED: Final[Mapping[str, object]] = {"stored": False}
+FLAT: Final[Mapping[str, object]] = {"flat": True}
 _INLINE = 64
 _CHUNK = 65536  # numbers
 _SERIES = "$series"
@@ -47,8 +49,12 @@ def json_text(value: Any) -> str:
 
 def _encode(value: Any, path: str, series: dict[str, Array]) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _encode(getattr(value, field.name), f"{path}/{field.name}", series)
-                for field in dataclasses.fields(value) if field.metadata.get("stored", True)}
+        stored = [field for field in dataclasses.fields(value) if field.metadata.get("stored", True)]
+        flat = [getattr(value, field.name) for field in stored if field.metadata.get("flat")]
+        beside = [_encode(one, path, series) for one in flat if one is not None]
+        return {key: item for one in beside for key, item in one.items()} | {
+            field.name: _encode(getattr(value, field.name), f"{path}/{field.name}", series)
+            for field in stored if not field.metadata.get("flat")}
     if isinstance(value, Mapping):
         return {str(key): _encode(item, f"{path}/{key}", series) for key, item in value.items()}
     if isinstance(value, np.ndarray):

@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterable
 
 from pipelines.model.diagnosis.outcome import Result
-from pipelines.model.diagnosis.result import Finding, Gain, Value
+from pipelines.model.diagnosis.result import Finding, Gain
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_proof import proof_figures
-from pipelines.report.diagnosis_words import cause_at, floor_words, held_out_words, per_joint, title_of, told_value, torque_errors
+from pipelines.report.diagnosis_words import cause_at, floor_words, held_out_words, in_order, per_joint, title_of, told_value
+from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
@@ -27,7 +28,7 @@ def diagnosis_report(result: Result) -> Report:
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
                 *_limits(result), _basis(result), *_doctor(result)]
     return Report("Diagnosis", _verdict(result), _TONES[result.verdict],
-                  torque_errors(result.residual_rms, result.after_rms, result.rated, floor_words(result)), tuple(sections))
+                  errors_table(result.residual_rms, result.after_rms, result.rated, floor_words(result)), tuple(sections))
 
 
 def _verdict(result: Result) -> str:
@@ -65,7 +66,7 @@ def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
     if one.rivals:
         names = ", ".join(f"{cause_at(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
-    tables = [_numbers(one.parameters),
+    tables = [_numbers(one),
               gain_table(one.gain, "Gain on held-out time, root mean square, beside the findings before it.")]
     return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text), tuple(tables),
                    tuple(proof_figures(number, one)))
@@ -91,8 +92,8 @@ def _worth(one: Finding) -> str:
             f"hide {format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{said}")
 
 
-def _numbers(parameters: dict[str, Value]) -> Table:
-    rows = tuple((name, told_value(value), value.unit) for name, value in parameters.items())
+def _numbers(one: Finding) -> Table:
+    rows = tuple((name, told_value(value), value.unit) for name, value in in_order(one.cause, one.parameters))
     return Table(("parameter", "value ± std", "unit"), rows, "What was identified.")
 
 
@@ -126,7 +127,7 @@ def _standing(result: Result) -> list[Section]:
     if not result.standing:
         return []
     rows = tuple((title_of(one.cause), one.joint, ", ".join(f"{name} {told_value(v)} {v.unit}".strip()
-                                                             for name, v in one.parameters.items()),
+                                                             for name, v in in_order(one.cause, one.parameters)),
                   _rounded(100.0 * one.explained)) for one in result.standing)
     return [Section("What the reference logs show as well", ("It is part of this robot and no news; the extended model has it.",),
                     (Table(("effect", "joint", "parameters", "explains [%]"), rows),))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, with_std
 
-__all__ = ["cause_at", "floor_words", "held_out_words", "per_joint", "title_of", "told_value", "torque_errors"]
+__all__ = ["cause_at", "floor_words", "held_out_words", "in_order", "per_joint", "title_of", "told_value", "torque_errors"]
 
 _FLOORS = {
     "twin": "The floor is what the simulated twin leaves: the fitted model run through the same experiment and the same analysis.",
@@ -38,6 +38,13 @@ def told_value(value: Value) -> str:
     values = value.value if isinstance(value.value, tuple | list) else (value.value,)
     stds = value.std if isinstance(value.std, tuple | list) else (value.std,) * len(values)
     return ", ".join(with_std(x, s) if s is not None else format_number(x) for x, s in zip(values, stds, strict=True))
+
+
+def in_order(cause: str, parameters: Mapping[str, Value]) -> list[tuple[str, Value]]:
+    """The parameters as the effect lists them; JSON sorts them by name."""
+    known = [q.name for q in find_effect(cause).parameters] if cause in effect_names() else []
+    place = {name: k for k, name in enumerate(known)}
+    return sorted(parameters.items(), key=lambda item: (place.get(item[0], len(known)), item[0]))
 
 
 def per_joint(x: Array) -> str:
