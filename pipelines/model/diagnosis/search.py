@@ -21,6 +21,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact, Refined, refine
+from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import Fit, orthonormal
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
@@ -54,23 +55,6 @@ class Case:
     blocks: int = 10
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Callable[[Refined], tuple[Sequence[Screened], Thresholds]] | None = None  # what has changed since the reference logs
-
-
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """A hypothesis fitted exactly."""
-
-    screened: Screened
-    effect: Effect
-    log: int | None
-    done: Refined
-    error: float  # squared weighted error as a share of that before: held out; of an event, of the logs it happened in
-    visibility: float
-
-    @property
-    def possible(self) -> bool:
-        """Whether the cause's numbers lie in their ranges."""
-        return self.done.model.effects[-1].possible
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +147,7 @@ def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
     best = _fewest(tried) if more else None
     other = _other([one for one in screened if id(one) in passes], best, now, case.nameable)
     best = None if other is not None else best
-    trials = _ledger(screened, judged, thresholds, explored.tried, best, now, number)
+    trials = ledger(screened, judged, thresholds, explored.tried, best, now, number)
     return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials, other)
 
 
@@ -280,24 +264,3 @@ def _reweighted(done: Refined) -> Refined:
         if settled:
             break
     return done
-
-
-def _ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
-            best: Tried | None, now: Refined, number: int) -> tuple[Trial, ...]:
-    exact = {id(one.screened): one for one in tried}
-    rows: list[Trial] = []
-    order = sorted(range(len(screened)), key=lambda k: -judged[k].gain[0])
-    for k in order:
-        one, gain = screened[k], float(judged[k].gain[0])
-        fitted = exact.get(id(one))
-        accepted = best is not None and fitted is best
-        if fitted is None and gain <= thresholds.gain[k] and len(rows) >= 12:
-            continue
-        reason = ("accepted" if accepted else "below its threshold" if gain <= thresholds.gain[k] else
-                  "weaker than others" if fitted is None else
-                  "impossible numbers" if not fitted.possible else
-                  "held-out error does not fall" if fitted.error >= 1.0 else "explains less than the one accepted")
-        gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
-        rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
-                          float(one.visibility[0]), gained, accepted, reason))
-    return tuple(rows)

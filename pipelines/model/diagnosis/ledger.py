@@ -1,0 +1,57 @@
+"""Every hypothesis of a step with what it gained, what it had to exceed, and why it was accepted or not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.model.diagnosis.exact import Refined
+from pipelines.model.diagnosis.result import Trial
+from pipelines.model.diagnosis.screen import Screened
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.effects.base import Effect
+
+__all__ = ["Tried", "ledger"]
+
+_SHOWN = 12  # lines of a step, of causes that stay below their thresholds
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A hypothesis fitted exactly."""
+
+    screened: Screened
+    effect: Effect
+    log: int | None
+    done: Refined
+    error: float  # squared weighted error as a share of that before: held out; of an event, of the logs it happened in
+    visibility: float
+
+    @property
+    def possible(self) -> bool:
+        """Whether the cause's numbers lie in their ranges."""
+        return self.done.model.effects[-1].possible
+
+
+def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
+            best: Tried | None, now: Refined, number: int) -> tuple[Trial, ...]:
+    """The lines of step `number`, greatest gain first; `judged` holds the gains that `thresholds` are for."""
+    exact = {id(one.screened): one for one in tried}
+    rows: list[Trial] = []
+    order = sorted(range(len(screened)), key=lambda k: -judged[k].gain[0])
+    for k in order:
+        one, gain = screened[k], float(judged[k].gain[0])
+        fitted = exact.get(id(one))
+        accepted = best is not None and fitted is best
+        if fitted is None and gain <= thresholds.gain[k] and len(rows) >= _SHOWN:
+            continue
+        reason = ("accepted" if accepted else "below its threshold" if gain <= thresholds.gain[k] else
+                  "weaker than others" if fitted is None else
+                  "impossible numbers" if not fitted.possible else
+                  "held-out error does not fall" if fitted.error >= 1.0 else "explains less than the one accepted")
+        gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
+        rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
+                          float(one.visibility[0]), gained, accepted, reason))
+    return tuple(rows)
