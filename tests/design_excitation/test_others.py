@@ -18,7 +18,7 @@ from pipelines.stage import Request, run_stage
 from tests.design_excitation.short import QUICK, designed
 
 
-@pytest.mark.parametrize(("purpose", "count"), [("friction", 3), ("frf", 3), ("hold", 8)])
+@pytest.mark.parametrize(("purpose", "count"), [("friction", 3), ("frf", 6), ("hold", 8)])
 def test_the_other_experiments(purpose: str, count: int, tmp_path: Path) -> None:
     """One log an experiment, each within the limits, its speed and acceleration the derivatives of its position."""
     out = designed(tmp_path / "out", replace(QUICK, purpose=purpose)).folder
@@ -49,6 +49,26 @@ def test_friction_speeds_span_two_decades(tmp_path: Path) -> None:
     assert len(held) == 18
     np.testing.assert_allclose(held, -held[::-1])
     assert held[-1] / held[9] == pytest.approx(100.0, rel=1e-3)
+
+
+def test_frf_plans_tell_distortion_from_noise(tmp_path: Path) -> None:
+    """Odd lines alone, one of four left out; two realisations on the same lines; two periods each way where the joint turns."""
+    out = designed(tmp_path / "out", replace(QUICK, purpose="frf")).folder
+    one, two = (open_log(out / f"logs/frf-2-{k}.h5").log for k in (1, 2))
+    assert one.period is not None
+    period = round(one.period / one.sample_time)
+    sizes = []
+    for log in (one, two):
+        steady = np.abs(log["dq_ref"][:, 1]) > 0.999 * np.abs(log["dq_ref"][:, 1]).max()
+        assert steady.sum() >= 2 * (2 * period + 500)
+        np.testing.assert_array_equal(log["v"][period:, 1], log["v"][:-period, 1])
+        sizes.append(np.abs(np.fft.rfft(log["v"][:period, 1])))
+    excited = [np.flatnonzero(size > 1e-6 * size.max()) for size in sizes]
+    np.testing.assert_array_equal(excited[0], excited[1])
+    assert (excited[0] % 2 == 1).all()
+    possible = (excited[0][-1] - excited[0][0]) // 2 + 1
+    assert len(excited[0]) / possible == pytest.approx(0.75, abs=0.01)
+    assert abs(np.corrcoef(one["v"][:period, 1], two["v"][:period, 1])[0, 1]) < 0.1
 
 
 def test_held_postures_show_gravity(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Plans of the other experiments of the workflow: friction, frequency responses, static postures.
 
     friction    one joint at speeds over two decades, both directions, each held as long as its range allows
-    frf         one joint turning slowly there and back, with a random-phase multisine to excite what bends
+    frf         one joint turning slowly there and back, with an odd random-phase multisine to excite what bends, twice
     hold        static postures that together tell most about gravity
 """
 
@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import UsageError
+from pipelines.model.excitation.multisine import odd_lines, realisation
 from pipelines.model.excitation.task import Task
 from pipelines.model.excitation.tip import tip_motion
 from pipelines.model.excitation.trajectory import quintic
@@ -30,7 +31,10 @@ _FREE = 4.0 * np.pi  # [rad] range of a joint that turns freely
 _PEAK = 1.5  # of 3 s² - 2 s³, times its mean slope
 _SLOW = 0.05  # of the speed limit: the turn of an frf experiment
 _FRF_TORQUE = 0.1  # of the torque limit, rms of the excitation
-_FRF_PERIOD = 5.0  # [s]
+_FRF_PERIOD = 8.0  # [s] odd lines then lie a quarter of a hertz apart
+_FRF_PERIODS = 2  # each way at least, to tell noise
+_FRF_SETTLE = 1.0  # [s] before them, in which the loop settles
+_REALISATIONS = 2  # of other phases, to tell nonlinear distortion from noise
 _FRF_BAND = (1.0, 0.4)  # [Hz] lowest line; highest, of the sample rate
 _POSTURES, _CANDIDATES, _DWELL = 8, 400, 2.0
 _SMALLER, _SMALLEST = 0.8, 0.05  # a plan that breaks a limit is made slower in such steps, down to such a share
@@ -60,23 +64,24 @@ def friction_plans(task: Task) -> tuple[Plan, ...]:
     """
     home = _home(task)
 
-    def slower(j: int) -> Callable[[float], Plan]:
-        return lambda share: _friction(task, j, home, share)
+    def slower(j: int) -> Callable[[float], tuple[Plan, ...]]:
+        return lambda share: (_friction(task, j, home, share),)
 
-    return tuple(_within(task, slower(j)) for j in range(task.robot.n_joints))
+    return tuple(plan for j in range(task.robot.n_joints) for plan in _within(task, slower(j)))
 
 
-def _within(task: Task, make: Callable[[float], Plan]) -> Plan:
-    """The fastest of the plans make(share) that keeps every limit."""
-    share, found = 1.0, Peak("", None, 0.0, 0.0, "", 0.0)
+def _within(task: Task, make: Callable[[float], tuple[Plan, ...]]) -> tuple[Plan, ...]:
+    """The fastest of the sets of plans make(share) that keep every limit."""
+    share, found, name = 1.0, Peak("", None, 0.0, 0.0, "", 0.0), ""
     while share >= _SMALLEST:
-        plan = make(share)
-        nearest = _nearest(task, plan)
-        if nearest is None or nearest.share <= 1.0:
-            return replace(plan, nearest=nearest)
-        share, found = share * _SMALLER, nearest
+        plans = [replace(plan, nearest=_nearest(task, plan)) for plan in make(share)]
+        broken = next((plan for plan in plans if plan.nearest is not None and plan.nearest.share > 1.0), None)
+        if broken is None:
+            return tuple(plans)
+        assert broken.nearest is not None
+        share, found, name = share * _SMALLER, broken.nearest, broken.name
     of = "" if found.joint is None else f" of joint {found.joint}"
-    raise UsageError("C08", f"{plan.name} cannot keep the {found.quantity} limit{of}, {found.limit:.4g} {found.unit}",
+    raise UsageError("C08", f"{name} cannot keep the {found.quantity} limit{of}, {found.limit:.4g} {found.unit}",
                      where="limits", remedy="start elsewhere (--home), or correct that limit")
 
 
@@ -177,38 +182,50 @@ def _joined(task: Task, parts: list[tuple[Array, float]]) -> Array:
 
 
 def frf_plans(task: Task, seed: int) -> tuple[Plan, ...]:
-    """One experiment a joint: there and back through its range at low speed, with a random-phase multisine.
+    """Two experiments a joint: there and back through its range at low speed, with odd multisines of the same lines.
 
-    The slow turn keeps friction from sticking; the multisine has equal lines, so every frequency gets as much (Pintelon &
-    Schoukens 2012, ch. 2).
+    The slow turn keeps friction from sticking; equal lines give every frequency as much, those left out show distortion, and so
+    does what differs between the two (multisine.py).
+
+    Raises:
+        UsageError: C08, a limit that even a slow and weak one breaks: says which.
     """
     home = _home(task)
 
-    def weaker(j: int) -> Callable[[float], Plan]:
-        return lambda share: _frf(task, j, home, seed, share)
+    def weaker(j: int) -> Callable[[float], tuple[Plan, ...]]:
+        return lambda share: tuple(_frf(task, j, home, seed, share, k) for k in range(_REALISATIONS))
 
-    return tuple(_within(task, weaker(j)) for j in range(task.robot.n_joints))
+    return tuple(plan for j in range(task.robot.n_joints) for plan in _within(task, weaker(j)))
 
 
-def _frf(task: Task, j: int, home: Array, seed: int, share: float) -> Plan:
-    """Joint j's experiment, its turn and its excitation `share` as strong as they might be."""
+def _frf(task: Task, j: int, home: Array, seed: int, share: float, k: int) -> Plan:
+    """Joint j's experiment with the k-th phases, its turn and its excitation `share` as strong as they might be."""
     low, high = task.robot.joints[j].position
     room = _USED_RANGE * (high - low) if np.isfinite(high - low) else 2.0 * np.pi
     centre = 0.5 * (low + high) if np.isfinite(high - low) else float(home[j])
-    speed = share * min(_SLOW * float(task.speed[j]), room / (2.0 * _FRF_PERIOD))
-    ramp = max(_PEAK * speed / (share * _acceleration(task, j, home)), 0.1)
-    hold = max(share * room / speed - ramp, 1.0)
+    full, ramp = _turn(task, j, home, room)
+    speed, hold = share * full, room / full - ramp
     motion = _joined(task, _stroke(centre - 0.5 * speed * (hold + ramp), speed, ramp, hold))
     whole = np.zeros((3, task.robot.n_joints, motion.shape[1]))
     whole[0] = home[:, None]
     whole[:, j] = motion
+    period = round(_FRF_PERIOD / task.sample_time)
+    lines = odd_lines(np.random.default_rng([seed, j]), int(_FRF_BAND[0] * _FRF_PERIOD), int(_FRF_BAND[1] * period))
     v = np.zeros((motion.shape[1], task.robot.n_joints))
-    drawn = _multisine(motion.shape[1], task.sample_time, np.random.default_rng([seed, j]))
-    v[:, j] = share * _strength(task, j, home) * drawn
+    v[:, j] = share * _strength(task, j, home) * realisation(np.random.default_rng([seed, j, k]), lines, period, motion.shape[1])
     t = np.arange(motion.shape[1], dtype=np.float64) * task.sample_time
-    return Plan(f"frf-{j + 1}", "frf", j + 1, home, t, whole, v, _FRF_PERIOD,
-                f"{speed:.3g} rad/s there and back, lines from {_FRF_BAND[0]:g} to "
-                f"{_FRF_BAND[1] / task.sample_time:g} Hz every {1.0 / _FRF_PERIOD:g} Hz")
+    return Plan(f"frf-{j + 1}-{k + 1}", "frf", j + 1, home, t, whole, v, period * task.sample_time,
+                f"{speed:.3g} rad/s there and back, {hold / _FRF_PERIOD:.2g} periods of {_FRF_PERIOD:g} s each way, "
+                f"{len(lines)} odd lines from {lines[0] / _FRF_PERIOD:.3g} to {lines[-1] / _FRF_PERIOD:.4g} Hz, one of four left "
+                f"out to detect distortion; phases {k + 1} of {_REALISATIONS}")
+
+
+def _turn(task: Task, j: int, home: Array, room: float) -> tuple[float, float]:
+    """Speed [rad/s] and its ramp [s]: slow, and slow enough for the periods to fit into `room` [rad] each way."""
+    least = _FRF_PERIODS * _FRF_PERIOD + _FRF_SETTLE
+    fastest = min(_SLOW * float(task.speed[j]), room / least)
+    ramp = max(_PEAK * fastest / _acceleration(task, j, home), 0.1)
+    return min(fastest, room / (least + ramp)), ramp
 
 
 def _strength(task: Task, j: int, home: Array) -> float:
@@ -217,16 +234,6 @@ def _strength(task: Task, j: int, home: Array) -> float:
     if task.arm is not None and np.isfinite(joint.torque):
         return _FRF_TORQUE * joint.torque / max(float(task.arm.body.mass_matrix(home[None], task.arm.p)[0, j, j]), 1e-9)
     return _FRF_TORQUE * _acceleration(task, j, home) / _ACCELERATION
-
-
-def _multisine(samples: int, sample_time: float, rng: np.random.Generator) -> Array:
-    """Lines of equal amplitude and random phase, rms 1, periodic."""
-    period = round(_FRF_PERIOD / sample_time)
-    spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
-    lines = np.arange(int(_FRF_BAND[0] * _FRF_PERIOD), int(_FRF_BAND[1] * period))
-    spectrum[lines] = np.exp(2j * np.pi * rng.uniform(size=len(lines)))
-    one = np.fft.irfft(spectrum, period)
-    return np.asarray(np.resize(one / np.sqrt(np.mean(one**2)), samples))
 
 
 def hold_plans(task: Task, seed: int) -> tuple[Plan, ...]:
