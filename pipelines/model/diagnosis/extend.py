@@ -159,7 +159,7 @@ def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, 
     if named:
         arm = with_uncertainty(extended_arm(found, Ruling("cause", tuple(range(len(named))), "")), final)
         arm = replace(arm, effects=(*standing, *arm.effects))
-        gain = _gain(found, prepared, chosen)
+        gain = named[0].gain if len(named) == 1 else _gain(found, prepared, chosen)
     return Extended(arm, named, rejected, gain, rms[0], rms[1], "blocks" if judge is None else "logs", standing,
                     (*prepared.motions, *prepared.judging), len(prepared.motions))
 

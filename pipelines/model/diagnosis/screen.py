@@ -21,7 +21,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Screened", "gains_of", "screen", "screen_family"]
+__all__ = ["Screened", "gains_of", "screen", "screen_event", "screen_family"]
 
 _INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
 _USUAL = 0.25  # of the shapes reach less

@@ -42,6 +42,9 @@ _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
 
 
+Changed = Callable[[Refined, Sequence[bool]], tuple[Sequence[Screened], Thresholds]]
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """What is diagnosed."""
@@ -54,7 +57,7 @@ class Case:
     thresholds: Thresholds | None  # None: a share of the residual
     blocks: int = 10
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
-    changed: Callable[[Refined], tuple[Sequence[Screened], Thresholds]] | None = None  # what has changed since the reference logs
+    changed: Changed | None = None  # what has changed since the reference logs
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +142,8 @@ def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
     now, screened = explored.before, explored.screened
     judged: Sequence[Screened] = screened
     if case.changed is not None:
-        judged, thresholds = case.changed(now)
+        most = max((one.gain[0] for one in screened), default=0.0)
+        judged, thresholds = case.changed(now, [bool(one.gain[0] >= _CLOSE**2 * most) for one in screened])
     else:
         thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
     passes = {id(one) for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True) if seen.gain[0] > bound}

@@ -58,13 +58,13 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     judge = prepared.judge and replace(prepared.judge, known=_known(prepared.judge, standing, sizes, arm))
     start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
 
-    def changed(found: Refined) -> tuple[Sequence[Screened], Thresholds]:
+    def changed(found: Refined, wanted: Sequence[bool]) -> tuple[Sequence[Screened], Thresholds]:
         more = np.zeros((0, data.rows))
         places = [k for place in range(len(found.model.effects)) for k in found.of_effect(place)]
         if places:
             more = np.zeros((len(places), data.rows))
             more[:, later] = found.slopes[places]
-        return changes(data, later, nominal, common, more, found.weight, every, arm)
+        return changes(data, later, nominal, common, more, found.weight, every, wanted, arm)
 
     case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed)
     kept = len(columns.kept)

@@ -22,7 +22,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
-from pipelines.model.diagnosis.screen import Screened, gains_of, screen
+from pipelines.model.diagnosis.screen import Screened, gains_of, screen, screen_event
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
@@ -95,8 +95,8 @@ def apart(table: Array, later: Mask) -> Array:
 
 
 def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array, weight: Array, families: Sequence[Family],
-            arm: Arm) -> tuple[list[Screened], Thresholds]:
-    """Every cause by what its change gains, and what it has to exceed.
+            wanted: Sequence[bool], arm: Arm) -> tuple[list[Screened], Thresholds]:
+    """Every cause that is wanted by what its change gains, and what it has to exceed; the others gain nothing.
 
     Args:
         data: rows of the reference logs, then of the later ones; `later` says which.
@@ -113,8 +113,12 @@ def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array,
              for mask in masks]
     found, own = [], []
     ratio = float(later.sum()) / max(float(rows.sum()) / 2.0, 1.0)
-    for family in families:
-        if family.event:
+    for family, asked in zip(families, wanted, strict=True):
+        if family.event and asked:  # it happened to the later logs, or did not
+            found.append(screen_event(data, fit, family, arm, np.where(later, fit.residual, 0.0)[None]))
+            own.append(float(screen_event(before, still[0], family, arm).gain.max()))
+            continue
+        if not asked:
             one = Screened(family, np.zeros(1), family.shapes[:1], np.ones(1), 1.0, 0.0, 1)
             found.append(one)
             own.append(np.inf)
@@ -167,7 +171,8 @@ def _bounds(families: Sequence[Family], own: Array, fit: Fit) -> Thresholds:
     joint = np.array([f.joint or 0 for f in families])
     left = np.bincount(fit.data.joint, fit.residual**2, minlength=fit.data.n_joints)
     least = _LEAST * np.append(left.mean(), left)
-    there = [own[(joint == j) & np.isfinite(own)] for j in range(fit.data.n_joints + 1)]
+    once = np.array([f.event for f in families])
+    there = [own[(joint == j) & np.isfinite(own) & ~once] for j in range(fit.data.n_joints + 1)]
     usual = np.array([np.median(some) if len(some) else 0.0 for some in there])
-    gain = np.maximum(_TIMES * np.maximum(own, usual[joint]), least[joint])
+    gain = np.maximum(_TIMES * np.maximum(own, np.where(once, 0.0, usual[joint])), least[joint])
     return Thresholds(gain, own, "reference logs", fit.weight, tuple(f.joint for f in families))
