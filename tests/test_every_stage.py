@@ -51,7 +51,8 @@ def _recording(folder: Path, samples: Path) -> Path:
 
 def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) -> tuple[Any, Any]:
     stage = _stage(module)
-    settings, paths = stage.settings(), (samples / "rrr-closed-form",)
+    settings = stage.settings()
+    paths: tuple[Path, ...] = (samples / "rrr-closed-form",)
     if module in LOGS:
         (tmp_path / "few").mkdir(exist_ok=True)
         paths = (tmp_path / "few",)
@@ -69,7 +70,8 @@ def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) ->
         settings = dataclasses.replace(settings, skip=("diagnose", "extend"))
     if module in ("diagnose", "extend"):
         paths = (written(tmp_path / "brief", session("cogging", 1, 2.0, 1)),)
-        more = {"without": but("cogging"), "replicas": 0, "most": 1} if module == "diagnose" else {"causes": ("cogging:1",)}
+        more: dict[str, Any] = {"without": but("cogging"), "replicas": 0, "most": 1} if module == "diagnose" else {
+            "causes": ("cogging:1",)}
         settings = dataclasses.replace(settings, **more)
     if module == "design_excitation":
         settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()

@@ -1,0 +1,121 @@
+"""`rrrid diagnose` on short sessions of the test bench: the contract of its result, its verdicts, its exit codes.
+
+The library is cut down to a few causes, for speed; with all of them it is asked in test_hidden_effects.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipelines import diagnose
+from pipelines.errors import UsageError
+from pipelines.stage import Outcome, Request, run_stage
+from tests.diagnose.sessions import but, session, written
+
+FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
+TOP = {"verdict", "findings", "standing", "rejected", "detectable", "not_testable", "residual_rms"}
+FINDING = {"cause", "joint", "parameters", "explained", "visibility", "rivals", "experiment", "gain"}
+GAIN = {"validate_torque_rms", "simulated_position_rms", "simulation", "tip_error_rms"}
+
+
+def asked(folder: Path, out: Path, **settings: object) -> Outcome[diagnose.Result]:
+    """The stage, its library cut down."""
+    chosen = diagnose.Settings(**({"without": FEW, "replicas": 0, "most": 1} | settings))  # type: ignore[arg-type]
+    return run_stage(diagnose.STAGE, Request((folder,), out=out, no_report=True, check=True), chosen)
+
+
+@pytest.fixture(scope="module")
+def rippled(tmp_path_factory: pytest.TempPathFactory) -> Outcome[diagnose.Result]:
+    """Cogging at joint 2."""
+    place = tmp_path_factory.mktemp("cogging")
+    return asked(written(place / "logs", session("cogging", 2)), place / "out")
+
+
+def test_the_result_holds_what_the_contract_says(rippled: Outcome[diagnose.Result]) -> None:
+    """Names and nesting of cli-contract.md, in the file itself."""
+    stored = json.loads((rippled.folder / "result.json").read_text())
+    assert set(stored) >= TOP
+    assert stored["verdict"] == "cause"
+    finding = stored["findings"][0]
+    assert set(finding) >= FINDING
+    assert set(finding["gain"]) == GAIN
+    assert set(finding["gain"]["validate_torque_rms"]) == {"before", "after", "ci95"}
+    assert [len(finding["gain"]["validate_torque_rms"][name]) for name in ("before", "after", "ci95")] == [3, 3, 3]
+    assert {len(pair) for pair in finding["gain"]["validate_torque_rms"]["ci95"]} == {2}
+    assert set(finding["gain"]["tip_error_rms"]) == {"before", "after"}
+    assert all(isinstance(x, float) for x in finding["gain"]["tip_error_rms"].values())
+    assert finding["gain"]["simulation"] == "closed-loop"
+    assert all(set(one) == {"value", "std", "unit"} for one in finding["parameters"].values())
+    assert set(stored["residual_rms"]) == {"identify", "validate", "floor"}
+    assert all(set(one) >= {"cause", "joint", "smallest"} for one in stored["detectable"])
+    assert all(set(one["smallest"]) >= {"value", "unit"} for one in stored["detectable"])
+    assert all(set(one) >= {"cause", "reason"} for one in (*stored["not_testable"], *stored["rejected"]))
+
+
+def test_a_cause_is_named_with_its_joint_and_its_numbers(rippled: Outcome[diagnose.Result]) -> None:
+    """Exit 1 under --check; the extended model is better on the held-out log, and the simulated arm nearer."""
+    finding = rippled.result.findings[0]
+    assert (finding.cause, finding.joint, rippled.exit_code) == ("cogging", 2, 1)
+    assert finding.parameters["amplitude"].value == pytest.approx(0.28, rel=0.05)  # 0.4 N m, joint factor 0.7
+    gain = finding.gain
+    assert gain.validate_torque_rms.ci95[1][1] < 0.0
+    assert gain.tip_error_rms is not None
+    assert gain.tip_error_rms.after < gain.tip_error_rms.before
+
+
+def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> None:
+    """Verdict in words, the remedy, the joint, millimetres at the tip; and the figure that proves it."""
+    report = rippled.report
+    assert "Cogging at joint 2" in report.verdict
+    first = report.sections[0]
+    assert any(text.startswith("What to check: ") for text in first.text)
+    assert any(" mm " in text for text in first.text)
+    assert first.figures[0].name == "proof-1"
+    assert {"What this rests on", "What these logs cannot tell"} <= {section.title for section in report.sections}
+
+
+@pytest.mark.parametrize(("cause", "joint"), [("torque_offset", 3), ("quadratic_drag", 1)])
+def test_other_causes_have_other_names(cause: str, joint: int, tmp_path: Path) -> None:
+    found = asked(written(tmp_path / "logs", session(cause, joint)), tmp_path / "out").result
+    assert [(one.cause, one.joint) for one in found.findings] == [(cause, joint)]
+
+
+def test_an_arm_in_order_has_nothing_wrong(tmp_path: Path) -> None:
+    """Exit 0, and it is said what would have been found."""
+    outcome = asked(written(tmp_path / "logs", session()), tmp_path / "out", replicas=2)
+    assert (outcome.result.verdict, outcome.result.findings, outcome.exit_code) == ("nothing-wrong", (), 0)
+    assert {one.cause for one in outcome.result.detectable} >= {"cogging", "torque_offset"}
+    assert outcome.result.floor_origin == "twin"
+
+
+def test_what_the_user_excludes_is_not_named(tmp_path: Path) -> None:
+    """--without cogging: the ripple then has no name, and certainly not that one."""
+    outcome = asked(written(tmp_path / "logs", session("cogging", 2)), tmp_path / "out", without=(*FEW, "cogging"))
+    assert "cogging" not in {one.cause for one in outcome.result.findings}
+    left_out = [text for section in outcome.report.sections for text in section.text if text.startswith("Left out")]
+    assert "Cogging" in left_out[0]
+
+
+def test_paths_go_before_what_logs_say_of_themselves(tmp_path: Path) -> None:
+    """Two logs of role identify, one of them named to judge: it judges. The same one cannot do both."""
+    logs = session("torque_offset", 3)
+    folder = written(tmp_path / "logs", logs)
+    one, other = (str(folder / f"excitation-{k}.h5") for k in (1, 2))
+    turned = asked(folder, tmp_path / "out", identify=(other,), validate=(one,))
+    assert turned.result.held_out == "logs"
+    assert [(found.cause, found.joint) for found in turned.result.findings] == [("torque_offset", 3)]
+    with pytest.raises(UsageError, match="named for identify and for validate"):
+        asked(folder, tmp_path / "out", identify=(str(folder),), validate=(one,))
+
+
+@pytest.mark.parametrize(("settings", "words"), [
+    ({"without": ("cogs",)}, "cogging"), ({"blocks": 1}, "blocks"), ({"replicas": -1}, "replicas"), ({"seed": -1}, "seed"),
+    ({"filter": 0.0}, "low-pass"), ({"most": 0}, "findings")])
+def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path) -> None:
+    folder = written(tmp_path / "logs", session())
+    with pytest.raises(UsageError) as refused:
+        asked(folder, tmp_path / "out", **settings)
+    assert words in str(refused.value)

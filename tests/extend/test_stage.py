@@ -1,0 +1,102 @@
+"""`rrrid extend` on short sessions of the test bench: what is accepted, what is refused, and that the model simulates."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines import extend
+from pipelines.errors import UsageError
+from pipelines.log.files import open_log
+from pipelines.log.model_file import read_model
+from pipelines.model.arm import Arm
+from pipelines.model.named_cause import wanted_cause
+from pipelines.model.simulation import Experiment, simulate
+from pipelines.stage import Outcome, Request, run_stage
+from tests.diagnose.sessions import session, written
+
+
+def extended(folder: Path, out: Path, *causes: str, model: Path | None = None) -> Outcome[extend.Extension]:
+    settings = extend.Settings(causes=causes, model=None if model is None else str(model))
+    return run_stage(extend.STAGE, Request((folder,), out=out, no_report=True, check=True), settings)
+
+
+@pytest.fixture(scope="module")
+def rippled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome[extend.Extension]]:
+    """Cogging at joint 2; extended by that and by a Stribeck hump that is not there."""
+    place = tmp_path_factory.mktemp("extend")
+    folder = written(place / "logs", session("cogging", 2))
+    return folder, extended(folder, place / "out", "cogging:2", "stribeck:2")
+
+
+def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Path, Outcome[extend.Extension]]) -> None:
+    """With the reason, and exit 1 under --check."""
+    _, outcome = rippled
+    result = outcome.result
+    assert [(one.cause, one.joint) for one in result.findings] == [("cogging", 2)]
+    assert [(one.cause, one.joint) for one in result.rejected] == [("stribeck", 2)]
+    assert result.rejected[0].reason
+    assert (result.accepted, outcome.exit_code) == (False, 1)
+    assert "stribeck:2" in outcome.report.verdict
+
+
+def test_the_gain_is_that_of_diagnose(rippled: tuple[Path, Outcome[extend.Extension]]) -> None:
+    """The same keys; held-out torque beyond its bootstrap interval, and the simulated arm nearer."""
+    stored = json.loads((rippled[1].folder / "result.json").read_text())
+    gain = stored["gain"]
+    assert set(gain) == {"validate_torque_rms", "simulated_position_rms", "simulation", "tip_error_rms"}
+    assert gain["validate_torque_rms"]["ci95"][1][1] < 0.0
+    assert gain["simulated_position_rms"]["after"][1] < 0.5 * gain["simulated_position_rms"]["before"][1]
+
+
+def test_the_model_is_refitted_and_simulates(rippled: tuple[Path, Outcome[extend.Extension]]) -> None:
+    """model.json holds base parameters and friction with deviations, the effect, its logs; read back it predicts a held-out log's
+    positions better than the same arm without the effect."""
+    folder, outcome = rippled
+    model = read_model(outcome.folder / "model.json")
+    assert [(one.effect, one.joint) for one in model.effects] == [("cogging", 2)]
+    assert all(p.std is not None and p.std > 0.0 for p in model.base_parameters if p.origin == "fitted")
+    assert {source.role for source in model.sources} == {"identify", "validate"}
+    assert model.validity is not None
+    log = open_log(folder / "excitation-2.h5").log
+    experiment = Experiment.of_log(log).part(0, 1000)
+    arm = Arm.from_model(model)
+    off = [np.abs(simulate(one, experiment).q[0] - log.q[:1000])[:, 1].max() for one in (arm, arm.nominal)]
+    assert off[0] < 0.5 * off[1]
+
+
+def test_a_model_keeps_its_effects(rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path) -> None:
+    """Extended by something that is not there, a model with cogging still has it, fitted anew."""
+    folder, outcome = rippled
+    again = extended(folder, tmp_path / "out", "torque_offset:3", model=outcome.folder / "model.json").result
+    assert [(one.cause, one.joint) for one in again.findings] == [("cogging", 2)]
+
+
+def test_nothing_is_written_where_nothing_is_accepted(tmp_path: Path) -> None:
+    outcome = extended(written(tmp_path / "logs", session()), tmp_path / "out", "quadratic_drag:1")
+    assert (outcome.result.findings, outcome.result.model, outcome.exit_code) == ((), None, 1)
+    assert not (outcome.folder / "model.json").exists()
+    assert "no model was written" in outcome.report.verdict
+
+
+def test_a_start_is_where_the_search_begins() -> None:
+    """cogging:2:order=18 starts at 18; an amplitude is fitted, whatever it is said to be."""
+    effect, start = wanted_cause("cogging:2:order=18", (True,) * 3)
+    assert (effect.name, effect.joint, start) == ("cogging", 2, {"order": 18.0})
+    assert wanted_cause("gravity_tilt", (True,) * 3)[0].joint is None
+    with pytest.raises(UsageError, match="amplitude is fitted"):
+        wanted_cause("cogging:2:amplitude=0.1", (True,) * 3)
+
+
+@pytest.mark.parametrize(("causes", "words"), [
+    ((), "no cause"), (("cogs:1",), "cogging"), (("cogging",), "takes a joint"), (("cogging:7",), "1 to 3"),
+    (("coulomb:1",), "has it already"), (("payload",), "base parameters"), (("contact",), "happens once")])
+def test_causes_that_no_model_takes_are_refused(causes: tuple[str, ...], words: str, tmp_path: Path) -> None:
+    folder = written(tmp_path / "logs", [replace(session()[0], role="identify")])
+    with pytest.raises(UsageError) as refused:
+        extended(folder, tmp_path / "out", *causes)
+    assert words in str(refused.value)
