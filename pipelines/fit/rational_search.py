@@ -16,7 +16,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.fit.rational import Array, Complex, Rational, known_part, product
 
-__all__ = ["fit_rational"]
+__all__ = ["fit_rational", "scattered"]
 
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # tried for a new pair of poles
 _FREQUENCIES = 150  # tried for it
@@ -86,6 +86,26 @@ def fit_rational(frequency: Array, response: Complex, variance: Array, *, integr
         if waited >= _PATIENCE:
             break
     return best
+
+
+def scattered(model: Rational, frequency: Array, responses: Complex, variance: Array, floor: float = 1e-3) -> Rational:
+    """The same function, its covariance that of the parameters from one of `responses` (parts, bins) to the next.
+
+    Each moves them by one Gauss-Newton step from those of the fit; `variance` (bins,) weighs the bins, as it did there.
+    """
+    _, data = _prepare(frequency, model.response(frequency), variance, model.integrators, model.hold, True, 1.0, np.inf, floor)
+    good = np.isfinite(variance) & (frequency > 0.0)
+    _, slope = _residual(data, model.parameters, model.zeros)
+    free = np.diag(model.covariance) > 0.0
+    normal = _normal(np.ascontiguousarray(slope[free]), np.ones(len(data.s)))
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse = np.linalg.pinv(normal / scale / scale[:, None], rcond=1e-14, hermitian=True) / scale / scale[:, None]
+    rest = (responses[:, good] / known_part(np.asarray(2j * np.pi * frequency[good]), model.integrators, model.hold)
+            - data.target) * data.weight
+    steps = (np.conj(slope[free]) @ rest.T).real.T @ inverse
+    covariance = np.zeros_like(model.covariance)
+    covariance[np.ix_(free, free)] = np.cov(steps.T)
+    return replace(model, covariance=covariance)
 
 
 def _prepare(frequency: Array, response: Complex, variance: Array, integrators: int, hold: float, with_delay: bool,

@@ -3,7 +3,8 @@
     modes = fitted_modes(measured)
 
 The response over the sampled double integrator is the acceleration beside that of a rigid body that the controller's model
-describes: 1 where that model is right, whatever the hold does. A rational function is fitted to it. An antiresonance with a
+describes: 1 where that model is right, whatever the hold does. A rational function is fitted to it. Deviations hold noise, and
+how far a mode moves along the turn (along.py). An antiresonance with a
 resonance above it is a part that gives way; what it carries drops out above it, and the level rises by (f_r / f_a)².
 """
 
@@ -14,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.fit.rational import Known, Mode, Rational
-from pipelines.fit.rational_search import fit_rational
+from pipelines.fit.rational_search import fit_rational, scattered
 from pipelines.log.experiment import Array
+from pipelines.model.frf.along import along_turn
 from pipelines.model.frf.controller import Complex, loop_delay
 from pipelines.model.frf.responses import Measured, double_integrator
 from pipelines.signal.frequency_response import FrequencyResponse
@@ -94,8 +96,9 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     relative = relative_acceleration(measured)
     part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
     fit = _fitted(part)
-    modes = tuple(_with_friction(m) for m in fit.modes() if _is_mode(m, part.resolution))
-    traces = tuple(_with_friction(m) for m in fit.modes() if not m.distinct and _is_trace(m, part.resolution))
+    moving = _moving(measured, part, fit)
+    modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution))
+    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m, part.resolution))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
@@ -180,6 +183,22 @@ def _is_mode(mode: Mode, resolution: float) -> bool:
 
 def _is_trace(mode: Mode, resolution: float) -> bool:
     return _is_mode(replace(mode, distinct=True), resolution) and mode.damping.value > _SEEN * mode.damping.std
+
+
+def _moving(measured: Measured, part: FrequencyResponse, fit: Rational) -> list[tuple[Mode, Mode]]:
+    """Each mode as the fit has it, and as uncertain as its movement along the turn makes it: what parts scatter beyond noise."""
+    modes = fit.modes()
+    along = along_turn(measured, part.frequency)
+    if along is None or not modes:
+        return [(m, m) for m in modes]
+    relative = along.response / _rigid(measured, part.frequency)
+    seen = scattered(fit, part.frequency, relative, part.variance).modes()
+
+    def wider(mean: Known, one: Known) -> Known:
+        return Known(mean.value, float(np.sqrt(mean.std**2 + max(one.std**2 - along.noise * mean.std**2, 0.0))))
+
+    return [(m, replace(m, frequency=wider(m.frequency, s.frequency), damping=wider(m.damping, s.damping)))
+            for m, s in zip(modes, seen, strict=True)]
 
 
 def _with_friction(mode: Mode) -> Mode:

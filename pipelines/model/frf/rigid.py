@@ -10,18 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from pipelines.errors import RrridError
-from pipelines.log.experiment import Array
 from pipelines.log.model_file import parse_model
 from pipelines.model.arm import Arm
 from pipelines.model.frf.experiment import Turned
 from pipelines.model.frf.responses import Measured
 
 __all__ = ["Expected", "expected_rigid"]
-
-_ANGLES = 16  # of the turn, over which the inertia is averaged
 
 
 @dataclass(frozen=True)
@@ -59,10 +54,6 @@ def _controllers(turned: Turned) -> Arm | None:
 
 
 def _inertia(arm: Arm, turned: Turned) -> float:
-    """D_jj in the posture, mean over the turn of joint j."""
+    """D_jj in the posture; the angle of joint j itself does not change it."""
     j = turned.joint - 1
-    postures = np.repeat(turned.posture[None], _ANGLES, axis=0)
-    if turned.speed > 0.0 and arm.robot.joints[j].revolute:
-        postures[:, j] += np.linspace(0.0, 2.0 * np.pi, _ANGLES, endpoint=False)
-    matrices: Array = arm.body.mass_matrix(postures, arm.p)
-    return float(matrices[:, j, j].mean())
+    return float(arm.body.mass_matrix(turned.posture[None], arm.p)[0, j, j])
