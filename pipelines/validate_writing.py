@@ -36,6 +36,8 @@ from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
+_LONGEST = 200  # letters, or moves: minutes of writing, and seconds of planning
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -200,6 +202,10 @@ def _refuse_strange(settings: Settings) -> None:
                          remedy="give a relative error above 0")
     if not 1 <= settings.draws <= 1000:
         raise UsageError("C02", f"{settings.draws} draws", where="--draws", remedy="give 1 to 1000")
+    if settings.via_points is not None and settings.via_points > _LONGEST:
+        raise UsageError("C02", f"{settings.via_points} via points", where="--via-points", remedy=f"give {_LONGEST} at most")
+    if settings.text is not None and len(settings.text) > _LONGEST:
+        raise UsageError("C02", f"a text of {len(settings.text)} letters", where="--text", remedy=f"give {_LONGEST} at most")
     if settings.seed < 0:
         raise UsageError("C02", f"the seed {settings.seed} is negative", where="--seed", remedy="give 0 or more")
 

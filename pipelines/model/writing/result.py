@@ -75,9 +75,9 @@ class Result:
 
 
 def pooled(logs: Sequence[FirstValidation]) -> TorqueError | None:
-    """Over the writing logs, or over all where none is; None of no log."""
+    """Over the writing logs; without any over those that move, for at rest friction is undetermined; None of no log."""
     writing = [log for log in logs if log.experiment == "writing"]
-    some = writing or list(logs)
+    some = writing or [log for log in logs if log.experiment != "hold"] or list(logs)
     if not some:
         return None
     counts = np.array([log.samples for log in some], dtype=float)[:, None]
