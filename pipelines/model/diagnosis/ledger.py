@@ -27,6 +27,7 @@ class Tried:
     log: int | None
     done: Refined
     error: float  # squared weighted error as a share of that before: held out; of an event, of the logs it happened in
+    rank: float  # lowest first: the same, and what is left of the fitted logs, on a par
     visibility: float
 
     @property

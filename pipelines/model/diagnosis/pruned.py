@@ -9,10 +9,12 @@ from pipelines.model.diagnosis.findings import sure
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.search import Case, Found, held_out
 from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.effects.base import Effect
 
 __all__ = ["settled"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
+_LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
 
 
 def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared) -> tuple[Found, Ruling]:
@@ -23,16 +25,37 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared) -> tup
     kept = [k for k in ruling.named if not doubts[k]]
     final = _without(found, kept, case)
     while len(kept) > 1:
-        always = [k for k in kept if found.final.model.effects[k].log is None]
-        errors = {k: held_out(_without(found, [other for other in kept if other != k], case, final), case) for k in always}
-        least = min(errors, key=lambda k: errors[k], default=None)
-        if least is None or errors[least] > (1.0 + _PAYS) * held_out(final, case):
+        idle = _idle(found, kept, case, final)
+        if idle is None:
             break
-        kept.remove(least)
+        kept.remove(idle)
         final = _without(found, kept, case, final)
     if not kept:
         return replace(found, final=found.nominal), Ruling("unknown", (), next(iter(doubts.values())))
     return replace(found, final=final), replace(ruling, named=tuple(kept))
+
+
+def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | None:
+    """The cause that is missed least, if it is missed so little that it would not have been found beside the others."""
+    least, share = None, 1.0
+    error = held_out(final, case)
+    for k in kept:
+        one = found.final.model.effects[k]
+        if one.log is not None:
+            continue
+        rest = _without(found, [other for other in kept if other != k], case, final)
+        missed = (rest.rss - final.rss) / max(_bound(case, one.effect, final), 1e-300)
+        if held_out(rest, case) <= (1.0 + _PAYS) * error:
+            missed = min(missed, 0.999)
+        if missed < share:
+            least, share = k, missed
+    return least
+
+
+def _bound(case: Case, effect: Effect, final: Refined) -> float:
+    """Squared weighted residual that the cause has to take away."""
+    place = next(k for k, family in enumerate(case.families) if (family.cause, family.joint) == (effect.name, effect.joint))
+    return _LEAST * final.rss if case.thresholds is None else float(case.thresholds.at(final.weight).gain[place])
 
 
 def _without(found: Found, kept: list[int], case: Case, weighted: Refined | None = None) -> Refined:

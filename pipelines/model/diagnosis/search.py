@@ -135,7 +135,7 @@ def _explored(case: Case, now: Refined) -> Explored:
     error = held_out(now, case)
     able = [one for one in order if one.family.shapes[0].evidence in case.nameable]
     tried = [_fitted(case, now, one, error) for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
-    return Explored(now, error, tuple(screened), tuple(sorted(tried, key=lambda one: one.error)))
+    return Explored(now, error, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
 
 
 def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
@@ -168,10 +168,10 @@ def _fewest(tried: Sequence[Tried]) -> Tried | None:
     possible = [one for one in tried if one.error < 1.0 and one.possible]
     if not possible:
         return None
-    least = possible[0].error
-    near = [one for one in possible if one.error - least <= _PARSIMONY * (1.0 - least)
+    least = possible[0].rank
+    near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least)
             and one.screened.joint == possible[0].screened.joint]
-    return min(near, key=lambda one: (one.done.model.effects[-1].count, one.error))
+    return min(near, key=lambda one: (one.done.model.effects[-1].count, one.rank))
 
 
 def _fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
@@ -181,7 +181,9 @@ def _fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     effect = one.shape[0].full()
     table = _laid(case.data, effect, now.model.arm)
     done = refine(now.model.with_effect(effect, _amplitudes(now.fit, table)), case.data, now.weight)
-    return Tried(one, effect, None, done, held_out(done, case) / error, _visibility(now, table))
+    left = held_out(done, case) / error
+    rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
+    return Tried(one, effect, None, done, left, rank, _visibility(now, table))
 
 
 def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:
@@ -190,13 +192,14 @@ def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     whole = _laid(case.data, effect, now.model.arm)
     table = whole if log is None else np.where(case.data.log_of == log - case.data.first, whole, 0.0)
     once = refine(now.model.with_effect(effect, _amplitudes(now.fit, table), log), case.data, now.weight)
-    tried = Tried(one, effect, log, once, once.rss / now.rss, _visibility(now, table))
+    tried = Tried(one, effect, log, once, once.rss / now.rss, once.rss / now.rss, _visibility(now, table))
     if case.judge is None or log is None:
         return tried
     named = once.model.effects[-1]
     always = refine(now.model.with_effect(named.effect, np.array(named.amplitudes)), case.data, now.weight)
     seen = held_out(always, case) / error
-    return Tried(one, effect, None, always, seen, tried.visibility) if seen < _CONFIRMED else tried
+    rank = float(np.sqrt(seen * always.rss / now.rss))
+    return Tried(one, effect, None, always, seen, rank, tried.visibility) if seen < _CONFIRMED else tried
 
 
 def _visibility(now: Refined, table: Array) -> float:
