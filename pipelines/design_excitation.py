@@ -29,6 +29,7 @@ from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
+from pipelines.model.excitation.apart import Pair, told_apart
 from pipelines.model.excitation.bounds import parse_bounds
 from pipelines.model.excitation.design import Design, Effort, design
 from pipelines.model.excitation.earlier import USED, first_mode, information_of
@@ -38,6 +39,7 @@ from pipelines.model.excitation.outputs import coefficients, joint_motion, log_o
 from pipelines.model.excitation.rehearse import rehearse, rehearsed
 from pipelines.model.excitation.result import CostOfLimit, Result
 from pipelines.model.excitation.task import Task, Wishes, plan_task
+from pipelines.model.named_cause import wanted_cause
 from pipelines.model.writing.planned import planned_log
 from pipelines.report.excitation_report import excitation_report
 from pipelines.report.report import Report
@@ -47,6 +49,7 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 PURPOSES = ("excitation", "friction", "frf", "hold")
 _REHEARSED = 10.0  # [s]
+_APART_HARMONICS = (20,)  # a search without gradients wants fewer
 
 
 @dataclass(frozen=True)
@@ -78,11 +81,13 @@ class Settings:
     recipe: str | None = None  # whose inverse writes controller.csv
     mode_factor: float = 3.0  # the top harmonic stays so many times below the first mode that --after knows
     rehearse: bool = True
+    tell_apart: tuple[str, ...] = ()  # two causes, CAUSE[:JOINT[:NAME=VALUE]], that the motion shall tell apart
 
     @property
     def wishes(self) -> Wishes:
         bands = tuple(zip(self.keep_out[::2], self.keep_out[1::2], strict=False))
-        return Wishes(self.criterion, self.cond_max, self.harmonics, self.frequency, bands, None, self.rest, self.home,
+        harmonics = self.harmonics if self.harmonics or not self.tell_apart else _APART_HARMONICS
+        return Wishes(self.criterion, self.cond_max, harmonics, self.frequency, bands, None, self.rest, self.home,
                       self.symmetric, self.friction, self.noise, self.torque_share, self.tip_speed, self.tip_box,
                       self.sample_time, self.periods)
 
@@ -198,8 +203,27 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     task = plan_task(given.robot, given.arm, wishes, told, bounds)
     if settings.purpose != "excitation":
         return _plans(task, settings, given)
-    found = design(task, Effort(settings.seconds, settings.evaluations, given.tell), settings.seed)
-    return _result(task, found, settings, given, tuple(log.name for log in logs), mode)
+    after, apart = tuple(log.name for log in logs), None
+    pair = _pair(settings, given.robot)
+    share = 1.0 if pair is None else 0.5
+    found = design(task, Effort(share * settings.seconds, settings.evaluations, given.tell), settings.seed)
+    if pair is not None and not found.stopped:
+        found, apart = told_apart(task, found, pair, share * settings.seconds, settings.evaluations, settings.seed, given.tell)
+    return replace(_result(task, found, settings, given, after, mode), apart=apart)
+
+
+def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
+    """The two causes to tell apart."""
+    if not settings.tell_apart:
+        return None
+    if len(settings.tell_apart) != 2 or settings.purpose != "excitation":
+        raise UsageError("C02", "two causes are told apart, by an excitation", where="--tell-apart",
+                         remedy="write --tell-apart spring:2 cogging:2")
+    if not settings.rest:
+        raise UsageError("C02", "a motion that tells causes apart starts and ends at rest", where="--no-rest",
+                         remedy="leave it out")
+    (a, first), (b, second) = (wanted_cause(text, robot.revolute, "--tell-apart") for text in settings.tell_apart)
+    return Pair(a, b, (first, second))
 
 
 def _refuse_strange(settings: Settings) -> None:

@@ -218,6 +218,8 @@ def design_excitation(
     tip_speed: Annotated[float | None, typer.Option(help="Limit on the speed of the tip [m/s].")] = None,
     tip_box: Annotated[list[str] | None, typer.Option(help="Box for the tip [m]: x from,to, y from,to, z from,to.")] = None,
     recipe: Annotated[str | None, typer.Option(help="Recipe of import: controller.csv in its order, units and rate.")] = None,
+    tell_apart: Annotated[tuple[str, str] | None, typer.Option(
+        metavar="CAUSE CAUSE", help="Two causes that the motion shall tell apart: spring:2 cogging:2:order=1.")] = None,
 ) -> None:
     """Design the excitation, or another experiment, that tells most within the robot's limits."""
     from pipelines.design_excitation import STAGE
@@ -229,7 +231,7 @@ def design_excitation(
         "keep_out": numbers(keep_out, "--keep-out"), "seconds": seconds, "evaluations": evaluations, "seed": seed,
         "symmetric": symmetric, "model": model, "bounds": bounds, "home": numbers(home, "--home"),
         "rest": False if no_rest else None, "periods": periods, "friction": friction, "tip_speed": tip_speed,
-        "tip_box": numbers(tip_box, "--tip-box"), "recipe": recipe})
+        "tip_box": numbers(tip_box, "--tip-box"), "recipe": recipe, "tell_apart": tell_apart})
 
 
 @app.command("validate-writing", cls=StageCommand)

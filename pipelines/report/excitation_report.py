@@ -29,8 +29,23 @@ def excitation_report(result: Result) -> Report:
     """The motion, its limits, what it tells; of other experiments their plans."""
     if result.purpose != "excitation":
         return _plans_report(result)
-    sections = (_safety(result), _motion(result), _limits(result), _told(result), _certificate(result), _comparison(result))
+    sections = (_safety(result), _motion(result), _limits(result), _told(result), _apart(result), _certificate(result),
+                _comparison(result))
     return Report("Excitation", _verdict(result), _tone(result), _key_figures(result), tuple(s for s in sections if s is not None))
+
+
+def _apart(result: Result) -> Section | None:
+    """How well two causes can be told apart in it."""
+    found = result.apart
+    if found is None:
+        return None
+    rows = tuple((name, one.similarity, *one.visibility, one.condition_number)
+                 for name, one in (("design for the parameters alone", found.before), ("this design", found.after)))
+    a, b = found.causes
+    words = ("Similarity: how much of one cause the other can imitate, when base parameters and friction are fitted beside both; "
+             "from 0.8 on diagnose calls them rivals. Visible: what base parameters and friction cannot take up.")
+    return Section(f"Telling {a} from {b}", (words,), (Table(
+        ("motion", "similarity", f"{a}, visible", f"{b}, visible", "condition number"), rows),))
 
 
 def _tone(result: Result) -> Tone:
@@ -54,6 +69,9 @@ def _verdict(result: Result) -> str:
         said.append(f"and will show the parameters to {format_number(100 * result.predicted_relative_std, 3)} % (predicted, root "
                     "mean square of their relative standard deviations)")
     text = " ".join(said)
+    if result.apart is not None:
+        before, after = (format_number(one.similarity, 2) for one in (result.apart.before, result.apart.after))
+        text += f"; {' and '.join(result.apart.causes)} look alike by {after}, in a design for the parameters alone by {before}"
     if not result.reached and result.ceiling is not None:
         dear = result.dearest
         text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"

@@ -23,7 +23,7 @@ from pipelines.model.excitation.verify import GRID, Peak, peaks, worst
 from pipelines.model.rigid.body import Array
 from pipelines.signal.fourier import good_size
 
-__all__ = ["Design", "Effort", "design", "landscape"]
+__all__ = ["Design", "Effort", "design", "finished", "landscape"]
 
 _COARSE, _FINE, _FINISH = 8, 10, 20  # samples of a period for each harmonic
 _FEWEST = 200  # samples of a period: fewer do not show what friction does
@@ -89,15 +89,20 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
     ended = Best()
     polish(finish, x, _FINISHING, Budget(None, int(np.clip(budget.done // 10, *_FINISH_EVALUATIONS))), ended)
     x = x if ended.x is None else ended.x
+    return finished(task, finish, x, budget.done, best.evaluation, stopped, task.problem.goal.ceiling is None or best.score < FAR)
+
+
+def finished(task: Task, finish: DesignProblem, x: Array, evaluations: int, found_at: int, stopped: int, reached: bool) -> Design:
+    """The design at `x`, made smaller until its limits hold between samples too, with run-in where it wants one."""
     x, factor = _within(task, finish, x)
     trajectory = Trajectory(finish.space.series(x), task.periods)
     if not task.rest:
         trajectory = with_run_in(task, trajectory)
     found = _peaks(task, trajectory)
     cost = tuple(float(c) for c in finish.cost(finish.sized(x, 0.9999, 1.0)))
-    return Design(trajectory, budget.done, best.evaluation, stopped,
+    return Design(trajectory, evaluations, found_at, stopped,
                   tuple(replace(peak, cost=share) for peak, share in zip(found, cost, strict=True)), factor, cost,
-                  task.problem.goal.ceiling is None or best.score < FAR)
+                  reached)
 
 
 def _progress(task: Task, done: int, best: Best) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.recording.controller_side import ControllerTable
 from pipelines.log.results import NOT_STORED
+from pipelines.model.excitation.apart import Apart
 from pipelines.model.excitation.others import Plan
 from pipelines.model.excitation.outcome import Compared, Course, ParameterStd
 from pipelines.model.excitation.rehearse import Rehearsal
@@ -96,6 +97,7 @@ class Result:
     rehearsal: Rehearsal | None = None
     rehearsal_failed: str = ""
     rehearsals: tuple[tuple[str, Rehearsal], ...] = ()  # of plans, by name
+    apart: Apart | None = None  # of a design that tells two causes apart
     logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
     table: ControllerTable | None = field(default=None, metadata=NOT_STORED)
     coefficients: dict[str, object] | None = field(default=None, metadata=NOT_STORED)
