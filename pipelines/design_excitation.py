@@ -191,6 +191,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     if len(settings.keep_out) % 2:
         raise UsageError("C02", "bands to stay out of are pairs of frequencies", where="--keep-out", remedy="write 5,8 [Hz]")
     _refuse_strange(settings)
+    pair = _pair(settings, given.robot)
     mode = first_mode(given.modes)
     wishes = replace(settings.wishes, top_hz=None if mode is None else mode / settings.mode_factor)
     logs = [o.log for o in inputs.logs if o.log.origin != "planned" and o.log.experiment in USED and o.log.role == "identify"]
@@ -204,7 +205,6 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     if settings.purpose != "excitation":
         return _plans(task, settings, given)
     after, apart = tuple(log.name for log in logs), None
-    pair = _pair(settings, given.robot)
     share = 1.0 if pair is None else 0.5
     found = design(task, Effort(share * settings.seconds, settings.evaluations, given.tell), settings.seed)
     if pair is not None and not found.stopped:

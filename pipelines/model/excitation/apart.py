@@ -84,8 +84,8 @@ def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluat
     if min(before.visibility) < _RANK:
         raise UsageError("C02", "one of the two shows in no motion: the base parameters take it up", where="--tell-apart",
                          remedy="see what diagnose says of it under not_testable")
-    ceiling = max(task.problem.goal.ceiling or np.inf, before.condition_number) if not designed.reached else (
-        task.problem.goal.ceiling or np.inf)
+    wanted = task.problem.goal.ceiling or np.inf
+    ceiling = max(wanted, before.condition_number)  # where the plain design did not reach it, this one is no worse
     rng, size, done, until = np.random.default_rng([seed, 9]), _FIRST, 0, time.process_time() + seconds
     stopped = designed.stopped
     try:
@@ -102,7 +102,7 @@ def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluat
     except Interrupted as signal:  # whoever stops the search wants what it has found by then
         stopped = signal.exit_code
     after = finished(task, landscape(task, 1, 20), x, designed.evaluations + done, designed.evaluations + done, stopped,
-                     designed.reached)
+                     now.condition_number <= wanted)
     last = alike(task, arm, after.trajectory.series.samples(problem.samples), pair)
     names = tuple(one.name if one.joint is None else f"{one.name}:{one.joint}" for one in (pair.first, pair.second))
     return after, Apart((names[0], names[1]), before, last, done)

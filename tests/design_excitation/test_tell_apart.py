@@ -1,0 +1,92 @@
+"""`design-excitation --tell-apart`: causes that look alike in a plain design can be told in this one, within the same limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines import design_excitation
+from pipelines.errors import UsageError
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.files import open_log
+from pipelines.model.rigid.choose import rigid_body
+from pipelines.stage import Outcome, Request, run_stage
+
+Result = design_excitation.Result
+NOISE = 0.05  # [N m] rms
+
+
+def designed(out: Path, *causes: str, **more: object) -> Outcome[Result]:
+    settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=150, rehearse=False, tell_apart=causes,
+                                          **more)  # type: ignore[arg-type]
+    return run_stage(design_excitation.STAGE, Request((), out=out, no_report=True), settings)
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome[Result]]:
+    """A plain design, and one that tells a spring at joint 2 from a torque offset there."""
+    out = tmp_path_factory.mktemp("apart")
+    return {"plain": designed(out / "plain"), "apart": designed(out / "apart", "spring:2", "torque_offset:2")}
+
+
+def trajectory(outcome: Outcome[Result]) -> ExperimentLog:
+    return open_log(outcome.folder / "trajectory.h5").log
+
+
+def missed(log: ExperimentLog) -> float:
+    """What an offset at joint 2 leaves of the torque of a spring there, fitted with base parameters and friction, in N m rms: by
+    NumPy's least squares, apart from everything that made the design."""
+    q, dq, ddq = log["q_ref"], log["dq_ref"], log["ddq_ref"]
+    regressor = rigid_body(log.robot).regressor(q, dq, ddq)
+    own = np.zeros((len(q), 3, 7))
+    for j in range(3):
+        own[:, j, 2 * j], own[:, j, 2 * j + 1] = np.tanh(200.0 * dq[:, j]), dq[:, j]
+    own[:, 1, 6] = 1.0
+    table: Array = np.concatenate([regressor, own], axis=2).reshape(3 * len(q), -1)
+    spring = np.zeros((len(q), 3))
+    spring[:, 1] = 2.5 * 0.7 * q[:, 1]  # full strength of causes.md
+    table = table / np.maximum(np.linalg.norm(table, axis=0), 1e-12)
+    left = spring.ravel() - table @ np.linalg.lstsq(table, spring.ravel(), rcond=1e-10)[0]
+    return float(np.sqrt(np.mean(left.reshape(-1, 3)[:, 1] ** 2)))
+
+
+def test_the_two_look_less_alike(both: dict[str, Outcome[Result]]) -> None:
+    found = both["apart"].result.apart
+    assert found is not None
+    assert found.causes == ("spring:2", "torque_offset:2")
+    assert found.after.similarity < 0.95 * found.before.similarity
+    assert both["plain"].result.apart is None
+    assert "look alike by" in both["apart"].report.verdict
+
+
+def test_what_one_leaves_of_the_other_stands_above_the_noise(both: dict[str, Outcome[Result]]) -> None:
+    """More of it than in the plain design, and a multiple of what ten seconds of noise make of a torque."""
+    assert missed(trajectory(both["apart"])) > missed(trajectory(both["plain"]))
+    assert missed(trajectory(both["apart"])) > 3.0 * NOISE
+
+
+def test_limits_and_ceiling_are_kept(both: dict[str, Outcome[Result]]) -> None:
+    """As in any design: a condition number of 3 where that was reached, and no limit broken."""
+    result = both["apart"].result
+    assert result.condition_number is not None
+    assert result.condition_number <= 3.0 * (1.0 + 1e-6)
+    assert result.reached
+    assert all(one.share <= 1.0 for one in result.limits)
+
+
+def test_a_seed_and_a_number_of_evaluations_give_it_again(both: dict[str, Outcome[Result]], tmp_path: Path) -> None:
+    again = designed(tmp_path / "again", "spring:2", "torque_offset:2")
+    np.testing.assert_array_equal(trajectory(again)["q_ref"], trajectory(both["apart"])["q_ref"])
+
+
+@pytest.mark.parametrize(("causes", "more", "words"), [
+    (("spring:2",), {}, "two causes"), (("spring:2", "cogs:2"), {}, "cogging"), (("spring:2", "torque_offset:7"), {}, "1 to 3"),
+    (("spring:2", "torque_offset:2"), {"purpose": "hold"}, "excitation"),
+    (("spring:2", "torque_offset:2"), {"rest": False}, "at rest"),
+    (("spring:2", "rotor_inertia:1"), {}, "no motion")])
+def test_what_cannot_be_told_apart_is_refused(causes: tuple[str, ...], more: dict[str, object], words: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError) as refused:
+        designed(tmp_path / "out", *causes, **more)
+    assert words in str(refused.value)
