@@ -12,7 +12,7 @@ import pytest
 from pipelines import frf
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.frf import Settings
-from pipelines.log.experiment import ExperimentLog
+from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.files import Opened, open_log, write_log
 from pipelines.model.frf.result import Posture
 from pipelines.stage import Inputs, Outcome, Request, run_stage
@@ -156,3 +156,20 @@ def test_too_short_is_rejected() -> None:
     with pytest.raises(InputRejected) as caught:
         computed(replace(LINK, seconds=2.5).log())
     assert caught.value.code == "RRID-T08"
+
+
+def test_an_input_of_the_wrong_sign_is_rejected() -> None:
+    """Not half a turn of phase taken for a delay: S14."""
+    log = LINK.log()
+    with pytest.raises(InputRejected) as caught:
+        computed(replace(log, signals={**log.signals, "r": Signal(-log["r"], "rad/s^2", "input")}))
+    assert caught.value.code == "RRID-S14"
+
+
+def test_noise_alone_names_nothing() -> None:
+    """A position that answers nothing: gated by its coherence, no finding."""
+    log = LINK.log()
+    noise = 1e-6 * np.random.default_rng(5).standard_normal(log.q.shape)
+    result = computed(replace(log, signals={**log.signals, "q": Signal(log["q_ref"] + noise, "rad", "position")}))
+    assert [one.kind for one in result.classification] == []
+    assert any(check.gate for check in result.doctor)

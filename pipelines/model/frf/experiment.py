@@ -32,6 +32,7 @@ _SETTLE = 0.5  # [s] after the speed has become constant
 _SHORTEST = 1.0  # [s] a stretch is worth
 _STILL = 1e-3  # [rad/s] a slower joint does not turn
 _SAME = 1e-9  # of the largest v: two periods are equal
+_LINE = 1e-3  # of the strongest line's amplitude: what is weaker is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +74,29 @@ class Turned:
         forwards, backwards = self.mean_input
         return None if forwards is None or backwards is None else 0.5 * (forwards - backwards)
 
+    @property
+    def lines(self) -> tuple[int, ...]:
+        """Harmonics of the period that v holds; none where it does not repeat."""
+        if self.period is None:
+            return ()
+        size = np.abs(np.fft.rfft(np.nan_to_num(self.whole[:self.period, V])))
+        return tuple(np.flatnonzero(size > _LINE * size.max()).tolist())
+
     def settings(self) -> tuple[object, ...]:
         """What two logs must share to be averaged, but for their posture."""
         c = self.controller
         gains = () if c is None or c.kp is None or c.kd is None else (float(c.kp[self.joint - 1]), float(c.kd[self.joint - 1]))
         model = "" if c is None or c.model is None else c.model
-        return self.joint, self.quantity, self.sample_time, gains, c.delay if c else None, c.velocity if c else None, model
+        law = (None, None) if c is None else (c.delay, c.velocity)
+        return self.joint, self.quantity, self.sample_time, self.period, gains, *law, model
 
 
 def turned_joint(log: ExperimentLog) -> Turned:
     """The excited joint's signals at constant speed.
 
     Raises:
-        InputRejected: S01, a signal or attribute is missing; T05, uneven sampling; D09, v does not excite; T08, nothing of it
-            lasts at constant speed.
+        InputRejected: S01, a signal or attribute is missing; T05, uneven sampling; D09, v does not excite; D04, input or position
+            is constant; T08, nothing of it lasts at constant speed.
     """
     joint, quantity = _described(log)
     good = usable(log)
@@ -98,6 +108,11 @@ def turned_joint(log: ExperimentLog) -> Turned:
     if not np.isfinite(v).any() or float(np.nanstd(v)) <= 0.0:
         raise InputRejected("D09", f"v does not excite joint {joint}", where=log.source or log.name,
                             remedy="inject a multisine or noise at that joint (design-excitation --for frf plans it)")
+    for name in (quantity, "q"):
+        channel = mended[name][:, j]
+        if not np.isfinite(channel).any() or float(np.nanstd(channel)) <= 0.0:
+            raise InputRejected("D04", f"{name} of joint {joint} is constant while v excites it", where=log.source or log.name,
+                                remedy="look at this channel in the recording")
     reference = mended["q_ref"][:, j] if "q_ref" in mended else _straight(mended.q[:, j])
     signals = np.column_stack([v, mended[quantity][:, j], mended.q[:, j] - reference, mended.tau[:, j]])
     speed = mended["dq_ref"][:, j] if "dq_ref" in mended else _speed(mended.q[:, j], log.sample_time)

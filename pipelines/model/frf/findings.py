@@ -16,15 +16,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from pipelines.errors import InputRejected
 from pipelines.fit.rational import Known
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
-from pipelines.model.frf.modes import BAND, Modes, fitted_modes
+from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration
 from pipelines.model.frf.responses import How, Measured, measured_responses
 from pipelines.model.frf.rigid import Expected, expected_rigid
 
 __all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings"]
+
+
+_SLOW = (BAND[0], 20.0)  # [Hz] where friction and delay turn the phase by less than a right angle
+_RELIABLE = 0.7  # coherence
+_FEWEST = 3  # bins
+_AGAINST = -0.5  # cosine of the phase: beyond 120°
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +68,16 @@ def frf_findings(logs: Iterable[ExperimentLog], arm: Arm | None = None, how: How
         band: [Hz] in which modes are looked for.
 
     Raises:
-        InputRejected: a log that no spectrum can be taken of, with what to record: S01, T05, T08, D09.
+        InputRejected: a log that no spectrum can be taken of, with what to record: S01, T05, T08, D04, D09; S14, a joint that
+            accelerates against its input.
     """
     return findings_of(measured_responses(logs, how), arm, band)
 
 
 def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tuple[float, float] = BAND) -> Findings:
     """The same, of responses that are there already."""
+    for one in measured:
+        _check_sign(one)
     seen = tuple(Seen(one, fitted_modes(one, band), expected_rigid(one, arm)) for one in measured)
     sure: list[Finding] = []
     unsure: list[Open] = []
@@ -76,3 +88,12 @@ def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tupl
         sure += found
         unsure += left
     return Findings(seen, *seen_elsewhere(sure, unsure))
+
+
+def _check_sign(measured: Measured) -> None:
+    slow = relative_acceleration(measured).within(*_SLOW)
+    sure = slow.response[slow.coherence >= _RELIABLE]
+    if len(sure) >= _FEWEST and float(np.median(sure.real / np.abs(sure))) < _AGAINST:
+        first = measured.first
+        raise InputRejected("S14", f"joint {measured.joint} accelerates against its input {first.quantity}", where=first.name,
+                            remedy=f"reverse the sign of {first.quantity}, or of q, in the recipe")

@@ -180,6 +180,8 @@ def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list
 def _mean(values: Sequence[Known]) -> Known:
     """Weighted with 1/std²; its deviation holds what the values scatter, too."""
     weight = np.array([1.0 / max(v.std, 1e-12) ** 2 for v in values])
+    if not weight.sum() > 0.0:
+        return Known(float(np.mean([v.value for v in values])), np.inf)  # nothing of it is known
     mean = float(weight @ [v.value for v in values] / weight.sum())
     scatter = float(weight @ [(v.value - mean) ** 2 for v in values]) / max(len(values) - 1, 1)
     return Known(mean, float(np.sqrt(max(scatter, 1.0) / weight.sum())))

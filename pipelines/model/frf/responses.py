@@ -105,7 +105,7 @@ def measured_responses(logs: Iterable[ExperimentLog], how: How | None = None) ->
 
 
 def _together(a: Turned, b: Turned) -> bool:
-    if a.settings() != b.settings():
+    if a.settings() != b.settings() or a.lines != b.lines:
         return False
     apart = np.delete(a.posture - b.posture, a.joint - 1)
     return bool(np.abs(apart).max(initial=0.0) < _SAME_POSTURE)

@@ -74,13 +74,17 @@ def _still(log: ExperimentLog) -> ExperimentLog:
     return replace(log, signals={**log.signals, "v": Signal(0.0 * log["v"], "rad/s^2", "excitation")})
 
 
+def _no_input(log: ExperimentLog) -> ExperimentLog:
+    return replace(log, signals={**log.signals, "r": Signal(0.0 * log["r"], "rad/s^2", "input")})
+
+
 def _short(log: ExperimentLog) -> ExperimentLog:
     return replace(log, signals={k: Signal(s.values[:1500], s.units, s.long_name) for k, s in log.signals.items()})
 
 
 @pytest.mark.parametrize(("spoil", "code", "words"), [
     (_without("v"), "S01", "record v"), (_without("r"), "S01", "record r"), (lambda log: replace(log, joint=None), "S01", "joint"),
-    (_jittery, "T05", "timer"), (_still, "D09", "multisine"), (_short, "T08", "20 s each way")])
+    (_jittery, "T05", "timer"), (_still, "D09", "multisine"), (_no_input, "D04", "channel"), (_short, "T08", "20 s each way")])
 def test_what_cannot_be_used_is_said(spoil: Callable[[ExperimentLog], ExperimentLog], code: str, words: str) -> None:
     """The code of the table of bad inputs, and what to record."""
     with pytest.raises(InputRejected) as caught:
@@ -104,3 +108,6 @@ def test_only_like_logs_are_averaged() -> None:
     assert one.distortion is not None
     other = replace(LOOP, kp=300.0).log()
     assert len(measured_responses([log, other])) == 2
+    for v in (None, 1000):  # noise, or other lines
+        assert len(measured_responses([log, replace(LOOP, period=v).log()])) == 2
+    assert len(measured_responses([log, replace(LOOP, odd=True).log()])) == 2
