@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.gates import examined, logs_of_roles
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.simulated import with_simulation
 from pipelines.model.effects import effect_names
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.report import Report
@@ -95,6 +96,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
                                settings.decimate, settings.min_speed, settings.seed)
     found = diagnose(chosen, engine, given.arm, given.tell)
+    given.tell("simulating what was found")
+    found = with_simulation(found, (*chosen.validate, *chosen.identify))
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),

@@ -56,10 +56,12 @@ def _digits(x: float | None) -> float | None:
 
 def _tells(one: Evidence) -> Table:
     """What of each joint's residual goes with which signal."""
-    best = sorted(one.curves, key=lambda c: (c.joint, -c.explained))
-    rows = [(c.joint, c.against, _digits(100.0 * c.explained)) for c in best]
-    return Table(("joint", "signal", "of the residual's power that follows it [%]"), tuple(rows),
-                 "The residual averaged in bins of each signal: what survives averaging depends on it.")
+    joints = sorted({c.joint for c in one.curves})
+    share = {(c.against, c.joint): c.explained for c in one.curves}
+    names = sorted({c.against for c in one.curves}, key=lambda name: -max(share.get((name, j), 0.0) for j in joints))
+    rows = tuple((name, *(_digits(100.0 * share[name, j]) if (name, j) in share else None for j in joints)) for name in names)
+    return Table(("signal", *(f"joint {j} [%]" for j in joints)), rows,
+                 "Of the residual's power, what survives averaging in bins of each signal: that much may depend on it.")
 
 
 def _figures(one: Evidence, suffix: str) -> list[Figure]:
@@ -69,9 +71,9 @@ def _figures(one: Evidence, suffix: str) -> list[Figure]:
              joint_signal_figure(f"residual{suffix}", "Residual over time: measured minus predicted torque.", one.t, one.residual,
                                  "N m", quantity="residual")]
     if one.simulated_t is not None and one.simulated_position_error is not None:
-        found.append(joint_signal_figure(f"position-error{suffix}", "What the simulation gets wrong: simulated minus measured "
-                                         "position.", one.simulated_t, one.simulated_position_error, "rad",
-                                         quantity="simulated − measured"))
+        found.append(Figure(f"position-error{suffix}", "What the simulation gets wrong: simulated minus measured position, in "
+                            f"closed loop with controller and references of {one.simulated_log}.",
+                            lambda drawing: _simulated(joint_axes(drawing, joints), one), joint_size(joints)))
     for over, words in (("order", "Orders of the joint's angle: a line is a torque that repeats every so-manieth turn."),
                         ("frequency", "Spectrum of the residual, and of the floor.")):
         spectra = [s for s in one.spectra if s.over == over]
@@ -97,6 +99,23 @@ def _compared(axes: Sequence[Axes], one: Evidence) -> None:
     axes[-1].set_xlabel("time [s]")
     if figure := axes[0].get_figure():
         figure.supylabel("torque [N m]", fontsize="medium")
+
+
+def _simulated(axes: Sequence[Axes], one: Evidence) -> None:
+    t, nominal, extended = one.simulated_t, one.simulated_position_error, one.extended_position_error
+    assert t is not None  # no figure is made without
+    assert nominal is not None
+    for j, axis in enumerate(axes):
+        axis.plot(t, nominal[:, j], color=style.BLUE, linewidth=1.4, label="nominal model")
+        if extended is not None:
+            axis.plot(t, extended[:, j], color=style.VERMILLION, linewidth=0.9, label="with the findings")
+        axis.set_title(f"joint {j + 1}", pad=3.0)
+        axis.margins(x=0.01, y=0.1)
+        axis.locator_params(axis="y", nbins=4)
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
+    axes[-1].set_xlabel("time [s]")
+    if figure := axes[0].get_figure():
+        figure.supylabel("simulated − measured [rad]", fontsize="medium")
 
 
 def _spectra(spectra: Sequence[Spectrum]) -> Callable[[Drawing], None]:

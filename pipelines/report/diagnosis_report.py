@@ -41,7 +41,10 @@ def _verdict(result: Result) -> str:
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(cause_at(one.cause, one.joint) for one in more)}" if more else ""
-    return f"{changed}{first.title}{_at(first.joint)}, {_size(first)}{others}."
+    size = f", {_size(first)}" if math.isfinite(first.torque_rms) else ""
+    tip = first.gain.tip_error_rms
+    moved = f"; for it the simulated tip is {format_number(1e3 * tip.before, 2)} mm off" if tip is not None else ""
+    return f"{changed}{first.title}{_at(first.joint)}{size}{moved}{others}."
 
 
 def _at(joint: int | None) -> str:
@@ -137,8 +140,8 @@ def _others(result: Result) -> list[Section]:
     """Rejected hypotheses and the ledger."""
     sections = []
     if result.rejected:
-        rows = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
-        sections.append(Section("Rejected", ("They came close, and are not believed.",), (Table(("cause", "joint", "why"), rows),)))
+        why = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
+        sections.append(Section("Rejected", ("They came close, and are not believed.",), (Table(("cause", "joint", "why"), why),)))
     shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
@@ -164,9 +167,9 @@ def _limits(result: Result) -> list[Section]:
         sections.append(Section("What would have been found", ("With 95 %, had it been there; nothing smaller can be excluded.",),
                                 (Table(("cause", "joint", "parameter", "smallest", "unit"), rows),)))
     if result.not_testable:
-        rows = tuple((title_of(one.cause), one.joint, one.reason, one.record) for one in result.not_testable)
+        hidden = tuple((title_of(one.cause), one.joint, one.reason, one.record) for one in result.not_testable)
         sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
-                                (Table(("cause", "joint", "why", "what to record"), rows),)))
+                                (Table(("cause", "joint", "why", "what to record"), hidden),)))
     return sections
 
 

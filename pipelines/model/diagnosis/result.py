@@ -227,6 +227,8 @@ class Evidence:
     band: Array  # (joints, 2) [Hz] in which most of that lies
     correlation: Array  # (joints, joints) of the residual of one joint with the torque of another
     torques: Array  # (joints, joints) each measured torque on every joint's modelled torque: near the identity
+    simulated_log: str = ""  # name of the log that was simulated in closed loop
+    extended_position_error: Array | None = None  # [rad] (points, joints) of the extended model
 
 
 @dataclass(frozen=True)

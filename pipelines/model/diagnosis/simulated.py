@@ -1,0 +1,44 @@
+"""Measured over simulated: the nominal and the extended model in closed loop, under the controller and references of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.errors import InputRejected
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.simulation import Experiment, simulate
+
+__all__ = ["with_simulation"]
+
+_SECONDS = 3.0  # of the log that are shown
+_POINTS = 1500
+
+
+def with_simulation(found: Diagnosis, logs: Sequence[ExperimentLog]) -> Diagnosis:
+    """`found` with the position error of both models in the first log whose controller is known; as it is where there is none."""
+    if not found.evidence or found.nominal is None:
+        return found
+    for log in logs:
+        try:
+            error = _error(found.nominal, log)
+            more = _error(found.extended, log) if found.extended is not None and found.extended.effects else None
+        except InputRejected:  # no controller, or a model that runs away
+            continue
+        t = log.t[:len(error)] - log.t[0]
+        every = max(1, len(t) // _POINTS)
+        first = replace(found.evidence[0], simulated_t=t[::every], simulated_position_error=error[::every], simulated_log=log.name,
+                        extended_position_error=None if more is None else more[::every])
+        return replace(found, evidence=(first, *found.evidence[1:]))
+    return found
+
+
+def _error(arm: Arm, log: ExperimentLog) -> Array:
+    """(samples, joints) [rad] simulated minus measured position."""
+    experiment = Experiment.of_log(log)
+    samples = min(experiment.n_samples, round(_SECONDS / log.sample_time))
+    return np.asarray(simulate(arm, experiment.part(0, samples)).q[0] - log.q[:samples])
