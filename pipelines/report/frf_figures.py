@@ -20,6 +20,7 @@ __all__ = ["bode_figure", "compliance_figure", "friction_figure", "posture_words
 
 _CONFIDENCE = float(np.sqrt(-np.log(0.05)))  # radius of the disc that holds the response with 95 %, in standard deviations
 _DECADE = 5.0  # values that span more are drawn on a logarithmic axis
+_HIGHEST = 2.5  # of the level of the rigid body: what lies beyond is noise
 _LOW = 10.0  # [Hz] up to which friction and reversal are shown
 _LOOKS = {"indirect": (style.GREEN, 1.6, (0, (4, 2))), "direct": (style.ORANGE, 0.9, "-"), "closed-loop": (style.BLUE, 1.1, "-")}
 
@@ -69,6 +70,9 @@ def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Meth
     band = _CONFIDENCE * default.curve.std
     size.fill_between(f, np.maximum(np.abs(value) - band, 1e-3 * np.abs(value)), np.abs(value) + band, color=style.SKY, alpha=0.5,
                       linewidth=0.0)
+    share = band / np.maximum(np.abs(value), 1e-300)
+    turn = np.where(share < 1.0, np.rad2deg(np.arcsin(np.minimum(share, 1.0))), 180.0)  # of the disc, seen from the origin
+    phase.fill_between(f, _phase(value) - turn, _phase(value) + turn, color=style.SKY, alpha=0.5, linewidth=0.0)
     low, high = np.quantile(np.abs(value[reliable]) if reliable.any() else np.abs(value), (0.0, 1.0))
     size.set_ylim(0.3 * low, 2.0 * high)
     phase.set_ylim(-370.0, 10.0)
@@ -187,7 +191,7 @@ def friction_figure(joint: int, postures: Sequence[Posture], methods: Sequence[M
             axis.axhline(posture.level.value, color=color, linewidth=0.7, linestyle=":")
         axis.set_xlabel("frequency [Hz]")
         axis.set_ylabel("acceleration per input")
-        axis.set_ylim(bottom=0.0)
+        axis.set_ylim(0.0, _HIGHEST * max(abs(p.level.value) for p in postures))
         axis.legend(loc="lower right", fontsize="small")
         style.log_ticks(axis.xaxis)
 

@@ -53,10 +53,6 @@ class Findings:
     classification: tuple[Finding, ...]
     undecided: tuple[Open, ...]
 
-    def of_cause(self, cause: str) -> tuple[Finding, ...]:
-        """Those that stand for a cause of the library: base_resonance, joint_elasticity, time_delay."""
-        return tuple(one for one in self.classification if one.cause == cause)
-
 
 def frf_findings(logs: Iterable[ExperimentLog], arm: Arm | None = None, how: How | None = None,
                  band: tuple[float, float] = BAND) -> Findings:

@@ -205,8 +205,10 @@ def _delay(joint: int, modes: Sequence[Modes], sample_time: float) -> tuple[list
 def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
     flat, low, high = max(m.flat for m in modes), min(m.band[0] for m in modes), max(m.band[1] for m in modes)
     if flat < _FLAT:
-        words = (f"No mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration per input is flat within "
-                 f"{100.0 * (flat - 1.0):.2g} %, without delay.")
+        traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]
+        beside = f" A pair that nearly cancels leaves a trace at {_many(traces)} Hz: base or another joint." if traces else ""
+        words = (f"No {'distinct ' if traces else ''}mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration "
+                 f"per input is flat within {100.0 * (flat - 1.0):.2g} %, without delay.{beside}")
         return Finding("rigid", joint, words, None, None, None, {}, (joint,))
     return Open(joint, None, ("drive_lag", "joint_elasticity"),
                 f"No mode is distinct, yet the acceleration per input changes by a factor of {flat:.3g}.",
