@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from pipelines.model.effects import find_effect
@@ -11,7 +13,7 @@ from pipelines.model.friction.result import JointResult, Result, Value
 from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number, with_std
+from pipelines.report.style import format_number, format_unit, with_std
 
 __all__ = ["friction_report"]
 
@@ -126,10 +128,10 @@ def _summary(result: Result) -> Section:
         having = [joint.parameters.get(name) for joint in result.joints]
         first = next(joint for joint in result.joints if name in joint.parameters)
         rows.append((name, *(None if value is None else with_std(value.value, value.std) for value in having),
-                     first.parameters[name].unit))
+                     format_unit(first.parameters[name].unit)))
         meanings.append((name, _meaning(first, name)))
     rows.append(("J", *(with_std(joint.inertia.value, joint.inertia.std) for joint in result.joints),
-                 result.joints[0].inertia.unit if result.joints else ""))
+                 format_unit(result.joints[0].inertia.unit) if result.joints else ""))
     meanings.append(("J", "inertia about the joint, the others held"))
     for name in dict.fromkeys(key for joint in result.joints for key, _ in _gravity(joint)):
         found = [joint.gravity.get(name) for joint in result.joints]
@@ -189,7 +191,8 @@ def _tables(joint: JointResult) -> tuple[Table, ...]:
             ("forth" if event.direction > 0 else "back", with_std(event.torque.value, event.torque.std), event.torque.unit,
              event.events) for event in joint.break_away), "Mean ± std of one event; reported, not part of the law."))
     if joint.unseen:
-        tables.append(Table(("not shown by these logs", "what to record"), tuple((gap.what, gap.record) for gap in joint.unseen),
+        tables.append(Table(("not shown by these logs", "what to record"), tuple(
+            (gap.what.replace("three_sigmoid.", ""), gap.record) for gap in joint.unseen),
                             tones=tuple("attention" for _ in joint.unseen)))
     return tuple(tables)
 
@@ -210,11 +213,16 @@ def _ladder_words(joint: JointResult) -> tuple[str, ...]:
             "taken.",)
 
 
+def _plain_reason(reason: str) -> str:
+    """With "amplitude of presliding" for "presliding.amplitude": names of settings are no words."""
+    return _plain(re.sub(r"\b([a-z]\w*)\.([a-z]\w*)", r"\2 of \1", reason))
+
+
 def _ladder(joint: JointResult) -> Table:
     rows = []
     tones: list[Tone] = []
     for rung in joint.ladder:
-        verdict = "chosen" if rung.chosen else rung.reason or ("not worse" if rung.alike else "worse")
+        verdict = "chosen" if rung.chosen else _plain_reason(rung.reason) or ("not worse" if rung.alike else "worse")
         rows.append((_plain(rung.law), rung.size, 1e3 * rung.identify_rms, 1e3 * rung.validate_rms, verdict))
         tones.append("good" if rung.chosen else "neutral")
     return Table(("law", "numbers", "left, fitted [mN m]", "left, held out [mN m]", ""), tuple(rows),

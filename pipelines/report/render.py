@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.log.atomic import write_file
 from pipelines.report.report import Figure, Report, Section, Table, Tone
-from pipelines.report.style import figure_style, format_number, format_unit, printable
+from pipelines.report.style import figure_style, format_decimals, format_number, format_unit, printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -28,7 +28,8 @@ _WORDS: Final[dict[Tone, str]] = {"good": "Good", "attention": "Attention", "bad
 _PARAGRAPH = 4000  # characters; longer ones are cut
 _NUMBER = re.compile(r"[(−+-]?\d[\d\s.,]*(e[+-]?\d+)?(\s*±\s*[\d\s.,∞]+)?\)?(\s*×\s*10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\s*%)?"
                      r"|[–—-]|")
-_NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=(%|°C|[mµnk]?(s|Hz|N|m|rad|g|A|V|W)\b|(min|deg|rev)\b))|(?<=\bN) (?=m\b)")
+_NUMBER_AND_UNIT = re.compile(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(%|°C|[mµnk]?(s|Hz|N|m|rad|g|A|V|W)\b|(min|deg|rev)\b))|(?<=\bN) (?=m\b)"
+                              r"|(?<=[\d)]) (?=[±×] [\d∞])|(?<=[±×]) (?=[\d∞])")
 
 
 def write_report(report: Report, folder: Path, footer: Mapping[str, str]) -> list[Path]:
@@ -120,8 +121,8 @@ def _column(cells: tuple[object, ...]) -> list[str]:
     wanted = max((count for count in decimals if count is not None), default=0)
     if wanted == 0 or any("×" in text or len(text.partition(".")[0]) + wanted > 6 for text in texts if text != "–"):
         return texts
-    return [text if count is None else text + "." * (count == 0) + "0" * (wanted - count)
-            for text, count in zip(texts, decimals, strict=True)]
+    return [text if count is None else format_decimals(cell, wanted)  # type: ignore[arg-type]  # a float, by `decimals`
+            for cell, text, count in zip(cells, texts, decimals, strict=True)]
 
 
 def _cell(cell: object) -> str:

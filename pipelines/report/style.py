@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
 __all__ = ["BLACK", "BLUE", "COLOURS", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILLION", "figure_style",
-           "format_number", "format_unit", "log_ticks", "printable", "with_std"]
+           "format_decimals", "format_number", "format_unit", "log_ticks", "printable", "with_std"]
 
 BLACK: Final = "#1a1f24"
 GREY: Final = "#5b6670"
@@ -84,6 +84,11 @@ def format_number(value: float | None, digits: int = 4) -> str:
     if value != 0.0 and not -3 <= exponent <= 5:
         return f"{_trimmed(mantissa)} × 10{_raised(exponent)}"
     return _grouped(_trimmed(f"{float(value):.{max(0, digits - 1 - exponent)}f}"))
+
+
+def format_decimals(value: float, decimals: int) -> str:
+    """`value` with that many decimals, each of them its own: 28.974, not 28.97 and a zero."""
+    return _grouped(f"{float(value):.{decimals}f}")
 
 
 def with_std(value: float | None, std: float | None) -> str:

@@ -174,7 +174,8 @@ def _cases_section(result: Result) -> Section:
         gain = None if first is None or one is first else ", ".join(
             format_number(a / b, 2) if b > 0.0 else "∞" for a, b in zip(first.tip_error_std.values, one.tip_error_std.values,
                                                                        strict=True))
-        rows.append((one.case, ", ".join(one.feedforward) or "nothing", *shown, gain or "", one.origin, ", ".join(one.logs)))
+        ahead = ", ".join(one.feedforward).replace("coriolis", "Coriolis")
+        rows.append((one.case, ahead or "nothing", *shown, gain or "", one.origin, ", ".join(one.logs)))
         tone: Tone = "neutral" if one.case != 6 or result.gates.cases is None else "good" if result.gates.cases else "bad"
         tones.append(tone)
     table = Table(("case", "ahead of the feedback", "x [mm]", "y [mm]", "z [mm]", "case 1 over it, x, y, z", "origin", "log"),

@@ -187,6 +187,23 @@ def test_tables_align_numbers_and_show_what_is_missing() -> None:
     assert 'range <span class="unit">[rad]</span>' in page
 
 
+def test_a_column_has_equally_many_decimals_and_every_digit_is_the_number_s_own() -> None:
+    values = (28.974, 1.4837, 6.1423)
+    table = Table(("name", "value"), tuple(("one", value) for value in values))
+    page = render_report(Report("Title", "Verdict", "good", table, ()), FOOTER)
+    cells = re.findall(r'<td class="number">([^<]*)</td>', page["report.html"].decode())
+    decimals = [len(cell.partition(".")[2]) for cell in cells]
+    assert decimals == [decimals[0]] * len(values)
+    for cell, value in zip(cells, values, strict=True):
+        assert abs(float(cell.replace("−", "-")) - value) <= 0.5001 * 10.0 ** -decimals[0], cell
+
+
+@pytest.mark.parametrize("words", ["28.0007 ± 0.0021 Hz", "5.5 × 10⁻⁴ rad/s", "(1.2 ± 0.1) × 10⁻⁵", "1.93 ± ∞"])
+def test_a_number_stays_on_one_line_with_its_deviation_and_unit(words: str) -> None:
+    page = render_report(Report("Title", f"It is {words}.", "good", None, ()), FOOTER)["report.html"].decode()
+    assert f"It is {words}.".replace(" ", "\u00a0").replace("It\u00a0is\u00a0", "It is ") in page
+
+
 def test_rows_of_another_length_than_the_columns_are_a_mistake() -> None:
     with pytest.raises(ValueError, match=r"shorter|longer"):
         render_report(Report("t", "v", key_figures=Table(("a", "b"), (("1",), ("2", "3")))), {})

@@ -46,8 +46,9 @@ class Pace:
     def __post_init__(self) -> None:
         rates = (self.fast, self.acceleration, self.jerk)
         if not all(math.isfinite(rate) and rate > 0.0 for rate in rates) or not 0.0 <= self.slow <= self.fast:
-            raise UsageError("C02", f"a pace needs a speed, acceleration and jerk above 0 and 0 <= slow <= fast, not {self}",
-                             where="pace", remedy="correct the speeds")
+            raise UsageError("C02", f"a pace of {self.fast:g} m/s, {self.slow:g} m/s in slow phases, "
+                             f"{self.acceleration:g} m/s^2 and {self.jerk:g} m/s^3", where="pace",
+                             remedy="give a speed, acceleration and jerk above 0, and slow phases from 0 to the speed")
 
     def slowed(self, factor: float) -> Pace:
         """The pace at which everything happens at `factor` times the speed: the same path in 1/factor of the time."""
