@@ -72,6 +72,7 @@ class Settings:
     home: tuple[float, ...] | None = None  # [rad]
     rest: bool = True
     periods: int = 1
+    random: bool = False  # of "frf": noise in the place of multisines
     sample_time: float = 1e-3  # [s]
     friction: bool | None = None  # count columns of friction; None: on every arm but the paper's, which has tests of its own
     noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
@@ -282,7 +283,7 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
 
 def _plans(task: Task, settings: Settings, given: Material) -> Result:
     """The other experiments of the workflow."""
-    plans = {"friction": lambda: friction_plans(task), "frf": lambda: frf_plans(task, settings.seed),
+    plans = {"friction": lambda: friction_plans(task), "frf": lambda: frf_plans(task, settings.seed, settings.random),
              "hold": lambda: hold_plans(task, settings.seed)}[settings.purpose]()
     rehearsals, failed = rehearsed(task, plans, settings.seed, given.tell) if settings.rehearse else ((), "")
     return Result.of_plans(task, settings.purpose, settings.seed, settings.sample_time, plans,

@@ -215,6 +215,7 @@ def design_excitation(
     no_rest: Annotated[bool, typer.Option("--no-rest", help="In motion at both ends, with run-in and run-out.")] = False,
     periods: Annotated[int | None, typer.Option(help="How often the period is repeated. [1]")] = None,
     friction: Annotated[bool | None, typer.Option("--friction/--no-friction", help="Count columns of friction as well.")] = None,
+    random: Annotated[bool | None, typer.Option("--random", help="frf: random noise in the place of odd multisines.")] = None,
     tip_speed: Annotated[float | None, typer.Option(help="Limit on the speed of the tip [m/s].")] = None,
     tip_box: Annotated[list[str] | None, typer.Option(help="Box for the tip [m]: x from,to, y from,to, z from,to.")] = None,
     recipe: Annotated[str | None, typer.Option(help="Recipe of import: controller.csv in its order, units and rate.")] = None,
@@ -230,7 +231,7 @@ def design_excitation(
         "harmonics": whole_numbers(harmonics, "--harmonics"), "frequency": numbers(frequency, "--frequency"),
         "keep_out": numbers(keep_out, "--keep-out"), "seconds": seconds, "evaluations": evaluations, "seed": seed,
         "symmetric": symmetric, "model": model, "bounds": bounds, "home": numbers(home, "--home"),
-        "rest": False if no_rest else None, "periods": periods, "friction": friction, "tip_speed": tip_speed,
+        "rest": False if no_rest else None, "periods": periods, "friction": friction, "random": random, "tip_speed": tip_speed,
         "tip_box": numbers(tip_box, "--tip-box"), "recipe": recipe, "tell_apart": tell_apart})
 
 

@@ -71,6 +71,16 @@ def test_frf_plans_tell_distortion_from_noise(tmp_path: Path) -> None:
     assert abs(np.corrcoef(one["v"][:period, 1], two["v"][:period, 1])[0, 1]) < 0.1
 
 
+def test_random_noise_in_the_place_of_multisines(tmp_path: Path) -> None:
+    """As in the paper: white, of no period, and drawn anew for the second log."""
+    out = designed(tmp_path / "out", replace(QUICK, purpose="frf", random=True)).folder
+    one, two = (open_log(out / f"logs/frf-1-{k}.h5").log for k in (1, 2))
+    v, w = one["v"][:, 0], two["v"][:, 0]
+    assert one.period is None
+    assert abs(np.corrcoef(v[1:], v[:-1])[0, 1]) < 0.03
+    assert abs(np.corrcoef(v, w)[0, 1]) < 0.03
+
+
 def test_held_postures_show_gravity(tmp_path: Path) -> None:
     """Together the postures determine all four parameters of gravity (rank 4, verified.md, section 3)."""
     out = designed(tmp_path / "out", replace(QUICK, purpose="hold")).folder

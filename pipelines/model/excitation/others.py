@@ -181,11 +181,11 @@ def _joined(task: Task, parts: list[tuple[Array, float]]) -> Array:
     return np.stack([(c * powers).sum(axis=0), first, second])
 
 
-def frf_plans(task: Task, seed: int) -> tuple[Plan, ...]:
+def frf_plans(task: Task, seed: int, random: bool = False) -> tuple[Plan, ...]:
     """Two experiments a joint: there and back through its range at low speed, with odd multisines of the same lines.
 
     The slow turn keeps friction from sticking; equal lines give every frequency as much, those left out show distortion, and so
-    does what differs between the two (multisine.py).
+    does what differs between the two (multisine.py). `random`: noise in their place, as in Kostić et al. 2004, Section IV.D.
 
     Raises:
         UsageError: C08, a limit that even a slow and weak one breaks: says which.
@@ -193,13 +193,13 @@ def frf_plans(task: Task, seed: int) -> tuple[Plan, ...]:
     home = _home(task)
 
     def weaker(j: int) -> Callable[[float], tuple[Plan, ...]]:
-        return lambda share: tuple(_frf(task, j, home, seed, share, k) for k in range(_REALISATIONS))
+        return lambda share: tuple(_frf(task, j, home, seed, share, k, random) for k in range(_REALISATIONS))
 
     return tuple(plan for j in range(task.robot.n_joints) for plan in _within(task, weaker(j)))
 
 
-def _frf(task: Task, j: int, home: Array, seed: int, share: float, k: int) -> Plan:
-    """Joint j's experiment with the k-th phases, its turn and its excitation `share` as strong as they might be."""
+def _frf(task: Task, j: int, home: Array, seed: int, share: float, k: int, random: bool) -> Plan:
+    """Joint j's experiment with the k-th phases or noise, its turn and its excitation `share` as strong as they might be."""
     low, high = task.robot.joints[j].position
     room = _USED_RANGE * (high - low) if np.isfinite(high - low) else 2.0 * np.pi
     centre = 0.5 * (low + high) if np.isfinite(high - low) else float(home[j])
@@ -209,15 +209,24 @@ def _frf(task: Task, j: int, home: Array, seed: int, share: float, k: int) -> Pl
     whole = np.zeros((3, task.robot.n_joints, motion.shape[1]))
     whole[0] = home[:, None]
     whole[:, j] = motion
-    period = round(_FRF_PERIOD / task.sample_time)
-    lines = odd_lines(np.random.default_rng([seed, j]), int(_FRF_BAND[0] * _FRF_PERIOD), int(_FRF_BAND[1] * period))
-    v = np.zeros((motion.shape[1], task.robot.n_joints))
-    v[:, j] = share * _strength(task, j, home) * realisation(np.random.default_rng([seed, j, k]), lines, period, motion.shape[1])
     t = np.arange(motion.shape[1], dtype=np.float64) * task.sample_time
-    return Plan(f"frf-{j + 1}-{k + 1}", "frf", j + 1, home, t, whole, v, period * task.sample_time,
-                f"{speed:.3g} rad/s there and back, {hold / _FRF_PERIOD:.2g} periods of {_FRF_PERIOD:g} s each way, "
-                f"{len(lines)} odd lines from {lines[0] / _FRF_PERIOD:.3g} to {lines[-1] / _FRF_PERIOD:.4g} Hz, one of four left "
-                f"out to detect distortion; phases {k + 1} of {_REALISATIONS}")
+    own, period, words = _excitation(task, np.random.default_rng([seed, j]), np.random.default_rng([seed, j, k]), len(t), random)
+    v = np.zeros((len(t), task.robot.n_joints))
+    v[:, j] = share * _strength(task, j, home) * own
+    return Plan(f"frf-{j + 1}-{k + 1}", "frf", j + 1, home, t, whole, v, period,
+                f"{speed:.3g} rad/s there and back, {hold:.3g} s each way, {words}; {k + 1} of {_REALISATIONS}")
+
+
+def _excitation(task: Task, grid: np.random.Generator, rng: np.random.Generator, samples: int,
+                random: bool) -> tuple[Array, float | None, str]:
+    """Of rms 1 (samples,), its period [s], and what it is."""
+    if random:
+        return rng.standard_normal(samples), None, "a random number each sample"
+    period = round(_FRF_PERIOD / task.sample_time)
+    lines = odd_lines(grid, int(_FRF_BAND[0] * _FRF_PERIOD), int(_FRF_BAND[1] * period))
+    words = (f"{len(lines)} odd lines from {lines[0] / _FRF_PERIOD:.3g} to {lines[-1] / _FRF_PERIOD:.4g} Hz, one of four left out "
+             f"to detect distortion, repeated every {_FRF_PERIOD:g} s")
+    return realisation(rng, lines, period, samples), period * task.sample_time, words
 
 
 def _turn(task: Task, j: int, home: Array, room: float) -> tuple[float, float]:
