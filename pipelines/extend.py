@@ -27,6 +27,7 @@ from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
@@ -125,11 +126,16 @@ def _kept(arm: Arm | None) -> list[Wanted]:
 def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
     """What `diagnose` named out of the residual, within `run`; what frequency responses tell has no place in these equations."""
     named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings if one.origin == "residual"
-             and not find_effect(one.cause).per_log]
+             and not _once(find_effect(one.cause))]
     if not named:
         raise NothingMatched("C06", f"diagnose found nothing to extend the model by: {diagnosed.verdict}", where=label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     return named
+
+
+def _once(kind: type[Effect]) -> bool:
+    """Whether it happens at a moment of one log."""
+    return any(q.shape and q.name in kind.per_log for q in kind.parameters)
 
 
 def _sources(motions: Motions) -> tuple[Source, ...]:

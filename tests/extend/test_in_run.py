@@ -1,0 +1,37 @@
+"""`rrrid run` ends in the diagnosis and the model that it offers; its result holds the fields of diagnose, and the stages."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipelines import diagnose, run
+from pipelines.errors import UsageError
+from pipelines.log.model_file import read_model
+from pipelines.stage import Request, run_stage
+from tests.diagnose.sessions import but, session, written
+
+OTHERS = ("fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf")
+QUICK = diagnose.Settings(without=but("cogging", "torque_offset"), replicas=0, most=1)
+
+
+def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
+    folder = written(tmp_path / "logs", session("cogging", 2))
+    settings = run.Settings({"diagnose": QUICK}, OTHERS)
+    outcome = run_stage(run.STAGE, Request((folder,), out=tmp_path / "out", no_report=True, check=True), settings)
+    stored = json.loads((outcome.folder / "result.json").read_text())
+    assert (stored["verdict"], [(one["cause"], one["joint"]) for one in stored["findings"]]) == ("cause", [("cogging", 2)])
+    assert [(stage["name"], stage["exit"]) for stage in stored["stages"]] == [("inspect", 0), ("diagnose", 1), ("extend", 0)]
+    assert stored["stages"][1]["result"]["findings"][0]["parameters"] == stored["findings"][0]["parameters"]
+    assert outcome.exit_code == 1
+    assert "Cogging at joint 2" in outcome.report.verdict
+    model = read_model(outcome.folder / "extend/model.json")
+    assert [(one.effect, one.joint) for one in model.effects] == [("cogging", 2)]
+
+
+def test_a_stage_that_there_is_not_cannot_be_skipped(tmp_path: Path) -> None:
+    folder = written(tmp_path / "logs", session())
+    with pytest.raises(UsageError, match="diagnose"):
+        run_stage(run.STAGE, Request((folder,), out=tmp_path / "out"), run.Settings(skip=("diagnosis",)))
