@@ -238,6 +238,8 @@ def _refuse_strange(settings: Settings) -> None:
             raise UsageError("C02", f"{value:g} is not positive and finite", where=where, remedy="give a positive number")
     if not all(map(math.isfinite, (*(settings.home or ()), *(settings.tip_box or ()), *settings.keep_out))):
         raise UsageError("C02", "a number is not finite", where="--home, --tip-box, --keep-out", remedy="give finite numbers")
+    if any(low > high for low, high in zip(settings.keep_out[::2], settings.keep_out[1::2], strict=False)):
+        raise UsageError("C02", "a band ends below where it begins", where="--keep-out", remedy="write 5,8 [Hz]")
     if settings.torque_share > 1.0:
         raise UsageError("C02", f"{settings.torque_share:g} of the torque limits is more than there is", where="torque_share",
                          remedy="give 1 at most")

@@ -32,7 +32,8 @@ from pipelines.stage import Inputs, Request, Stage, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
-_RECORD = "let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans it"
+_RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans "
+           "one, at home or where --home says")
 _RELIABLE = 0.7
 _MOST_LOW = 0.9  # of the bins in the band under that coherence: low everywhere
 _SWING = 0.25  # of the turning speed: beyond it friction now and then turns its sign
