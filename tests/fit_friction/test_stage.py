@@ -126,6 +126,12 @@ def test_three_methods(method: str) -> None:
     assert relative(joint.series.curve, TRUTHS["three_sigmoid"].curve(joint.series.speed)) < 0.012
 
 
+def test_a_given_law_may_join_several(good: ExperimentLog) -> None:
+    (joint,) = computed(good, settings=Settings(law="stribeck+asymmetric_friction")).joints
+    assert joint.law == "stribeck+asymmetric_friction"
+    assert [rung.law for rung in joint.ladder] == [joint.law]
+
+
 def ramps(seed: int = 6) -> ExperimentLog:
     """Slow ramps of torque from rest to beyond what friction holds, both ways, gravity nearly none."""
     t = np.arange(16000) * STEP

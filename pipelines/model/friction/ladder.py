@@ -94,7 +94,7 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
         tried.append(one)
         if law.name == "coulomb+viscous":
             sharpness = float(np.exp(one.fit.theta[0]))
-    causes = [law.name for law in laws if len(law.members) > 2]
+    causes = [law.name for law in laws if len(law.members) > 2 and law.name in law.members]  # a law of several causes is none
     for _ in range(_FURTHER):
         best = _best(tried)
         if best.law.name in ("viscous", "coulomb", "coulomb+viscous"):
