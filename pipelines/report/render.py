@@ -26,7 +26,7 @@ __all__ = ["render_report", "write_report"]
 
 _WORDS: Final[dict[Tone, str]] = {"good": "Good", "attention": "Attention", "bad": "Problem", "neutral": "Result"}
 _PARAGRAPH = 4000  # characters; longer ones are cut
-_NUMBER = re.compile(r"[(−+-]?\d[\d\s.,]*(e[+-]?\d+)?(\s*±\s*[\d\s.,∞]+)?\)?(\s*×\s*10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\s*%)?"
+_NUMBER = re.compile(r"\(?[−+-]?\d[\d\s.,]*(e[+-]?\d+)?(\s*±\s*[\d\s.,∞]+)?\)?(\s*×\s*10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\s*%)?"
                      r"|[–—-]|")
 _NUMBER_AND_UNIT = re.compile(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(%|°C|[mµnk]?(s|Hz|N|m|rad|g|A|V|W)\b|(min|deg|rev)\b))|(?<=\bN) (?=m\b)"
                               r"|(?<=[\d)]) (?=[±×] [\d∞])|(?<=[±×]) (?=[\d∞])")

@@ -198,6 +198,12 @@ def test_a_column_has_equally_many_decimals_and_every_digit_is_the_number_s_own(
         assert abs(float(cell.replace("−", "-")) - value) <= 0.5001 * 10.0 ** -decimals[0], cell
 
 
+def test_small_negative_numbers_are_numbers_too() -> None:
+    rows = (("one", "(−7.5 ± 4.9) × 10⁻⁴"), ("two", "1.69709 ± 0.00011"), ("three", None), ("four", "−0.2"))
+    page = render_report(Report("Title", "Verdict", "good", Table(("name", "value"), rows), ()), FOOTER)["report.html"].decode()
+    assert page.count('<td class="number">') == len(rows)
+
+
 @pytest.mark.parametrize("words", ["28.0007 ± 0.0021 Hz", "5.5 × 10⁻⁴ rad/s", "(1.2 ± 0.1) × 10⁻⁵", "1.93 ± ∞"])
 def test_a_number_stays_on_one_line_with_its_deviation_and_unit(words: str) -> None:
     page = render_report(Report("Title", f"It is {words}.", "good", None, ()), FOOTER)["report.html"].decode()
