@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.exact import Exact, Refined, refine
 from pipelines.model.diagnosis.findings import sure
 from pipelines.model.diagnosis.inputs import Prepared
@@ -14,6 +17,7 @@ from pipelines.model.effects.base import Effect
 __all__ = ["settled"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
+_MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
 
 
@@ -22,7 +26,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared) -> tup
     if ruling.verdict != "cause":
         return replace(found, final=found.nominal), replace(ruling, named=())
     doubts = {k: sure(found.steps[k], prepared, case.blocks) for k in ruling.named}
-    kept = [k for k in ruling.named if not doubts[k]]
+    kept = _apart(found, [k for k in ruling.named if not doubts[k]])
     final = _without(found, kept, case)
     while len(kept) > 1:
         idle = _idle(found, kept, case, final)
@@ -33,6 +37,28 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared) -> tup
     if not kept:
         return replace(found, final=found.nominal), Ruling("unknown", (), next(iter(doubts.values())))
     return replace(found, final=final), replace(ruling, named=tuple(kept))
+
+
+def _apart(found: Found, kept: list[int]) -> list[int]:
+    """Without what only mends the shape of a cause found before at the same joint, for which it could be mistaken.
+
+    No law of the library is that of the machine to the last: the rest of a great Stribeck hump is no drag.
+    """
+    out: list[int] = []
+    for k in kept:
+        own = found.final.model.effects[k].effect
+        before = [found.final.model.effects[j].effect for j in out]
+        alike = [e for e in before if e.joint == own.joint and (own.name in e.twins or e.name in own.twins)]
+        step = found.steps[k]
+        taken = 0.0 if step.best is None else _power(found, step.before.rms) - _power(found, step.best.done.rms)
+        if not alike or taken > _MENDS * _power(found, found.nominal.rms):
+            out.append(k)
+    return out
+
+
+def _power(found: Found, rms: Array) -> float:
+    """Of a residual, joints in units of what the final model leaves of them."""
+    return float(np.sum(np.square(rms / np.maximum(found.final.rms, 1e-12))))
 
 
 def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | None:
