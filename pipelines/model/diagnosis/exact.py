@@ -26,7 +26,9 @@ from pipelines.model.estimation.regression import Columns
 
 __all__ = ["Exact", "Named", "Refined", "number_moved", "refine"]
 
-_STEPS, _HALVES = 8, 5
+_STEPS = 8
+_SHARES = (1.0, 0.4, 0.1)  # of a step, until one leaves less
+_RIDGES = (0.0, 1e-4, 1e-2)  # of unit columns: two numbers that do nearly the same would be moved far apart
 _GAIN = 1e-5  # of the squared residual: less is no progress
 _DIFFERENCE = 1e-3  # of a number, for slopes
 _FARTHEST = 0.5  # of ln shape, a step
@@ -189,16 +191,18 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
     now = float(np.sum(np.square(left * weights)))
     slopes, names = _slopes(model, data, rigid, y - left)
     for _ in range(steps):
-        shift = _solved(slopes * weights, left * weights)
-        share, better = 1.0, False
-        for _ in range(_HALVES):
-            there = model.moved(share * shift, names)
-            other = y - there.torque(data)
-            power = float(np.sum(np.square(other * weights)))
-            if power < now:
-                better = True
+        better = False
+        for ridge in _RIDGES:
+            shift = _solved(slopes * weights, left * weights, ridge)
+            for share in _SHARES:
+                there = model.moved(share * shift, names)
+                other = y - there.torque(data)
+                power = float(np.sum(np.square(other * weights)))
+                if power < now:
+                    better = True
+                    break
+            if better:
                 break
-            share *= 0.4
         if not better:
             break
         gained, model, left, now = 1.0 - power / now, there, other, power
@@ -237,13 +241,13 @@ def _steps(one: Named) -> list[tuple[str, float]]:
     return found
 
 
-def _solved(table: Array, y: Array) -> Array:
+def _solved(table: Array, y: Array, ridge: float = 0.0) -> Array:
     size = np.linalg.norm(table, axis=1)
     size = np.where(size > 0.0, size, 1.0)
     unit = table / size[:, None]
     values, vectors = np.linalg.eigh(unit @ unit.T)
     keep = values > 1e-11 * values[-1]
-    return np.asarray((vectors[:, keep] / values[keep]) @ (vectors[:, keep].T @ (unit @ y)) / size)
+    return np.asarray((vectors[:, keep] / (values[keep] + ridge)) @ (vectors[:, keep].T @ (unit @ y)) / size)
 
 
 def _covariance(done: Refined) -> Array:
