@@ -3,6 +3,7 @@
     told = compliance(logs.frf, arm)
     told.findings          causes that the responses name
     told.rigid             whether they show a rigid arm: what gives way then does so at reversals only, and is a gap
+    untold(told)           causes that they leave open, with the reason
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.result import Finding, Gain, TorqueGain, Value
-from pipelines.model.effects import find_effect
+from pipelines.model.diagnosis.result import Finding, Gain, NotTestable, TorqueGain, Value
+from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
 
-__all__ = ["Compliance", "compliance"]
+__all__ = ["Compliance", "compliance", "untold"]
 
 _POSTURES = 2  # that it takes
 
@@ -33,18 +34,27 @@ class Compliance:
     open: str  # what they leave open, in words; empty where they do not
 
 
-def compliance(logs: Sequence[ExperimentLog], arm: Arm) -> Compliance | None:
-    """None without responses of every joint in question, or where no response can be taken."""
+def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance | None:
+    """None without frequency-response logs; causes in `without` are not named."""
     if not logs:
         return None
     try:
         found = frf.frf_findings(logs, arm)
-    except InputRejected:
-        return None
-    named = tuple(_finding(one, arm) for one in found.classification
-                  if one.cause is not None and find_effect(one.cause).evidence == "frequency responses")
+    except InputRejected as refused:
+        return Compliance((), False, f"the frequency responses are of no use: {refused.message}")
+    giving = [one for one in found.classification
+              if one.cause is not None and find_effect(one.cause).evidence == "frequency responses"]
+    named = tuple(_finding(one, arm) for one in giving if one.cause not in without)
     left = "; ".join(one.evidence for one in found.undecided)
-    return Compliance(named, not named and not found.undecided, left)
+    return Compliance(named, not giving and not found.undecided, left)
+
+
+def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotTestable, ...]:
+    """Causes that only frequency responses tell, where there are none, or where they leave it open."""
+    reason = "only frequency responses tell it, and there is no frf log" if told is None else told.open
+    named = () if told is None else tuple(one.cause for one in told.findings)
+    return tuple(NotTestable(kind.name, None, reason, kind.experiment) for kind in all_effects()
+                 if reason and kind.evidence == "frequency responses" and kind.name not in (*named, *without))
 
 
 def _finding(one: frf.Finding, arm: Arm) -> Finding:

@@ -19,7 +19,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.compliance import Compliance, compliance
+from pipelines.model.diagnosis.compliance import Compliance, compliance, untold
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import absorbed_finding, extended_arm, findings, rejected
@@ -55,10 +55,10 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     if prepared.reference is not None:
         say("comparing with the reference logs")
         since = since_reference(prepared, prepared.reference, chosen)
-        stiff = compliance(logs.frf, since.case.model.nominal)
-        return _responding(_changed(prepared, replace(since, case=_nameable(since.case, stiff)), chosen), stiff)
+        stiff = compliance(logs.frf, since.case.model.nominal, chosen.without)
+        return _responding(_changed(prepared, replace(since, case=_nameable(since.case, stiff)), chosen), stiff, chosen)
     case = _case(prepared, chosen)
-    stiff = compliance(logs.frf, case.model.nominal)
+    stiff = compliance(logs.frf, case.model.nominal, chosen.without)
     case = _nameable(case, stiff)
     say("looking for the greatest causes")
     rough = provisional(case)
@@ -68,7 +68,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     case = replace(case, thresholds=floored.thresholds)
     found = search(case, chosen.most, rough)
     found, ruling = settled(found, rule(found, floored.rms, floored.twin is not None), case, prepared)
-    return _responding(_told(prepared, case, found, ruling, floored, chosen), stiff)
+    return _responding(_told(prepared, case, found, ruling, floored, chosen), stiff, chosen)
 
 
 def _nameable(case: Case, stiff: Compliance | None) -> Case:
@@ -76,8 +76,9 @@ def _nameable(case: Case, stiff: Compliance | None) -> Case:
     return replace(case, nameable=(*case.nameable, "reversals")) if stiff is not None and stiff.rigid else case
 
 
-def _responding(told: Diagnosis, stiff: Compliance | None) -> Diagnosis:
-    """With what the frequency responses name; causes that the residual names stay beside them."""
+def _responding(told: Diagnosis, stiff: Compliance | None, chosen: DiagnosisSettings) -> Diagnosis:
+    """With what the frequency responses name, or leave open; causes that the residual names stay beside them."""
+    told = replace(told, not_testable=(*told.not_testable, *untold(stiff, chosen.without)))
     if stiff is None or not stiff.findings:
         return told
     findings = (*told.findings, *stiff.findings)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.compliance import compliance
+from pipelines.model.diagnosis.compliance import compliance, untold
 from sample_logs.make_model import synthetic_arm
 
 SAMPLES = Path(__file__).resolve().parents[3] / "sample_logs" / "rrr-healthy"
@@ -24,5 +26,27 @@ def test_a_soft_base_is_named_with_its_frequency() -> None:
     assert numbers["damping_ratio"].value == pytest.approx(0.04, rel=0.1)
 
 
-def test_without_responses_nothing_is_said() -> None:
+def test_without_responses_what_gives_way_is_not_testable() -> None:
     assert compliance((), synthetic_arm()) is None
+    told = {one.cause: one for one in untold(None)}
+    assert set(told) == {"base_resonance", "joint_elasticity"}
+    assert all("no frf log" in one.reason and one.record for one in told.values())
+
+
+def test_responses_of_no_use_are_said() -> None:
+    """A log in which v never moves anything answers nothing: the reason stands where the causes would."""
+    log = open_log(SAMPLES / "frf-1-1.h5").log
+    still = replace(log, signals={**log.signals, "v": replace(log.signals["v"], values=np.zeros_like(log.signals["v"].values))})
+    found = compliance([still], synthetic_arm())
+    assert found is not None
+    assert not found.findings
+    assert not found.rigid
+    assert {one.reason for one in untold(found)} == {found.open}
+    assert "frequency responses are of no use" in found.open
+
+
+def test_a_cause_left_out_is_not_named() -> None:
+    found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm(), ("base_resonance",))
+    assert found is not None
+    assert not found.findings
+    assert not found.rigid
