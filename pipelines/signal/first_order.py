@@ -48,8 +48,10 @@ def held_mean(u: Array, h: float, time_constant: float) -> Array:
 
 
 def rate_of_change(x: Array, t: Array) -> Array:
-    """dx/dt (samples,) by central differences, one-sided at the ends and on either side of a gap."""
+    """dx/dt (samples,) by central differences, one-sided at the ends and on either side of a gap; zero of one sample alone."""
     out = np.zeros(len(x))
+    if len(x) < 2:
+        return out
     for part, _ in _stretches(t):
         if part.stop - part.start > 1:
             out[part] = np.gradient(x[part], t[part])

@@ -83,7 +83,7 @@ def test_pinocchio_computes_the_same(name: str, shared: Path, tmp_path: Path) ->
 def test_every_effect_acts_as_in_the_arm(kind: type[Effect], as_friction: bool) -> None:
     """Whether it has a form in plain numbers or not, as friction or as an accepted effect: as on an array of one row."""
     effect = kind(joint=2) if kind.scope == "joint" else kind()
-    values = {quantity.name: 0.6 * quantity.low + 0.4 * quantity.high for quantity in effect.parameters}
+    values = {q.name: 1.0 if q.discrete else 0.6 * q.low + 0.4 * q.high for q in effect.parameters}  # the first joint, or link
     acting = (Acting.of(effect, values),)
     rigid = synthetic_arm().nominal
     arm = Arm("with", rigid.body, rigid.base, acting) if as_friction else rigid.extended(*acting)
