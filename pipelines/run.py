@@ -154,7 +154,7 @@ def _sessions(logs: Iterable[Opened]) -> dict[tuple[str, str, str], list[Opened]
 
 
 def report(result: Result) -> Report:
-    """The worst verdict first, one table of all stages, then every stage's report."""
+    """The worst verdict first, one table of all stages, what diagnosis says, then every other stage's report."""
     steps = [(group.name, step) for group in result.groups for step in group.stages]
     tone = max((step.report.tone for _, step in steps), key=_WORST.index)
     verdicts = [text for group in result.groups for text in _verdicts(group)]
@@ -162,7 +162,7 @@ def report(result: Result) -> Report:
                   caption="Each stage in the order it was run.", tones=tuple(step.report.tone for _, step in steps))
     single = len(steps) == 1
     sections = [Section("Stages", tables=(table,))] if not single else []
-    for name, step in steps:
+    for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):  # the answer before its sources
         sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
     return Report("Run", " ".join(verdicts), tone, steps[0][1].report.key_figures if single else None, tuple(sections))
 
