@@ -39,6 +39,17 @@ def _complete(out: Path) -> dict[str, str]:
     return there
 
 
+def _nobody_left(group: int) -> bool:
+    """Whether a process group ends within a second: who has just died waits for init to take notice."""
+    for _ in range(100):
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.01)
+    return False
+
+
 def test_ctrl_c_at_any_moment_ends_the_run(tmp_path: Path) -> None:
     """P06: SIGINT to the whole process group, as a terminal sends it, at random times from the first log read on.
 
@@ -67,8 +78,7 @@ def test_ctrl_c_at_any_moment_ends_the_run(tmp_path: Path) -> None:
             assert said.splitlines()[-1] == ENDED
             assert "Traceback" not in said
             interrupted += 1
-        with pytest.raises(ProcessLookupError):
-            os.killpg(process.pid, 0)
+        assert _nobody_left(process.pid)
     assert interrupted > RUNS // 2
 
 
