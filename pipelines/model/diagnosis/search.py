@@ -37,6 +37,7 @@ _LEAST = 2e-3  # of the squared residual: no cause is fitted for less
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
 _MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
+_WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
@@ -169,8 +170,9 @@ def _fewest(tried: Sequence[Tried]) -> Tried | None:
     if not possible:
         return None
     least = possible[0].rank
-    near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least)
-            and one.screened.joint == possible[0].screened.joint]
+    joint = possible[0].screened.joint
+    near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least) and one.screened.joint == joint
+            and (joint is None or one.done.rms[joint - 1] <= _WORSE * possible[0].done.rms[joint - 1])]
     return min(near, key=lambda one: (one.done.model.effects[-1].count, one.rank))
 
 
