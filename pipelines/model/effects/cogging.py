@@ -14,6 +14,7 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Cogging"]
 
+_WAVES = 1.5  # in the range travelled, at least: fewer are the curve of a spring (causes.md: a full turn tells them apart)
 _HIGHEST = 150.0  # order that is searched for
 _MOST = 200  # orders on the grid
 _PEAKS = 24
@@ -56,9 +57,9 @@ class Cogging(Effect):
         return self.on_own_row(arm, *(part for wave in waves for part in (wave.imag, wave.real)))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """From one wave in the range travelled, in steps of half of what that range can tell apart: whole ones over many turns."""
+        """From the fewest waves in the range travelled, in steps of half of what it can tell apart: whole ones over many turns."""
         travel = max(float(np.ptp(self.own(motion.q))), 1e-3)
-        lowest = max(1.0, 2.0 * math.pi / travel)
+        lowest = max(1.0, _WAVES * 2.0 * math.pi / travel)
         step = max(math.pi / travel, (_HIGHEST - 1.0) / _MOST)
         highest = max(_HIGHEST, 4.0 * lowest)
         start = lowest if travel < 4.0 * math.pi else 1.0
@@ -76,8 +77,8 @@ class Cogging(Effect):
         size = 1 << int(np.ceil(np.log2(4.0 * (bins.max() + 1))))
         power = np.abs(np.fft.rfft(np.bincount(bins, r, minlength=size), n=size))
         order = 2.0 * math.pi / (size * width) * np.arange(len(power))
-        wanted = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)) & (order >= max(0.25, 0.5 * 2.0 * math.pi / travel))
-        wanted &= order < 0.5 * math.pi / width
+        wanted = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1))
+        wanted &= (order >= max(0.25, _WAVES * 2.0 * math.pi / travel)) & (order < 0.5 * math.pi / width)
         peaks = np.flatnonzero(wanted)
         for peak in peaks[np.argsort(power[peaks])[::-1][:_PEAKS]]:
             yield replace(self, order=float(order[peak]), harmonics=1)
