@@ -17,6 +17,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import lay_one
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.linear import deviations
 from pipelines.model.diagnosis.nominal import fit_columns
 from pipelines.model.diagnosis.result import Value
 from pipelines.model.diagnosis.standing import Mask, apart
@@ -37,8 +38,8 @@ class Absorbed:
     effect: Effect
     values: dict[str, float]
     parameters: dict[str, Value]
+    std: dict[str, float]  # of the values that were fitted
     explained: float  # of the difference between one set of base parameters and two
-    rms: tuple[Array, Array]  # (joints,) [N m] left of the later logs with the parameters of all, without the cause and with it
 
 
 def absorbed(data: Data, later: Mask, rigid: Array, others: Array, common: Array, weight: Array, arm: Arm,
@@ -54,7 +55,6 @@ def absorbed(data: Data, later: Mask, rigid: Array, others: Array, common: Array
     one = fit_columns(data, np.concatenate([rigid, beside]), weight=weight)
     two = fit_columns(data, np.concatenate([apart(rigid, later), beside]), weight=weight)
     powers = [float(fit.residual @ fit.residual) for fit in (one, two)]
-    before, shared = _rms(data, later, one.left), [rigid, beside]
     if powers[0] - powers[1] < _WORTH * powers[1]:
         return None
     best: Absorbed | None = None
@@ -62,46 +62,26 @@ def absorbed(data: Data, later: Mask, rigid: Array, others: Array, common: Array
         if kind.evidence != "base parameters" or kind.name in without:
             continue
         for place in kind.everywhere(arm.n_joints):
-            found = _tried(place.full(), data, later, np.concatenate(shared), weight, arm, powers, before)
+            found = _tried(place.full(), data, later, np.concatenate([rigid, beside]), weight, arm, powers)
             if found is not None and (best is None or found.explained > best.explained):
                 best = found
     return best
 
 
-def _tried(effect: Effect, data: Data, later: Mask, beside: Array, weight: Array, arm: Arm, powers: list[float],
-           before: Array) -> Absorbed | None:
+def _tried(effect: Effect, data: Data, later: Mask, beside: Array, weight: Array, arm: Arm,
+           powers: list[float]) -> Absorbed | None:
     columns = np.where(later, lay_one(data, effect, arm), 0.0)
     fit = fit_columns(data, np.concatenate([beside, columns]), weight=weight)
     share = (powers[0] - float(fit.residual @ fit.residual)) / (powers[0] - powers[1])
     amplitudes = fit.beta[len(beside):]
-    std = _deviations(fit.table * fit.weights, fit.residual)[len(beside):]
+    std = deviations(fit.table * fit.weights, fit.residual)[len(beside):]
     if share < _EXPLAINS or abs(amplitudes[0]) < _SURE * std[0]:
         return None
     values = effect.values(amplitudes)
     if not effect.possible(values):
         return None
-    return Absorbed(effect, values, _reported(effect, amplitudes, std), share,
-                    (before, _rms(data, later, fit.left)))
-
-
-def _rms(data: Data, later: Mask, left: Array) -> Array:
-    power = np.bincount(data.joint[later], left[later] ** 2, minlength=data.n_joints)
-    return np.asarray(np.sqrt(power / np.maximum(np.bincount(data.joint[later & data.counts], minlength=data.n_joints), 1)))
-
-
-def _deviations(table: Array, residual: Array) -> Array:
-    """Standard deviations, rows next to each other allowed to depend on one another (20 lags)."""
-    size = np.linalg.norm(table, axis=1)
-    unit = table / np.where(size > 0.0, size, 1.0)[:, None]
-    values, vectors = np.linalg.eigh(unit @ unit.T)
-    keep = values > 1e-11 * values[-1]
-    bread = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
-    scores = unit * residual
-    meat = scores @ scores.T
-    for lag in range(1, 21):
-        cross = scores[:, lag:] @ scores[:, :-lag].T
-        meat += (1.0 - lag / 21.0) * (cross + cross.T)
-    return np.asarray(np.sqrt(np.maximum(np.diag(bread @ meat @ bread), 0.0)) / np.where(size > 0.0, size, 1.0))
+    names = [q.name for q in effect.parameters if not q.shape]
+    return Absorbed(effect, values, _reported(effect, amplitudes, std), dict(zip(names, std.tolist(), strict=False)), share)
 
 
 def _reported(effect: Effect, amplitudes: Array, std: Array) -> dict[str, Value]:

@@ -1,7 +1,7 @@
 """What gives way, named by frequency responses: the residual of motion alone does not tell a base from a joint, or from a gap.
 
     told = compliance(logs.frf, arm)
-    told.findings          causes that the responses name
+    told.named             causes that the responses name, with their numbers
     told.rigid             whether they show a rigid arm: what gives way then does so at reversals only, and is a gap
     untold(told)           causes that they leave open, with the reason
 """
@@ -15,23 +15,32 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.result import Finding, Gain, NotTestable, TorqueGain, Value
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.result import NotTestable
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
 
-__all__ = ["Compliance", "compliance", "untold"]
+__all__ = ["Compared", "Compliance", "compared", "compliance", "untold"]
 
-_POSTURES = 2  # that it takes
+_MOVED = 3.0  # standard deviations, by which a base's frequency or a joint's stiffness is another one
+_SAME = 0.03  # of it, within which two sessions show the same one: temperature, and how the arm stood
 
 
 @dataclass(frozen=True)
 class Compliance:
     """What the responses say."""
 
-    findings: tuple[Finding, ...]
+    named: tuple[Acting, ...]
     rigid: bool
     open: str  # what they leave open, in words; empty where they do not
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What responses name now, beside what those of the reference logs named."""
+
+    new: tuple[Acting, ...]  # or moved
+    standing: tuple[Acting, ...]
 
 
 def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance | None:
@@ -44,26 +53,36 @@ def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] =
         return Compliance((), False, f"the frequency responses are of no use: {refused.message}")
     giving = [one for one in found.classification
               if one.cause is not None and find_effect(one.cause).evidence == "frequency responses"]
-    named = tuple(_finding(one, arm) for one in giving if one.cause not in without)
+    named = tuple(_acting(one, arm) for one in giving if one.cause not in without)
     left = "; ".join(one.evidence for one in found.undecided)
     return Compliance(named, not giving and not found.undecided, left)
+
+
+def compared(now: Compliance, before: Compliance) -> Compared:
+    """Which of the causes named now are news: those that the reference does not name, or not with this frequency or stiffness."""
+    there = {one.place: one for one in before.named}
+    new = tuple(one for one in now.named if one.place not in there or _moved(one, there[one.place]))
+    return Compared(new, tuple(one for one in now.named if one not in new))
+
+
+def _moved(now: Acting, before: Acting) -> bool:
+    one, other = now.parameters[0], before.parameters[0]  # a joint's frequency moves with the posture, its stiffness does not
+    spread = float(np.hypot(one.std or 0.0, other.std or 0.0))
+    return abs(one.value - other.value) > max(_MOVED * spread, _SAME * other.value)
 
 
 def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotTestable, ...]:
     """Causes that only frequency responses tell, where there are none, or where they leave it open."""
     reason = "only frequency responses tell it, and there is no frf log" if told is None else told.open
-    named = () if told is None else tuple(one.cause for one in told.findings)
+    named = () if told is None else tuple(one.effect.name for one in told.named)
     return tuple(NotTestable(kind.name, None, reason, kind.experiment) for kind in all_effects()
                  if reason and kind.evidence == "frequency responses" and kind.name not in (*named, *without))
 
 
-def _finding(one: frf.Finding, arm: Arm) -> Finding:
-    effect = find_effect(one.cause or "")
-    joint = one.joint if effect.scope == "joint" else None
-    turning = joint is None or arm.robot.revolute[joint - 1]
-    units = {q.name: q.unit_at(turning) for q in effect.parameters}
-    numbers = {name: Value(known.value, known.std, units.get(name, "1")) for name, known in one.parameters.items()}
-    nothing = np.full(arm.n_joints, np.nan)
-    gain = Gain(TorqueGain(nothing, nothing, np.full((arm.n_joints, 2), np.nan)), None, "none", None)
-    return Finding(effect.name, joint, effect.title, numbers, np.nan, np.nan, (), None, gain, "frequency responses", np.nan, np.nan,
-                   None)
+def _acting(one: frf.Finding, arm: Arm) -> Acting:
+    """The cause with the numbers that the responses give."""
+    kind = find_effect(one.cause or "")
+    joint = one.joint if kind.scope == "joint" else None
+    known = one.parameters
+    return Acting.of(kind(joint=joint), {name: x.value for name, x in known.items()}, {name: x.std for name, x in known.items()},
+                     revolute=joint is None or arm.robot.revolute[joint - 1])

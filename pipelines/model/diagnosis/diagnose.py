@@ -9,7 +9,7 @@ is left; search with the twin's thresholds; judge what was found on held-out log
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,20 +17,23 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.absorbed import Absorbed
+from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.compliance import Compliance, compliance, untold
+from pipelines.model.diagnosis.carried import carried
+from pipelines.model.diagnosis.compliance import Compliance, untold
+from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import absorbed_finding, extended_arm, findings, rejected
+from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import settled
-from pipelines.model.diagnosis.result import Diagnosis, Finding, ResidualRms, Threshold, Verdict
-from pipelines.model.diagnosis.search import Case, Explored, Found, clean, held_out_left, provisional, search
+from pipelines.model.diagnosis.pruned import Settled, settled
+from pipelines.model.diagnosis.responding import Responding, responding
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, ResidualRms, Threshold
+from pipelines.model.diagnosis.search import Case, Explored, clean, held_out_left, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import Since, since_reference
+from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin, drive_noise, make_twin, replayable, white
 from pipelines.model.diagnosis.verdict import Ruling, rule
@@ -52,14 +55,14 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     prepared = prepare(logs, chosen, arm)
-    if prepared.reference is not None:
+    plain = _case(prepared, chosen)
+    if logs.frf:
+        say("looking at the frequency responses")
+    first = responding(plain, prepared, chosen.without)
+    if first.held.prepared.reference is not None:
         say("comparing with the reference logs")
-        since = since_reference(prepared, prepared.reference, chosen)
-        stiff = compliance(logs.frf, since.case.model.nominal, chosen.without)
-        return _responding(_changed(prepared, replace(since, case=_nameable(since.case, stiff)), chosen), stiff, chosen)
-    case = _case(prepared, chosen)
-    stiff = compliance(logs.frf, case.model.nominal, chosen.without)
-    case = _nameable(case, stiff)
+        return _changed(first, first.held.prepared.reference, chosen)
+    case, prepared = _nameable(first.held.case, first.stiff), first.held.prepared
     say("looking for the greatest causes")
     rough = provisional(case)
     say("simulating the twin")
@@ -67,22 +70,13 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     say("looking for causes")
     case = replace(case, thresholds=floored.thresholds)
     found = search(case, chosen.most, rough)
-    found, ruling = settled(found, rule(found, floored.rms, floored.twin is not None), case, prepared)
-    return _responding(_told(prepared, case, found, ruling, floored, chosen), stiff, chosen)
+    done = settled(found, rule(found, floored.rms, floored.twin is not None), case, prepared, floored.rms, floored.twin is not None)
+    return _told(first, case, done, floored, chosen)
 
 
 def _nameable(case: Case, stiff: Compliance | None) -> Case:
     """Where frequency responses show a rigid arm, what gives way is a gap, which the residual then names."""
     return replace(case, nameable=(*case.nameable, "reversals")) if stiff is not None and stiff.rigid else case
-
-
-def _responding(told: Diagnosis, stiff: Compliance | None, chosen: DiagnosisSettings) -> Diagnosis:
-    """With what the frequency responses name, or leave open; causes that the residual names stay beside them."""
-    told = replace(told, not_testable=(*told.not_testable, *untold(stiff, chosen.without)))
-    if stiff is None or not stiff.findings:
-        return told
-    findings = (*told.findings, *stiff.findings)
-    return replace(told, verdict="cause", findings=findings, reason="", summary=_sentence(Ruling("cause", (), ""), findings))
 
 
 def _case(prepared: Prepared, chosen: DiagnosisSettings) -> Case:
@@ -122,32 +116,40 @@ def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen
     return _Floored(white(prepared.data, left), "blocks", None, None, nan)
 
 
-def _changed(prepared: Prepared, since: Since, chosen: DiagnosisSettings) -> Diagnosis:
+def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings) -> Diagnosis:
     """What is different since the reference logs."""
-    now = replace(prepared, data=since.case.data, judge=since.case.judge)
-    found = search(since.case, chosen.most)
-    found, ruling = settled(found, rule(found, since.floor), since.case, now)
-    floored = _Floored(since.floor, "reference logs", None, None, np.full(prepared.data.n_joints, np.nan))
-    told = _told(now, since.case, found, ruling, floored, chosen)
-    told = replace(told, question="what has changed", standing=since.standing)
-    if told.extended is not None:
-        told = replace(told, extended=replace(told.extended, effects=(*since.acting, *told.extended.effects)))
-    return told if since.absorbed is None else _with_absorbed(told, since.absorbed)
-
-
-def _with_absorbed(told: Diagnosis, moved: Absorbed) -> Diagnosis:
-    """A cause that the base parameters show is a finding as well."""
-    one = absorbed_finding(moved, told)
-    findings = tuple(sorted((one, *told.findings), key=lambda finding: -finding.explained))
-    verdict: Verdict = "unknown" if told.verdict == "unknown" else "cause"
-    if verdict == "unknown":
+    since = since_reference(first.held.prepared, reference, chosen, first.held.case.beside)
+    case = _nameable(since.case, first.stiff)
+    now = replace(first.held.prepared, data=case.data, judge=case.judge)
+    first = replace(first, held=replace(first.held, prepared=now))
+    found = search(case, chosen.most)
+    done = settled(found, rule(found, since.floor), case, now, since.floor)
+    floored = _Floored(since.floor, "reference logs", None, None, np.full(case.data.n_joints, np.nan))
+    told = _told(first, case, done, floored, chosen)
+    told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
+    if since.absorbed is None or told.verdict == "unknown" or told.extended is None:
         return told
-    return replace(told, verdict=verdict, findings=findings, summary=_sentence(Ruling("cause", (), ""), findings))
+    one = carried(since.absorbed, done.found.final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
+    if one.doubt:
+        return replace(told, rejected=(*told.rejected, Rejected(one.finding.cause, one.finding.joint, one.doubt)))
+    findings = _strongest((one.finding, *told.findings))
+    return replace(told, verdict="cause", findings=findings, reason="", extended=one.arm,
+                   summary=_sentence(Ruling("cause", (), ""), findings))
 
 
-def _told(prepared: Prepared, case: Case, found: Found, ruling: Ruling, floored: _Floored, chosen: DiagnosisSettings) -> Diagnosis:
+def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(sorted(findings, key=lambda finding: -finding.explained))
+
+
+def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings) -> Diagnosis:
+    found, ruling, prepared, parts = done.found, done.ruling, first.held.prepared, first.held.parts
     nominal, last = found.nominal, found.steps[-1]
-    named = findings(found, ruling, prepared, floored.rms, chosen.blocks, chosen.evidence)
+    plain = parts[0].before if parts else nominal  # nothing taken out for what responses name
+    held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
+    named = _strongest((*held, *findings(found, ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks,
+                                         chosen.evidence)))
+    if held:
+        ruling = replace(ruling, verdict="cause")
     thresholds = last.thresholds
     bounds = tuple(Threshold(f.cause, f.joint, float(g / last.before.rss), thresholds.origin)
                    for f, g in zip(case.families, thresholds.gain, strict=True))
@@ -157,18 +159,25 @@ def _told(prepared: Prepared, case: Case, found: Found, ruling: Ruling, floored:
     judge = prepared.judge
     rms = [ResidualRms(one.rms, (one.data if judge is None else judge).rms(held_out_left(one, judge, chosen.blocks)), floored.rms)
            for one in (nominal, found.final)]
-    pictures = (evidence(nominal, floored.rms, floored.twin, None),) if chosen.evidence else ()
+    if parts:
+        rms[0] = ResidualRms(plain.rms, parts[0].gain.validate_torque_rms.before, floored.rms)
+    pictures = (evidence(plain, floored.rms, floored.twin, None),) if chosen.evidence else ()
+    harmful = tuple(Rejected(part.acting.effect.name, part.acting.effect.joint, f"named by frequency responses, but the model goes "
+                             f"without it: {part.doubt}") for part in parts if part.doubt)
+    arm = extended_arm(found, ruling)
     return Diagnosis(
-        ruling.verdict, _sentence(ruling, named), named, (), rejected(found, ruling), limits, hidden, rms[0], "what is wrong",
+        ruling.verdict, _sentence(ruling, named), named, (), (*harmful, *rejected(found, ruling)), limits,
+        (*first.undecided, *hidden, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
-        0 if floored.twin is None else len(floored.twin.fits), floored.noise, nominal.model.arm, extended_arm(found, ruling))
+        0 if floored.twin is None else len(floored.twin.fits), floored.noise, plain.model.arm, acted(arm, case.beside))
 
 
 def _sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:
     """What a technician is told."""
     if ruling.verdict == "nothing-wrong":
-        return "Nothing is wrong with this arm, as far as these logs can tell."
+        caveat = f": {ruling.reason}" if ruling.reason else ""
+        return f"Nothing is wrong with this arm, as far as these logs can tell{caveat}."
     if ruling.verdict == "unknown":
         return f"Something is wrong that has no name here: {ruling.reason}."
     first = named[0]

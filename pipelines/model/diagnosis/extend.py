@@ -18,13 +18,14 @@ import numpy as np
 from pipelines.errors import UsageError
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
 from pipelines.model.diagnosis.exact import Exact, Refined
 from pipelines.model.diagnosis.findings import extended_arm, findings, sure
-from pipelines.model.diagnosis.gains import simulation_errors, torque_gain
+from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.result import BeforeAfter, Finding, Gain, Rejected, ResidualRms, TipError
+from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.search import Case, Found, held_out_left, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
@@ -81,7 +82,7 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     prepared = prepare(logs, chosen, arm)
-    case, prepared, standing = _case(prepared, chosen)
+    case, prepared = _case(prepared, chosen)
     every = tuple(_family(case, one) for one in wanted)
     left, refused = list(every), dict[tuple[str, int | None], str]()
     while True:
@@ -91,17 +92,17 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
         if not why:
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
-    return _told(found, named, refused, prepared, standing, chosen)
+    return _told(found, named, refused, case, prepared, chosen)
 
 
-def _case(prepared: Prepared, chosen: DiagnosisSettings) -> tuple[Case, Prepared, tuple[Acting, ...]]:
+def _case(prepared: Prepared, chosen: DiagnosisSettings) -> tuple[Case, Prepared]:
     """The nominal model on these logs, beside what the reference logs show as well."""
     if prepared.reference is not None:
         since = since_reference(prepared, prepared.reference, chosen)
         case = replace(since.case, changed=None, nameable=_ALL)
-        return case, replace(prepared, data=case.data, judge=case.judge), since.acting
+        return case, replace(prepared, data=case.data, judge=case.judge)
     columns, fit = fit_nominal(prepared.data, prepared.columns)
-    return (Case(prepared.data, prepared.judge, Exact.start(columns, fit), fit.weight, (), None, chosen.blocks, _ALL), prepared, ())
+    return Case(prepared.data, prepared.judge, Exact.start(columns, fit), fit.weight, (), None, chosen.blocks, _ALL), prepared
 
 
 def _family(case: Case, one: Wanted) -> Family:
@@ -129,27 +130,22 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     found = search(replace(case, thresholds=free), len(case.families))
     steps = [step for step in found.steps if step.best is not None]
     ruling = Ruling("cause", tuple(range(len(steps))), "")
-    told = findings(found, ruling, prepared, white(case.data, found.final.left), chosen.blocks, chosen.evidence)
+    arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in steps if step.best is not None)]
+    simulated = simulation_errors([acted(arm, case.beside) for arm in arms], prepared.judging or prepared.motions)
+    told = findings(found, ruling, simulated, prepared, found.nominal.rms, white(case.data, found.final.left), chosen.blocks,
+                    chosen.evidence)
     why: dict[tuple[str, int | None], str] = {}
-    for step in steps:
-        if step.best is not None and (doubt := sure(step, prepared, chosen.blocks)):
+    for k, step in enumerate(steps):
+        if step.best is not None and (doubt := sure(step, prepared, chosen.blocks) or farther(simulated[k], simulated[k + 1])):
             why[step.best.effect.name, step.best.effect.joint] = doubt
-    for one in told:
-        if (one.cause, one.joint) not in why and not _nearer(one.gain):
-            why[one.cause, one.joint] = "the simulated arm with it is no nearer to the measured one"
     taken = {(one.cause, one.joint) for one in told}
     why |= {(f.cause, f.joint): "it takes nothing off the held-out error" for f in case.families
             if (f.cause, f.joint) not in taken}
     return found, told, why
 
 
-def _nearer(gain: Gain) -> bool:
-    position = gain.simulated_position_rms
-    return position is None or float(np.linalg.norm(position.after)) < float(np.linalg.norm(position.before))
-
-
-def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], prepared: Prepared,
-          standing: tuple[Acting, ...], chosen: DiagnosisSettings) -> Extended:
+def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], case: Case,
+          prepared: Prepared, chosen: DiagnosisSettings) -> Extended:
     judge, final = prepared.judge, found.final
     floor = white(final.data, final.left)
     rms = [ResidualRms(one.rms, (one.data if judge is None else judge).rms(held_out_left(one, judge, chosen.blocks)), floor)
@@ -158,20 +154,17 @@ def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, 
     arm = gain = None
     if named:
         arm = with_uncertainty(extended_arm(found, Ruling("cause", tuple(range(len(named))), "")), final)
-        arm = replace(arm, effects=(*standing, *arm.effects))
-        gain = named[0].gain if len(named) == 1 else _gain(found, prepared, chosen)
-    return Extended(arm, named, rejected, gain, rms[0], rms[1], "blocks" if judge is None else "logs", standing,
+        arm = acted(arm, case.beside)
+        gain = named[0].gain if len(named) == 1 else _gain(found, case, prepared, chosen)
+    return Extended(arm, named, rejected, gain, rms[0], rms[1], "blocks" if judge is None else "logs", case.beside,
                     (*prepared.motions, *prepared.judging), len(prepared.motions))
 
 
-def _gain(found: Found, prepared: Prepared, chosen: DiagnosisSettings) -> Gain:
+def _gain(found: Found, case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> Gain:
     """Of everything that was accepted, together."""
-    motions = prepared.judging or prepared.motions
-    before, after = simulation_errors([found.nominal.model.arm, found.final.model.arm], motions)
-    known = after.how != "none"
-    return Gain(torque_gain(found.nominal, found.final, prepared.judge, chosen.blocks),
-                BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how,
-                TipError(before.tip_rms, after.tip_rms) if known else None)
+    arms = [acted(one.model.arm, case.beside) for one in (found.nominal, found.final)]
+    simulated = simulation_errors(arms, prepared.judging or prepared.motions)
+    return gain_of(torque_gain(found.nominal, found.final, prepared.judge, chosen.blocks), *simulated)
 
 
 def with_uncertainty(arm: Arm, done: Refined) -> Arm:

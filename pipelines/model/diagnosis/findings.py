@@ -2,70 +2,84 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Literal
+
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.absorbed import Absorbed
+from pipelines.model.diagnosis.beside import Part
+from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.exact import Refined
-from pipelines.model.diagnosis.gains import simulation_errors, torque_gain
+from pipelines.model.diagnosis.gains import Simulation, gain_of, torque_gain, worse_log
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.numbers import acting, parameters
-from pipelines.model.diagnosis.result import BeforeAfter, Diagnosis, Finding, Gain, Rejected, Rival, TipError, TorqueGain
-from pipelines.model.diagnosis.search import Found, Step, Tried
+from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Value
+from pipelines.model.diagnosis.search import Found, Step, Tried, held_out_left
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
-__all__ = ["absorbed_finding", "agreement", "extended_arm", "findings", "rejected", "sure"]
+__all__ = ["agreement", "extended_arm", "findings", "held_finding", "rejected", "sure"]
 
 _ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
 _TELLS = 9.0  # times its variance, that the power of the predicted part must have in a log to be asked
 
 
-def findings(found: Found, ruling: Ruling, prepared: Prepared, floor: Array, blocks: int, draw: bool) -> tuple[Finding, ...]:
-    """Each named cause, the one that explains most first; the final model holds them, in the order of their steps."""
-    steps = [found.steps[k] for k in ruling.named]
-    last = max(ruling.named, default=-1) + 1
-    arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in found.steps[:last] if step.best is not None)]
-    motions = prepared.judging or prepared.motions
-    simulated = simulation_errors(arms, motions)
+def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prepared: Prepared, nominal: Array, floor: Array,
+             blocks: int, draw: bool) -> tuple[Finding, ...]:
+    """Each named cause, the one that explains most first; the final model holds them, in the order of their steps.
+
+    Args:
+        simulated: the nominal arm and that after each step.
+        nominal: (joints,) [N m] what the nominal model leaves.
+    """
     covariance = found.final.covariance()
     out = []
-    for place, (k, step) in enumerate(zip(ruling.named, steps, strict=True)):
+    for place, k in enumerate(ruling.named):
+        step = found.steps[k]
         if step.best is None:
             continue
-        before, after = simulated[k], simulated[k + 1]
-        known = after.how != "none"
-        gain = Gain(torque_gain(step.before, step.best.done, prepared.judge, blocks),
-                    BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how,
-                    TipError(before.tip_rms, after.tip_rms) if known else None)
-        out.append(_finding(found, step, step.best, place, covariance, floor, gain, draw))
+        gain = gain_of(torque_gain(step.before, step.best.done, prepared.judge, blocks), simulated[k], simulated[k + 1])
+        out.append(_finding(found, step, step.best, place, covariance, nominal, floor, gain, draw))
     return tuple(sorted(out, key=lambda one: -one.explained))
 
 
-def _finding(found: Found, step: Step, best: Tried, place: int, covariance: Array, floor: Array, gain: Gain, draw: bool) -> Finding:
+def held_finding(part: Part, nominal: Array, floor: Array, draw: bool) -> Finding:
+    """A cause that frequency responses name, with what the logs of motion say of it."""
+    acting, before, after = part.acting, part.before, part.after
+    effect, data = acting.effect, before.data
+    torque = np.zeros(data.rows) if after.data.known is None else after.data.known
+    torque = torque if data.known is None else torque - data.known
+    size, joint, of_rated = _size(torque, data, effect.joint, floor)
+    seen = float(np.linalg.norm(before.fit.project(torque)) / max(float(np.linalg.norm(torque * before.weights)), 1e-300))
+    units = {p.name: p.unit for p in acting.parameters}
+    std = {p.name: p.std for p in acting.parameters}
+    numbers = {name: Value(value, std.get(name), units.get(name, "1")) for name, value in effect.reported(acting.values).items()}
+    return Finding(effect.name, effect.joint, effect.title, numbers, explained(before.rms, after.rms, nominal, floor), seen, (),
+                   None, part.gain, "frequency responses", size, of_rated, proof(before, after, joint + 1) if draw else None)
+
+
+def _size(torque: Array, data: Data, joint: int | None, floor: Array) -> tuple[float, int, float]:
+    """[N m] rms of a cause's torque at its joint, or where it stands highest; that joint, from 0; and the share of the rated."""
+    own = data.rms(torque)
+    where = int(np.argmax(own / np.maximum(floor, 1e-12))) if joint is None else joint - 1
+    rated = data.logs[0].log.robot.joints[where].torque
+    return float(own[where]), where, float(own[where] / rated) if np.isfinite(rated) and rated > 0.0 else np.nan
+
+
+def _finding(found: Found, step: Step, best: Tried, place: int, covariance: Array, nominal: Array, floor: Array, gain: Gain,
+             draw: bool) -> Finding:
     effect, data = best.effect, step.before.data
     rivals = _rivals(step, best)
-    own = data.rms(found.final.data.y - found.final.left - _without(found.final, place))
-    joint = int(np.argmax(own / np.maximum(floor, 1e-12))) if effect.joint is None else effect.joint - 1
-    rated = data.logs[0].log.robot.joints[joint].torque
-    of_rated = float(own[joint] / rated) if np.isfinite(rated) and rated > 0.0 else np.nan
+    torque = data.y - found.final.left - _without(found.final, place)
+    size, _, of_rated = _size(torque, data, effect.joint, floor)
     numbers = parameters(found.final, place, covariance)
-    return Finding(effect.name, effect.joint, effect.title, numbers, explained(step, found, floor),
-                   best.visibility, rivals, effect.experiment if rivals else None, gain, "residual", float(own[joint]), of_rated,
+    origin: Literal["residual", "reversals"] = "reversals" if effect.evidence == "reversals" else "residual"
+    return Finding(effect.name, effect.joint, effect.title, numbers, explained(step.before.rms, best.done.rms, nominal, floor),
+                   best.visibility, rivals, effect.experiment if rivals else None, gain, origin, size, of_rated,
                    proof(step.before, best.done, effect.joint) if draw else None)
-
-
-def absorbed_finding(moved: Absorbed, told: Diagnosis) -> Finding:
-    """A cause that the base parameters took in: its gain is that over the parameters of the reference logs."""
-    joints = len(told.residual_rms.floor)
-    before, after = moved.rms
-    gain = Gain(TorqueGain(before, after, np.full((joints, 2), np.nan)), None, "none", None)
-    torque = float(np.sqrt(np.max(np.maximum(before**2 - after**2, 0.0))))
-    effect = moved.effect
-    return Finding(effect.name, effect.joint, effect.title, moved.parameters, moved.explained, 0.0, (), None, gain,
-                   "base parameters", torque, np.nan, None)
 
 
 def _without(done: Refined, place: int) -> Array:
@@ -93,6 +107,9 @@ def sure(step: Step, prepared: Prepared, blocks: int) -> str:
     gain = torque_gain(step.before, best.done, prepared.judge, blocks)
     if not (gain.ci95[:, 1] < 0.0).any():
         return "its gain on held-out torque is within what chance does"
+    data = best.done.data if prepared.judge is None else prepared.judge
+    if worse := worse_log(data, *(held_out_left(one, prepared.judge, blocks) for one in (step.before, best.done))):
+        return worse
     off = [f"{scale:.2g}" for scale in agreement(step, best, prepared) if not _AGREE[0] < scale < _AGREE[1]]
     return f"logs do not agree on its size: {', '.join(off)} of it" if off else ""
 
@@ -126,9 +143,11 @@ def rejected(found: Found, ruling: Ruling) -> tuple[Rejected, ...]:
     for step in found.steps:
         for trial in step.trials:
             key = (trial.cause, trial.joint)
-            if key in named or key in out or trial.gain <= trial.threshold:
+            doubted = trial.accepted and trial.step - 1 in ruling.doubts
+            if key in named or (key in out and not doubted) or trial.gain <= trial.threshold:
                 continue
-            out[key] = Rejected(trial.cause, trial.joint, ruling.reason or "not named" if trial.accepted else trial.reason)
+            why = ruling.doubts.get(trial.step - 1) or ruling.reason or "not named" if trial.accepted else trial.reason
+            out[key] = Rejected(trial.cause, trial.joint, why)
     return tuple(out.values())
 
 

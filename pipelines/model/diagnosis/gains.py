@@ -1,7 +1,8 @@
 """What a finding is worth on what was held out: torque residual, simulated position, tip.
 
     torque_gain(before, after, case)        with its bootstrap interval
-    simulated(arms, logs, ...)              position error of each arm, in closed loop or over short windows
+    simulation_errors(arms, logs)           position error of each arm, in closed loop or over short windows
+    farther(before, after)                  whether the second is worse than chance does
 """
 
 from __future__ import annotations
@@ -18,80 +19,134 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Refined
-from pipelines.model.diagnosis.result import TorqueGain
+from pipelines.model.diagnosis.result import BeforeAfter, Gain, TipError, TorqueGain
 from pipelines.model.diagnosis.search import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.simulation import Experiment, Plant, choose_step, simulate, simulate_windows
 
-__all__ = ["Simulation", "simulation_errors", "torque_gain"]
+__all__ = ["Simulation", "farther", "gain_of", "simulation_errors", "torque_gain", "torque_gain_of", "worse_log"]
 
 _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
 _LONGEST = 5.0  # [s] of a log that is simulated
+_SOFT = 1.5  # [s] the same, where something moves beside the joints of an arm, which takes many steps
 _WINDOW = 0.1  # [s]
 _LOGS = 2  # that are simulated
+_WORSE = 1.1  # times the error of a held-out log, that an extension must not exceed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Simulation:
     """How far the simulated arm is from the measured one, over the held-out logs."""
 
     how: Literal["closed-loop", "windowed", "none"]
     position_rms: Array  # [rad] (joints,)
     tip_rms: float  # [m]
+    power: Array  # [rad^2] (blocks,) summed over the joints and the samples of each block of time
+    samples: Array  # (blocks,)
+
+    @classmethod
+    def none(cls, joints: int) -> Simulation:
+        return cls("none", np.full(joints, np.nan), np.nan, np.zeros(0), np.zeros(0))
+
+
+def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
+    """All of it, as a finding has it; position and tip are None where one of the two could not be simulated."""
+    known = "none" not in (before.how, after.how)
+    return Gain(torque, BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how if known else "none",
+                TipError(before.tip_rms, after.tip_rms) if known else None)
 
 
 def torque_gain(before: Refined, after: Refined, judge: Data | None, blocks: int) -> TorqueGain:
     """Root mean square of the held-out torque residual, joint by joint, and how sure its change is."""
     data = after.data if judge is None else judge
     one, other = (held_out_left(x, judge, blocks) for x in (before, after))
+    return torque_gain_of(data, one, other)
+
+
+def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
+    """The same of residuals (rows,) [N m] of held-out rows."""
     place = data.blocks(_BLOCKS)
     count = int(place.max()) + 1
     ci = []
     for joint in range(data.n_joints):
         own = (data.joint == joint) & data.counts
         sums = [np.asarray(np.bincount(place[own], values, minlength=count), dtype=np.float64)
-                for values in (one[own] ** 2, other[own] ** 2, np.ones(int(own.sum())))]
+                for values in (before[own] ** 2, after[own] ** 2, np.ones(int(own.sum())))]
         ci.append(apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED)))
-    return TorqueGain(data.rms(one), data.rms(other), np.array(ci))
+    return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
+
+
+def worse_log(data: Data, before: Array, after: Array) -> str:
+    """In which held-out log the torque error grows by more than a tenth, of all joints together; empty where in none."""
+    for place, one in enumerate(data.logs):
+        own = (data.log_of == place) & data.counts
+        joints = data.joint[own]
+        overall = np.maximum(data.rms(before)[joints], 1e-12)
+        for scale in (1.0, overall):  # as they are, and each joint in units of its own error
+            was, now = (float(np.linalg.norm(x[own] / scale)) for x in (before, after))
+            if now > _WORSE * was:
+                return f"the torque error of {one.log.name}, held out, would be {100.0 * (now / was - 1.0):.0f} % larger"
+    return ""
+
+
+def farther(before: Simulation, after: Simulation) -> str:
+    """Why the second simulated arm is no nearer to the measured one than the first; empty where it is, or chance hides it."""
+    if before.how == "none":
+        return ""
+    if after.how == "none":
+        return "the simulated arm runs away with it"
+    low, _ = apart(before.power, after.power, before.samples, np.random.default_rng(_SEED))
+    return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
 
 
 def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
-    """Position error of each arm over the same logs: closed loop where all of them allow it, short windows else."""
+    """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else."""
     logs = motions[:_LOGS]
-    try:
-        return [_all(arm, logs, closed=True) for arm in arms]
-    except InputRejected:
-        pass
-    try:
-        return [_all(arm, logs, closed=False) for arm in arms]
-    except InputRejected:
-        return [Simulation("none", np.full(arm.n_joints, np.nan), np.nan) for arm in arms]
+    soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
+    for closed in (True, False):
+        try:
+            first = _all(arms[0], logs, closed, soft)
+        except InputRejected:
+            continue
+        return [first, *(_if_possible(arm, logs, closed, soft) for arm in arms[1:])]
+    return [Simulation.none(arm.n_joints) for arm in arms]
 
 
-def _all(arm: Arm, motions: Motions, closed: bool) -> Simulation:
-    power, tip, samples, steps = np.zeros(arm.n_joints), 0.0, 0, 1
+def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
+    try:
+        return _all(arm, motions, closed, soft)
+    except InputRejected:
+        return Simulation.none(arm.n_joints)
+
+
+def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
+    steps, seconds = 1, _SOFT if soft else _LONGEST
+    square, away = [], []
     for place, (log, found) in enumerate(motions):
         if closed and place == 0:  # one controller and one arm: what suffices for a log suffices for the next
-            steps = choose_step(Plant.of(arm), _first(log)).per_sample
-        q, seen = _closed(arm, log, steps) if closed else _windowed(arm, log, found)
+            steps = choose_step(Plant.of(arm), _first(log, seconds)).per_sample
+        q, seen = _closed(arm, log, steps, seconds) if closed else _windowed(arm, log, found)
         known = np.isfinite(q + seen).all(axis=1)
-        power += np.sum(np.square(q[known] - seen[known]), axis=0)
-        tip += float(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known]))))
-        samples += int(known.sum())
-    count = max(samples, 1)
-    return Simulation("closed-loop" if closed else "windowed", np.sqrt(power / count), float(np.sqrt(tip / count)))
+        square.append(np.square(q[known] - seen[known]))
+        away.append(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known])), axis=1))
+    each = np.concatenate(square)
+    block = np.arange(len(each)) * _BLOCKS // max(len(each), 1)
+    power = np.asarray(np.bincount(block, each.sum(axis=1), minlength=_BLOCKS), dtype=np.float64)
+    samples = np.asarray(np.bincount(block, minlength=_BLOCKS), dtype=np.float64)
+    return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples)
 
 
-def _closed(arm: Arm, log: ExperimentLog, steps: int) -> tuple[Array, Array]:
-    q = simulate(arm, _first(log), steps=steps).q[0]
+def _closed(arm: Arm, log: ExperimentLog, steps: int, seconds: float) -> tuple[Array, Array]:
+    q = simulate(arm, _first(log, seconds), steps=steps).q[0]
     return q, log.q[:len(q)]
 
 
-def _first(log: ExperimentLog) -> Experiment:
+def _first(log: ExperimentLog, seconds: float) -> Experiment:
     experiment = Experiment.of_log(log)
-    return experiment.part(0, min(experiment.n_samples, round(_LONGEST / log.sample_time)))
+    return experiment.part(0, min(experiment.n_samples, round(seconds / log.sample_time)))
 
 
 def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed) -> tuple[Array, Array]:
@@ -100,4 +155,3 @@ def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed) -> tuple[Array
     tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
     length = max(3, round(_WINDOW / log.sample_time))
     return simulate_windows(Plant.of(arm), found.motion, tau, log.sample_time, length, usable).q, found.motion.q
-

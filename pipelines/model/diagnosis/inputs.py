@@ -32,6 +32,7 @@ class Logs:
     validate: tuple[ExperimentLog, ...] = ()
     reference: tuple[ExperimentLog, ...] = ()
     frf: tuple[ExperimentLog, ...] = ()
+    frf_before: tuple[ExperimentLog, ...] = ()  # of role "reference"
 
     @classmethod
     def by_role(cls, logs: Sequence[ExperimentLog]) -> Logs:
@@ -39,7 +40,8 @@ class Logs:
         moving = [log for log in logs if log.experiment in _MOVING and log.origin != "planned"]
         parts = {role: tuple(log for log in moving if log.role == role) for role in ("identify", "validate", "reference")}
         return cls(parts["identify"], parts["validate"], parts["reference"],
-                   tuple(log for log in logs if log.experiment == "frf" and log.role != "reference"))
+                   *(tuple(log for log in logs if log.experiment == "frf" and (log.role == "reference") is before)
+                     for before in (False, True)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,41 +2,71 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.exact import Exact, Refined, refine
 from pipelines.model.diagnosis.findings import sure
+from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
 from pipelines.model.diagnosis.inputs import Prepared
-from pipelines.model.diagnosis.search import Case, Found, held_out
-from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.diagnosis.search import Case, Found, held_out, held_out_left
+from pipelines.model.diagnosis.verdict import Ruling, without_steps
 from pipelines.model.effects.base import Effect
 
-__all__ = ["settled"]
+__all__ = ["Settled", "settled"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
 
 
-def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared) -> tuple[Found, Ruling]:
-    """The search with a final model of exactly the causes that are named, in the order of their steps."""
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """What is believed of a search."""
+
+    found: Found  # its final model has exactly the causes that are named, in the order of their steps
+    ruling: Ruling
+    simulated: tuple[Simulation, ...]  # the nominal arm, then the arm after each accepted step; empty where nothing was accepted
+
+
+def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor: Array, known: bool = True) -> Settled:
+    """Only causes that keep every rule of acceptance; `floor` and `known` as in `rule`."""
     if ruling.verdict != "cause":
-        return replace(found, final=found.nominal), replace(ruling, named=())
-    doubts = {k: sure(found.steps[k], prepared, case.blocks) for k in ruling.named}
-    kept = _apart(found, [k for k in ruling.named if not doubts[k]])
+        return Settled(replace(found, final=found.nominal), replace(ruling, named=()), ())
+    simulated = _simulated(found, case, prepared)
+    doubts = {k: sure(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1]) for k in ruling.named}
+    doubts = {k: why for k, why in doubts.items() if why}
+    kept = _apart(found, [k for k in ruling.named if k not in doubts])
     final = _without(found, kept, case)
     while len(kept) > 1:
         idle = _idle(found, kept, case, final)
         if idle is None:
             break
         kept.remove(idle)
+        doubts[idle] = "beside the others it takes nothing off the held-out error"
         final = _without(found, kept, case, final)
-    if not kept:
-        return replace(found, final=found.nominal), Ruling("unknown", (), next(iter(doubts.values())))
-    return replace(found, final=final), replace(ruling, named=tuple(kept))
+    while kept and (why := _harm(found, final, case)):
+        doubts[kept.pop()] = why
+        final = _without(found, kept, case, final)
+    if kept:
+        return Settled(replace(found, final=final), replace(ruling, named=tuple(kept), doubts=doubts), simulated)
+    alone = without_steps(found, floor, known)
+    reason = f"{alone.reason}: {next(iter(doubts.values()), '')}" if alone.verdict == "unknown" else alone.reason
+    return Settled(replace(found, final=found.nominal), replace(alone, reason=reason, doubts=doubts), ())
+
+
+def _simulated(found: Found, case: Case, prepared: Prepared) -> tuple[Simulation, ...]:
+    arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in found.steps if step.best is not None)]
+    return tuple(simulation_errors([acted(arm, case.beside) for arm in arms], prepared.judging or prepared.motions))
+
+
+def _harm(found: Found, final: Refined, case: Case) -> str:
+    """Why the model with everything is worse than the nominal one on some held-out log."""
+    left = [held_out_left(one, case.judge, case.blocks) for one in (found.nominal, final)]
+    return worse_log(case.data if case.judge is None else case.judge, *left)
 
 
 def _apart(found: Found, kept: list[int]) -> list[int]:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.arm import Arm
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact, Refined, refine
@@ -59,6 +59,7 @@ class Case:
     blocks: int = 10
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Changed | None = None  # what has changed since the reference logs
+    beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
 
 
 @dataclass(frozen=True, eq=False)

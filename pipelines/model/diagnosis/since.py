@@ -8,13 +8,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.absorbed import Absorbed, absorbed
+from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.candidates import families, lay_one, whole_motion
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact, Refined
@@ -37,12 +38,16 @@ class Since:
     case: Case
     floor: Array  # (joints,) [N m]
     standing: tuple[Standing, ...]
-    acting: tuple[Acting, ...]  # the same, for a model
+    acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
     absorbed: Absorbed | None  # what the base parameters show
 
 
-def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings) -> Since:
-    """Standing effects, the gate for changes, and causes that base parameters show."""
+def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = ()) -> Since:
+    """Standing effects, the gate for changes, and causes that base parameters show.
+
+    Args:
+        before: effects that were taken out of the rows already.
+    """
     columns, fit = fit_nominal(reference, prepared.columns)
     arm = Exact.start(columns, fit).arm
     data, later = joined(reference, prepared.data)
@@ -54,8 +59,8 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     whole = fit_columns(data, np.concatenate([apart(nominal, later), common]))
     shared = whole.beta[2 * len(nominal):]
     sizes = _split(shared, standing)
-    now = replace(prepared.data, known=_known(prepared.data, standing, sizes, arm))
-    judge = prepared.judge and replace(prepared.judge, known=_known(prepared.judge, standing, sizes, arm))
+    now = less(prepared.data, _known(prepared.data, standing, sizes, arm))
+    judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm))
     start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
 
     def changed(found: Refined, wanted: Sequence[bool]) -> tuple[Sequence[Screened], Thresholds]:
@@ -66,12 +71,14 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
             more[:, later] = found.slopes[places]
         return changes(data, later, nominal, common, more, found.weight, every, wanted, arm)
 
-    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed)
+    acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
+    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed,
+                beside=(*before, *acting))
     kept = len(columns.kept)
     moved = absorbed(data, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
     pairs = list(zip(standing, sizes, strict=True))
     return Since(case, reference.rms(whole.left[~later]), tuple(_told(one, size, arm) for one, size in pairs),
-                 tuple(_acting(one, size, arm) for one, size in pairs), moved)
+                 case.beside, moved)
 
 
 def _torques(data: Data, standing: Sequence[Chosen], arm: Arm) -> Array:

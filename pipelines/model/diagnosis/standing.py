@@ -85,7 +85,10 @@ def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> 
 
 def joined(reference: Data, later: Data) -> tuple[Data, Mask]:
     """The rows of both, and which of them are later ones."""
-    data = Data((*reference.logs, *later.logs))
+    parts = (reference, later)
+    known = None if all(part.known is None for part in parts) else np.concatenate(
+        [np.zeros(part.rows) if part.known is None else part.known for part in parts])
+    data = Data((*reference.logs, *later.logs), known=known)
     return data, data.log_of >= len(reference.logs)
 
 
@@ -107,8 +110,9 @@ def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array,
     """
     fit = fit_columns(data, np.concatenate([apart(nominal, later), common, more]), weight=weight)
     masks = _nothing(data, ~later)
-    before = replace(data, logs=data.logs[:int(data.log_of[~later].max()) + 1])
     rows = ~later
+    known = None if data.known is None else data.known[rows]
+    before = replace(data, logs=data.logs[:int(data.log_of[rows].max()) + 1], known=known)
     still = [fit_columns(before, np.concatenate([apart(nominal[:, rows], mask[rows]), common[:, rows]]), data.y[rows], weight)
              for mask in masks]
     found, own = [], []

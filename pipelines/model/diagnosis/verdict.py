@@ -6,19 +6,25 @@ half of what stands above it, nothing is: the name would be wrong more often tha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["Ruling", "explained", "rule"]
+__all__ = ["Ruling", "excess", "explained", "rule", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
 _REST = 0.35  # of a joint's residual that may be left beside a named cause, where it still stands above the floor
+
+
+_NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
+             "testable without a floor: reference logs, or logs whose controller is known and a twin")
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,8 @@ class Ruling:
 
     verdict: Literal["cause", "nothing-wrong", "unknown"]
     named: tuple[int, ...]  # places of the steps whose cause is named
-    reason: str
+    reason: str  # why "unknown", or what "nothing-wrong" cannot vouch for
+    doubts: Mapping[int, str] = field(default_factory=dict)  # of steps that were accepted and are not named
 
 
 def excess(rms: Array, floor: Array) -> float:
@@ -35,12 +42,10 @@ def excess(rms: Array, floor: Array) -> float:
     return float(np.sum(np.maximum(np.square(rms / floor) - 1.0, 0.0)))
 
 
-def explained(step: Step, found: Found, floor: Array) -> float:
-    """Share of the excess of the nominal residual that this step takes away."""
-    if step.best is None:
-        return 0.0
-    whole = excess(found.nominal.rms, floor)
-    return float(np.clip((excess(step.before.rms, floor) - excess(step.best.done.rms, floor)) / max(whole, 1e-12), 0.0, 1.0))
+def explained(before: Array, after: Array, nominal: Array, floor: Array) -> float:
+    """Share of the excess of the nominal residual that is taken away between two models; each (joints,) [N m] rms."""
+    whole = excess(nominal, floor)
+    return float(np.clip((excess(before, floor) - excess(after, floor)) / max(whole, 1e-12), 0.0, 1.0))
 
 
 def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
@@ -50,8 +55,16 @@ def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
         known: whether the floor is that of an arm in order, twin or reference; else it is only the noise, which the models of
             recorded arms never come down to, and what pays on held-out time is named.
     """
-    accepted = [step for step in found.steps if step.best is not None]
-    other = next((step.other for step in found.steps if step.other is not None), None)
+    return _ruled(found, floor, known, [step for step in found.steps if step.best is not None])
+
+
+def without_steps(found: Found, floor: Array, known: bool) -> Ruling:
+    """The same where nothing that was found is believed."""
+    return _ruled(replace(found, final=found.nominal), floor, known, [])
+
+
+def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Ruling:
+    other = next((step.other for step in found.steps if step.other is not None and (known or _much(step.other, found))), None)
     joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
     high = ", ".join(f"joint {j + 1}" for j in joints.tolist())
     if other is not None and (not accepted or len(joints)):
@@ -59,9 +72,9 @@ def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
         return Ruling("unknown", (), f"{where} gives way, of a kind that these logs do not tell: record frequency responses in two "
                       "postures")
     if not accepted:
-        if len(joints):
+        if len(joints) and known:
             return Ruling("unknown", (), f"the residual of {high} stands above the floor, and no cause explains it")
-        return Ruling("nothing-wrong", (), "")
+        return Ruling("nothing-wrong", (), _NO_FLOOR if len(joints) else "")
     if not known:
         return Ruling("cause", tuple(range(len(accepted))), "")
     whole = excess(found.nominal.rms, floor)
@@ -72,3 +85,10 @@ def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {high} well above the floor")
     return Ruling("cause", tuple(range(len(accepted))), "")
+
+
+def _much(other: Screened, found: Found) -> bool:
+    """Without a floor: whether what gives way would explain half of what its joint leaves, or all joints."""
+    residual, joint = found.nominal.residual, other.joint
+    own = residual if joint is None else residual[found.nominal.data.joint == joint - 1]
+    return float(other.gain[0]) > _HALF * float(own @ own)

@@ -20,10 +20,10 @@ def test_a_soft_base_is_named_with_its_frequency() -> None:
     found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm())
     assert found is not None
     assert not found.rigid
-    assert [(one.cause, one.joint, one.origin) for one in found.findings] == [("base_resonance", None, "frequency responses")]
-    numbers = found.findings[0].parameters
-    assert numbers["frequency"].value == pytest.approx(28.0, abs=0.2)
-    assert numbers["damping_ratio"].value == pytest.approx(0.04, rel=0.1)
+    assert [one.place for one in found.named] == ["base_resonance"]
+    numbers = found.named[0].values
+    assert numbers["frequency"] == pytest.approx(28.0, abs=0.2)
+    assert numbers["damping_ratio"] == pytest.approx(0.04, rel=0.1)
 
 
 def test_without_responses_what_gives_way_is_not_testable() -> None:
@@ -39,7 +39,7 @@ def test_responses_of_no_use_are_said() -> None:
     still = replace(log, signals={**log.signals, "v": replace(log.signals["v"], values=np.zeros_like(log.signals["v"].values))})
     found = compliance([still], synthetic_arm())
     assert found is not None
-    assert not found.findings
+    assert not found.named
     assert not found.rigid
     assert {one.reason for one in untold(found)} == {found.open}
     assert "frequency responses are of no use" in found.open
@@ -48,5 +48,5 @@ def test_responses_of_no_use_are_said() -> None:
 def test_a_cause_left_out_is_not_named() -> None:
     found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm(), ("base_resonance",))
     assert found is not None
-    assert not found.findings
+    assert not found.named
     assert not found.rigid

@@ -60,9 +60,16 @@ def test_what_gives_way_is_not_named_by_the_residual() -> None:
 def test_two_causes_share_what_stands_above_the_floor() -> None:
     """Each joint's excess is that of its own cause."""
     case = found(left(0.01, 0.05, 0.03), left(0.01, 0.01, 0.03), left(0.01, 0.01, 0.01))
-    shares = [explained(step, case, FLOOR) for step in case.steps[:2]]
+    shares = [explained(step.before.rms, step.best.done.rms, case.nominal.rms, FLOOR) for step in case.steps[:2]]
     assert shares == pytest.approx([24.0 / 32.0, 8.0 / 32.0])
     assert rule(case, FLOOR).named == (0, 1)
+
+
+def test_without_a_floor_what_is_left_is_no_alarm() -> None:
+    """Of every recorded arm more than noise is left; what the answer cannot vouch for is said."""
+    ruling = rule(found(left(0.011, 0.05, 0.01)), FLOOR, known=False)
+    assert ruling.verdict == "nothing-wrong"
+    assert "not testable without a floor" in ruling.reason
 
 
 def test_excess_counts_no_joint_below_its_floor() -> None:

@@ -1,0 +1,77 @@
+"""A cause that the base parameters took in, a load at the tip, made a finding of its own: the arm before it, and the arm with it.
+
+The parameters fitted to the later logs hold the load. Less what the load adds to them, they are those of the bare arm, which is the
+model that the reference logs gave; held-out logs say how wrong that has become, and how right the bare arm with the load is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.absorbed import Absorbed
+from pipelines.model.diagnosis.beside import acted
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.evidence import proof
+from pipelines.model.diagnosis.exact import Refined
+from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of, worse_log
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.nominal import rigid_rows
+from pipelines.model.diagnosis.result import Finding
+from pipelines.model.diagnosis.search import held_out_left
+
+__all__ = ["Carried", "carried"]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """The finding, and the model with it."""
+
+    finding: Finding
+    arm: Arm  # the bare arm with every effect, and the load around them
+    doubt: str  # why it is not believed; empty where it is
+
+
+def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, standing: Sequence[Acting], blocks: int,
+            draw: bool) -> Carried:
+    """What the base parameters show, as a finding with its gain.
+
+    Args:
+        done: the final model of the later logs, whose base parameters hold the load.
+        whole: the same as an arm, with the standing effects and all deviations.
+    """
+    effect, data, judge = moved.effect, done.data, prepared.judge
+    load = data.lay(lambda motion: effect.torque(motion, done.model.nominal, moved.values))
+    rigid = rigid_rows(data, done.model.columns)
+    shift = np.linalg.lstsq((rigid * done.weights).T, load * done.weights, rcond=None)[0]
+    beta = done.model.beta.copy()
+    beta[:len(shift)] -= shift
+    bare = replace(done.model, beta=beta)
+    before = replace(done, model=bare, left=data.y - bare.torque(data))
+    left = (before.left if judge is None else judge.y - bare.torque(judge)), held_out_left(done, judge, blocks)
+    rows = data if judge is None else judge
+    torque = torque_gain_of(rows, *left)
+    arms = [acted(model.arm, standing) for model in (bare, done.model)]
+    simulated = simulation_errors(arms, prepared.judging or prepared.motions)
+    doubt = "" if (torque.ci95[:, 1] < 0.0).any() else "what moved in the base parameters does not show on held-out torque"
+    doubt = doubt or worse_log(rows, *left) or farther(*simulated)
+    size, joint, of_rated = _size(load, data)
+    finding = Finding(effect.name, effect.joint, effect.title, moved.parameters, moved.explained, 0.0, (), None,
+                      gain_of(torque, *simulated), "base parameters", size, of_rated,
+                      proof(before, done, joint + 1) if draw else None)
+    acting = Acting.of(effect, moved.values, moved.std)
+    place = {i: k for k, i in enumerate(done.model.columns.kept)}
+    base = tuple(replace(p, value=p.value - float(shift[place[i]])) if i in place else p for i, p in enumerate(whole.base))
+    return Carried(finding, replace(whole, base=base, effects=(*whole.effects, acting)), doubt)
+
+
+def _size(load: Array, data: Data) -> tuple[float, int, float]:
+    """[N m] rms at the joint that feels most of it, that joint, and the share of its rated torque."""
+    own = data.rms(load)
+    joint = int(np.argmax(own))
+    rated = data.logs[0].log.robot.joints[joint].torque
+    return float(own[joint]), joint, float(own[joint] / rated) if np.isfinite(rated) and rated > 0.0 else np.nan

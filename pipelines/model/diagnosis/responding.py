@@ -1,0 +1,108 @@
+"""Frequency responses go first: what they name is subtracted, and all else is looked for beside it.
+
+    first = responding(prepared, logs, settings)
+    first.held             the case and the rows less what gives way, and what that is worth
+    first.standing         what gave way before as well
+    first.undecided        what gives way now, of which nobody knows whether it did before
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.beside import Held, beside, less, torque_of
+from pipelines.model.diagnosis.compliance import Compliance, compared, compliance
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.linear import deviations
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
+from pipelines.model.diagnosis.result import NotTestable, Standing, Value
+from pipelines.model.diagnosis.search import Case
+
+__all__ = ["Responding", "responding"]
+
+_SURE = 3.0  # standard deviations
+_THERE, _NOT_THERE = 0.4, 0.6  # of its strength now, that the reference shows at least; at most
+_OPEN = "it gives way now; whether it did before, the reference logs do not tell"
+
+
+@dataclass(frozen=True, eq=False)
+class Responding:
+    """What frequency responses say, put to use."""
+
+    stiff: Compliance | None  # None without frf logs
+    held: Held
+    standing: tuple[Standing, ...] = ()
+    undecided: tuple[NotTestable, ...] = ()
+
+
+def responding(case: Case, prepared: Prepared, without: Sequence[str] = ()) -> Responding:
+    """What gives way is taken out of all rows: out of those of the reference where it did before as well."""
+    logs, arm = prepared.logs, case.model.nominal
+    stiff = compliance(logs.frf, arm, without)
+    if stiff is None or not stiff.named:
+        return Responding(stiff, Held(case, prepared, ()))
+    if prepared.reference is None:
+        return Responding(stiff, beside(case, prepared, stiff.named))
+    new, old, open_ = _apart(stiff, compliance(logs.frf_before, arm, without), prepared.reference, arm, prepared)
+    told = []
+    for acting in (*old, *open_):
+        case, prepared, share = _taken_out(case, prepared, acting, arm, both=acting in old)
+        if acting in old:
+            told.append(_standing(acting, share))
+    left = tuple(NotTestable(one.effect.name, one.effect.joint, _OPEN, f"{one.effect.experiment} Before and after.")
+                 for one in open_)
+    return Responding(stiff, beside(case, prepared, new), tuple(told), left)
+
+
+def _apart(stiff: Compliance, before: Compliance | None, reference: Data, arm: Arm,
+           prepared: Prepared) -> tuple[tuple[Acting, ...], tuple[Acting, ...], tuple[Acting, ...]]:
+    """What is new, what stands, what nobody knows: by the reference's own responses, else by how it moved."""
+    if before is not None:
+        both = compared(stiff, before)
+        return both.new, both.standing, ()
+    _, fit = fit_nominal(reference, prepared.columns)
+    new: list[Acting] = []
+    old: list[Acting] = []
+    open_: list[Acting] = []
+    for acting in stiff.named:
+        share, std = _strength(acting, reference, fit, arm)
+        where = old if share - _SURE * std > _THERE else new if share + _SURE * std < _NOT_THERE else open_
+        where.append(acting)
+    return tuple(new), tuple(old), tuple(open_)
+
+
+def _strength(acting: Acting, reference: Data, fit: Fit, arm: Arm) -> tuple[float, float]:
+    """The share of the effect's torque that the reference logs ask for, and its standard deviation."""
+    column = torque_of((acting,), arm, reference)[None]
+    done = fit_columns(reference, np.concatenate([fit.table, column]), weight=fit.weight)
+    return float(done.beta[-1]), float(deviations(done.table * done.weights, done.residual)[-1])
+
+
+def _taken_out(case: Case, prepared: Prepared, acting: Acting, arm: Arm, both: bool) -> tuple[Case, Prepared, float]:
+    """Out of the later logs, and out of the reference where it stood then; the share of the reference's residual that it was."""
+    torque = torque_of((acting,), arm, prepared.data)
+    data = less(prepared.data, torque)
+    judge = None if prepared.judge is None else less(prepared.judge, torque_of((acting,), arm, prepared.judge))
+    reference, share = prepared.reference, 0.0
+    if both and reference is not None:
+        lower = less(reference, torque_of((acting,), arm, reference))
+        joint = (acting.effect.joint or 1) - 1
+        was, now = (fit_nominal(rows, prepared.columns)[1].rms[joint] for rows in (reference, lower))
+        reference, share = lower, float(max(0.0, 1.0 - (now / max(was, 1e-300)) ** 2))
+    prepared = replace(prepared, data=data, judge=judge, reference=reference)
+    columns, fit = fit_nominal(data, prepared.columns)
+    case = replace(case, data=data, judge=judge, model=Exact.start(columns, fit), weight=fit.weight, beside=(*case.beside, acting))
+    return case, prepared, share
+
+
+def _standing(acting: Acting, share: float) -> Standing:
+    known = {p.name: p for p in acting.parameters}
+    numbers = {name: Value(value, known[name].std if name in known else None, known[name].unit if name in known else "1")
+               for name, value in acting.effect.reported(acting.values).items()}
+    return Standing(acting.effect.name, acting.effect.joint, numbers, share)
