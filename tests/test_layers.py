@@ -21,20 +21,22 @@ LAYERS = {
     "pipelines.model.effects": 4,
     "pipelines.model": 5,
     "pipelines.report": 6,
+    "pipelines.recall": 7,
     "pipelines.stage": 7,
     "pipelines": 8,
-    "rrrid_cli": 9,
+    "pipelines.batch": 9,  # calls stages, and nothing but the command line calls it
+    "rrrid_cli": 10,
 }
-CALL_STAGES = {"pipelines.run", "pipelines.batch"}
+CALL_STAGES = {"pipelines.run"}
 DOORS = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": "pipelines.log",
     "pandas": "pipelines.log", "pyarrow": "pipelines.log", "filterpy": "pipelines.signal.kalman", "mujoco": "pipelines.bench",
     "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody", "pydantic": "pipelines.log", "pydantic_core": "pipelines.log",
-    "rich": "rrrid_cli",
+    "rich": "rrrid_cli", "pebble": "pipelines.batch", "dask": "pipelines.batch", "distributed": "pipelines.batch",
 }
 NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy alone
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.
-BY_NAME = {"pipelines.run", "pipelines.batch", "pipelines.model.effects", "pipelines.bench.faults",
+BY_NAME = {"pipelines.run", "pipelines.batch.plan", "pipelines.model.effects", "pipelines.bench.faults",
            "rrrid_cli.settings", "rrrid_cli.commands"}
 HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pipelines.errors import EnvironmentFault
 
-__all__ = ["environment_faults", "replace_folder", "staging_folder", "write_file"]
+__all__ = ["environment_faults", "replace_folder", "staging_folder", "sweep", "write_file"]
 
 _MARK = ".rrrid-tmp-"
 
@@ -52,7 +52,7 @@ def write_file(path: Path, fill: Callable[[Path], None]) -> None:
     with environment_faults(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         # The ending stays: writers choose the container by it.
-        _sweep(path.parent)
+        sweep(path.parent)
         draft = path.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}{path.suffix}"
         try:
             fill(draft)
@@ -71,7 +71,7 @@ def staging_folder(target: Path) -> Path:
     """
     with environment_faults(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-        _sweep(target.parent)
+        sweep(target.parent)
         folder = target.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}"
         folder.mkdir()
         return folder
@@ -100,7 +100,7 @@ def _prefix() -> str:
     return f"{_MARK}{zlib.crc32(platform.node().encode()):08x}-"
 
 
-def _sweep(folder: Path) -> None:
+def sweep(folder: Path) -> None:
     """Remove what killed processes of this machine left behind in `folder`."""
     for left in folder.glob(f"{_prefix()}*"):
         number = left.name.removeprefix(_prefix()).split("-")[0]

@@ -26,12 +26,13 @@ import numpy as np
 from pipelines.errors import EnvironmentFault, InputRejected, RrridError, UsageError
 from pipelines.log.experiment import Array
 
-__all__ = ["Answer", "guarded"]
+__all__ = ["Answer", "die_with_parent", "guarded"]
 
 _SECONDS = 10.0  # a healthy file of 20 MB takes a tenth of it
 _BYTES_A_SECOND = 5e6
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 _MEMORY = 1 << 30  # [B] beyond three times the file and what its samples need
+_PR_SET_PDEATHSIG = 1  # prctl(2)
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ def guarded(work: Callable[[], Answer], path: Path, *, seconds: float | None = N
     receive, send = os.pipe()
     # No signal between the fork and the child's own handlers: the child would run the rest of the parent's program.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
+    reader = os.getpid()
     try:
         with warnings.catch_warnings():
             # Python 3.12 warns of forks beside threads; ours runs one reader and leaves without touching any lock of theirs.
@@ -69,7 +71,7 @@ def guarded(work: Callable[[], Answer], path: Path, *, seconds: float | None = N
             child = os.fork()
         if child == 0:
             os.close(receive)
-            _serve(work, send, store, budget)
+            _serve(work, send, store, budget, reader)
         os.close(send)
         try:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -97,16 +99,27 @@ def _shared_file() -> int:
         return os.dup(file.fileno())
 
 
-def _serve(work: Callable[[], Answer], send: int, store: int, budget: int) -> NoReturn:
-    """The child: work, answer, leave without running anybody's clean-up."""
-    code = 0
+def die_with_parent() -> None:
+    """Linux: when the process that made this one is killed, this one ends as well, and nobody's work goes on unseen."""
+    import ctypes
+
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
+
+
+def _serve(work: Callable[[], Answer], send: int, store: int, budget: int, reader: int) -> NoReturn:
+    """The child of `reader`: work, answer, leave without running anybody's clean-up."""
+    code, lowered = 0, False
     try:
+        die_with_parent()
+        if os.getppid() != reader:  # it was killed before
+            os._exit(0)
         # A signal for the whole group is the parent's to answer, and it ends this child: a child that died of it alone
         # would look like a file that crashes the library.
         for number in _STOPPING:
             signal.signal(number, signal.SIG_IGN)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPPING)
-        _limit_memory(budget)
+        lowered = _limit_memory(budget)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # HDF5 prints its error stack there
         faulthandler.disable()  # a crash here is the parent's to tell
         try:
@@ -115,8 +128,10 @@ def _serve(work: Callable[[], Answer], send: int, store: int, budget: int) -> No
         except RrridError as problem:
             reply = {"error": {"exit": problem.exit_code, **problem.as_dict()}}
         except MemoryError:
-            reply = {"error": {"exit": 3, "code": "RRID-X05", "message": "needs more memory than a log may", "where": "",
-                               "remedy": "split the recording"}}
+            reply = {"error": {"where": "", "remedy": "split the recording", **(
+                {"exit": 6, "code": "RRID-P03", "message": "memory: reading it needs more than this process may use"}
+                if lowered else
+                {"exit": 3, "code": "RRID-X05", "message": "needs more memory than a log may"})}}
         text = json.dumps(reply).encode()
         while text:
             text = text[os.write(send, text):]
@@ -127,15 +142,19 @@ def _serve(work: Callable[[], Answer], send: int, store: int, budget: int) -> No
         os._exit(code)
 
 
-def _limit_memory(budget: int) -> None:
+def _limit_memory(budget: int) -> bool:
+    """Let the system refuse what goes beyond `budget`; True where the process was limited to less before."""
     import resource
 
+    lowered = False
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         wanted = pages * resource.getpagesize() + budget
-        resource.setrlimit(resource.RLIMIT_AS, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
+        lowered = hard != resource.RLIM_INFINITY and hard < wanted
+        resource.setrlimit(resource.RLIMIT_AS, (hard if lowered else wanted, hard))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    return lowered
 
 
 def _store(arrays: Mapping[str, Array], store: int) -> dict[str, list[int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from pipelines.log.atomic import write_file
 from pipelines.log.experiment import Array, ExperimentLog
 
-__all__ = ["csv_cell", "write_csv", "write_table"]
+__all__ = ["csv_cell", "write_csv", "write_rows", "write_table"]
 
 
 def csv_cell(text: str) -> str:
@@ -46,4 +46,15 @@ def write_table(path: Path, columns: Mapping[str, Array], units: Mapping[str, st
 
     schema = pa.schema([pa.field(name, pa.float64(), metadata={"units": units.get(name, "1")}) for name in columns])
     table = pa.table([pa.array(values) for values in columns.values()], schema=schema)
+    write_file(path, lambda draft: pq.write_table(table, draft, compression="zstd", write_page_checksum=True))
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, str | float | int | None]], kinds: Mapping[str, type]) -> None:
+    """Rows of named cells as Parquet; `kinds`: column -> str, float or int. What a row lacks is null."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    arrow = {str: pa.string(), float: pa.float64(), int: pa.int64()}
+    schema = pa.schema([pa.field(name, arrow[kind]) for name, kind in kinds.items()])
+    table = pa.table([pa.array([row.get(name) for row in rows], type=arrow[kind]) for name, kind in kinds.items()], schema=schema)
     write_file(path, lambda draft: pq.write_table(table, draft, compression="zstd", write_page_checksum=True))

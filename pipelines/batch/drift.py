@@ -1,0 +1,126 @@
+"""Say how figures moved from item to item against their own uncertainty.
+
+A figure x of n items, each with its standard deviation s: if nothing moved,
+
+    χ² = Σ ((xᵢ - x̄) / sᵢ)²,    x̄ = Σ (xᵢ/sᵢ²) / Σ (1/sᵢ²)
+
+follows a χ² distribution with n - 1 degrees of freedom (Bevington and Robinson 2003, eq. (4.17) for x̄, (4.19) for its variance,
+§ 4.4 for χ²). An item has moved where it lies more than 3 std from the mean of the others. A residual has no std of its own:
+it is judged by how much it scatters, from a median absolute deviation, where there are enough items.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.batch.record import Record
+from pipelines.log.experiment import Array
+
+__all__ = ["LIMIT", "Course", "Drift", "drift_of", "from_others"]
+
+LIMIT: Final = 3.0  # [std]
+_ENOUGH = 5  # items, to judge a residual by its scatter
+_MAD_TO_STD = 1.4826  # of a normal distribution (Rousseeuw and Croux 1993)
+
+
+@dataclass(frozen=True)
+class Course:
+    """One figure through the items of one robot, in the order of their recording."""
+
+    name: str
+    unit: str
+    items: tuple[str, ...]
+    value: Array
+    std: Array | None  # None: a residual
+    away: Array  # [std] of each item from the mean of the others; of a residual from the median
+    chi_square: float | None
+    freedom: int | None
+    probability: float | None  # of so large a χ², if nothing moved
+    trend: float  # [std] from the first item to the last
+
+    @property
+    def beyond(self) -> npt.NDArray[np.bool_]:
+        """Which of them are beyond the limit."""
+        return np.abs(self.away) > LIMIT
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """The items beyond the limit."""
+        return tuple(item for item, far in zip(self.items, self.beyond, strict=True) if far)
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Every figure that more than one item of a robot has."""
+
+    robot: str
+    figures: tuple[Course, ...]
+    residuals: tuple[Course, ...]
+
+
+def drift_of(records: Iterable[Record]) -> tuple[Drift, ...]:
+    """The courses of every robot's figures, in the order of the names; empty for robots with a single item."""
+    robots: dict[str, list[Record]] = {}
+    for record in sorted(records, key=lambda one: (one.recorded, one.name)):
+        if record.figures or record.residuals:
+            robots.setdefault(record.robot, []).append(record)
+    return tuple(Drift(robot, _figures(done), _residuals(done)) for robot, done in sorted(robots.items()) if len(done) > 1)
+
+
+def _figures(done: Sequence[Record]) -> tuple[Course, ...]:
+    courses = []
+    for name in dict.fromkeys(name for record in done for name in record.figures):
+        having = [record for record in done if name in record.figures]
+        if len(having) > 1 and len({record.figures[name][2] for record in having}) == 1:
+            value = np.array([record.figures[name][0] for record in having])
+            std = np.array([record.figures[name][1] for record in having])
+            chi_square, freedom = _chi_square(value, std), len(having) - 1
+            trend = float((value[-1] - value[0]) / np.hypot(std[-1], std[0]))
+            courses.append(Course(name, having[0].figures[name][2], tuple(r.name for r in having), value, std,
+                                  from_others(value, std), chi_square, freedom, _probability(chi_square, freedom), trend))
+    return tuple(courses)
+
+
+def _residuals(done: Sequence[Record]) -> tuple[Course, ...]:
+    courses = []
+    for name in dict.fromkeys(name for record in done for name in record.residuals):
+        having = [record for record in done if name in record.residuals]
+        if len(having) > 1:
+            value = np.array([record.residuals[name][0] for record in having])
+            scatter = _scatter(value)
+            away = (value - np.median(value)) / scatter if scatter > 0.0 else np.zeros(len(value))
+            trend = float(value[-1] - value[0]) / (np.sqrt(2.0) * scatter) if scatter > 0.0 else 0.0
+            courses.append(Course(name, having[0].residuals[name][1], tuple(r.name for r in having), value, None, away, None, None,
+                                  None, trend))
+    return tuple(courses)
+
+
+def from_others(value: Array, std: Array) -> Array:
+    """[std] by which each value is away from the weighted mean of the others."""
+    weight = 1.0 / std**2
+    others = np.sum(weight) - weight
+    mean = (np.sum(weight * value) - weight * value) / others
+    return np.asarray((value - mean) / np.sqrt(std**2 + 1.0 / others))
+
+
+def _chi_square(value: Array, std: Array) -> float:
+    weight = 1.0 / std**2
+    return float(np.sum(weight * (value - np.sum(weight * value) / np.sum(weight)) ** 2))
+
+
+def _probability(chi_square: float, freedom: int) -> float:
+    from scipy.special import gammaincc
+
+    return float(gammaincc(freedom / 2.0, chi_square / 2.0))
+
+
+def _scatter(value: Array) -> float:
+    """[unit of `value`] one standard deviation of most of them; 0 where too few tell."""
+    if len(value) < _ENOUGH:
+        return 0.0
+    return float(_MAD_TO_STD * np.median(np.abs(value - np.median(value))))

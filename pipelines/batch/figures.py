@@ -1,0 +1,98 @@
+"""Take out of a stage's result what can be followed from item to item: fitted figures with their std, and residuals.
+
+Any stage's result will do: a figure is what has `value`, `std` and `unit`; a residual is what bears one of a few names. Each
+gets a name in words from where it stands: "p1", "joint 2 viscous", "cogging joint 2 amplitude".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+__all__ = ["fitted", "residuals"]
+
+# What a result calls the error that is left, and its unit; arrays are per joint.
+_RESIDUALS: Final = {"torque_rms": "N m", "residual_rms": "N m", "relative_error": "1", "reconstruction_error_max": "rad"}
+# Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
+_NAMING: Final = ("name", "effect", "cause", "kind", "law", "joint", "posture", "method")
+_SILENT: Final = ("parameters", "result", "torque")
+_PASSED_OVER: Final = ("balance", "comparison", "ladder", "rejected", "detectable", "courses")
+_MOST = 400  # figures of one item
+
+
+def fitted(result: Mapping[str, Any]) -> dict[str, tuple[float, float, str]]:
+    """Name -> (value, std, unit) of every figure of `result` whose std is known."""
+    found: dict[str, tuple[float, float, str]] = {}
+    for name, holder in _walk(_single(result), ()):
+        if isinstance(holder, Mapping) and {"value", "std", "unit"} <= set(holder):
+            value, std = holder["value"], holder["std"]
+            if _number(value) and _number(std) and std > 0.0 and len(found) < _MOST:
+                found[_free(name, found)] = (float(value), float(std), str(holder["unit"]))
+    return found
+
+
+def residuals(result: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+    """Name -> (value, unit) of every residual of `result`."""
+    found: dict[str, tuple[float, str]] = {}
+    for name, holder in _walk(_single(result), ()):
+        for key, unit in _RESIDUALS.items():
+            if isinstance(holder, Mapping) and key in holder:
+                for words, value in _leaves(holder[key]):
+                    if len(found) < _MOST:
+                        found[_free(" ".join(filter(None, (name, key.replace("_", " "), words))), found)] = (value, unit)
+    return found
+
+
+def _single(result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Of a run its stages alone: what it repeats of them beside stands there as well."""
+    return {key: result[key] for key in ("stages", "runs") if result.get(key)} if "stages" in result else result
+
+
+def _walk(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
+    """Every object below `value`, with the words that lead to it."""
+    if isinstance(value, Mapping):
+        yield " ".join(path), value
+        for key, item in value.items():
+            if key not in _PASSED_OVER and key not in _RESIDUALS:
+                yield from _walk(item, path if key in _SILENT or isinstance(item, list) else (*path, key.replace("_", " ")))
+    elif isinstance(value, list):
+        for item in value:
+            yield from _walk(item, (*path, *_words(item)))
+
+
+def _words(item: Any) -> list[str]:
+    """What tells one of a list from the others."""
+    if not isinstance(item, Mapping):
+        return []
+    said = []
+    for key in _NAMING:
+        value = item.get(key)
+        if isinstance(value, str) and value and len(value) < 40:
+            said.append(value)
+        elif isinstance(value, int) and not isinstance(value, bool):
+            said.append(f"{key} {value}")
+    return said
+
+
+def _leaves(value: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, float]]:
+    if _number(value):
+        yield " ".join(words), float(value)
+    elif isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(item, (*words, key))
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _leaves(item, (*words, f"joint {index + 1}"))
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _free(name: str, taken: Mapping[str, Any]) -> str:
+    number, free = 1, name
+    while free in taken:
+        number += 1
+        free = f"{name} ({number})"
+    return free

@@ -1,0 +1,181 @@
+"""Say what came of all items: one verdict, one table, and how the figures of each robot moved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from pipelines.batch.baseline import known_figures
+from pipelines.batch.drift import LIMIT, Course, Drift
+from pipelines.batch.record import Record, Status
+from pipelines.errors import Check
+from pipelines.log.model_file import ModelFile
+from pipelines.report.drift_figures import Panel, drift_figure
+from pipelines.report.report import Figure, Report, Section, Table, Tone
+from pipelines.report.sections import checks_table
+from pipelines.report.style import format_number
+
+__all__ = ["Summary", "result_object", "rows_of", "summary_report"]
+
+_TONES: Final[dict[Status, Tone]] = {"ok": "good", "found": "attention", "rejected": "bad", "failed": "bad"}
+_ROWS = 2000  # items in one table of the page
+_DRAWN = 6  # figures of one robot
+_LISTED = 40  # of them in the table
+KINDS: Final[dict[str, type]] = {"item": str, "status": str, "exit": int, "code": str, "message": str, "verdict": str,
+                                 "robot": str, "recorded": str, "quantity": str, "value": float, "std": float, "unit": str,
+                                 "away": float}
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Everything about a batch that is known when it ends."""
+
+    stage: str
+    records: tuple[Record, ...]  # in the order of the items' names
+    drifts: tuple[Drift, ...]
+    checks: tuple[Check, ...] = ()
+    baseline: ModelFile | None = None
+    interrupted: bool = False
+
+    def count(self, *statuses: Status) -> int:
+        return sum(record.status in statuses for record in self.records)
+
+
+def result_object(summary: Summary) -> dict[str, Any]:
+    """What result.json holds. Nothing of it hangs on how, where and how fast the items were done."""
+    items = [{"name": r.name, "status": r.status, "error": r.error, "verdict": r.verdict, "exit": r.exit, "robot": r.robot,
+              "recorded": r.recorded or None, "folder": f"items/{r.slug}" if r.provenance else None} for r in summary.records]
+    counts = {status: summary.count(status) for status in _TONES}
+    drift = [{"robot": d.robot, "figures": list(map(_course_object, d.figures)),
+              "residuals": list(map(_course_object, d.residuals))} for d in summary.drifts]
+    return {"command": "batch", "stage": summary.stage, "items": items, "counts": counts, "drift": drift,
+            "baseline": None if summary.baseline is None else summary.baseline.name,
+            "checks": [check.as_dict() for check in summary.checks]}
+
+
+def _course_object(course: Course) -> dict[str, Any]:
+    return {"name": course.name, "unit": course.unit, "items": list(course.items), "value": course.value.tolist(),
+            "std": None if course.std is None else course.std.tolist(), "away": course.away.tolist(),
+            "chi_square": course.chi_square, "freedom": course.freedom,
+            "probability": course.probability, "trend": course.trend, "moved": list(course.moved)}
+
+
+def rows_of(summary: Summary) -> list[Mapping[str, str | float | int | None]]:
+    """One row for each figure and residual of each item, and one for an item that has none: the table of summary.parquet."""
+    away = {(c.name, item): float(far) for d in summary.drifts for c in (*d.figures, *d.residuals)
+            for item, far in zip(c.items, c.away, strict=True)}
+    rows: list[Mapping[str, str | float | int | None]] = []
+    for r in summary.records:
+        about: dict[str, str | float | int | None] = {
+            "item": r.name, "status": r.status, "exit": r.exit, "code": (r.error or {}).get("code"),
+            "message": (r.error or {}).get("message"), "verdict": r.verdict, "robot": r.robot, "recorded": r.recorded}
+        numbers: list[tuple[str, float, float | None, str]] = [(name, *figure) for name, figure in r.figures.items()]
+        numbers += [(name, value, None, unit) for name, (value, unit) in r.residuals.items()]
+        rows += [{**about, "quantity": name, "value": value, "std": std, "unit": unit, "away": away.get((name, r.name))}
+                 for name, value, std, unit in numbers] or [about]
+    return rows
+
+
+def summary_report(summary: Summary, figures: bool = True) -> Report:
+    """The page: verdict, counts, what is not in order, drift, every item.
+
+    Args:
+        figures: draw them; without, the page is there at once.
+    """
+    tone: Tone = "bad" if summary.count("rejected", "failed") or summary.interrupted else (
+        "attention" if summary.count("found") else "good")
+    words: dict[Status, str] = {"ok": "in order", "found": "something found", "rejected": "rejected", "failed": "failed"}
+    counts = Table(("items", "number"), tuple((said, summary.count(status)) for status, said in words.items()))
+    sections = [*_wrong(summary), *(s for drift in summary.drifts for s in _drift_section(drift, summary.baseline, figures)),
+                *_checks(summary), _all(summary)]
+    return Report(f"Batch: {summary.stage}", _verdict(summary), tone, counts, tuple(sections))
+
+
+def _verdict(summary: Summary) -> str:
+    total, wrong, found = len(summary.records), summary.count("rejected", "failed"), summary.count("found")
+    said = f"{total} items: {total - wrong - found} in order"
+    said += f", in {found} something was found" if found else ""
+    said += f", {wrong} {'was' if wrong == 1 else 'were'} rejected or failed" if wrong else ""
+    begun = "Interrupted; what is missing is done with --resume. " if summary.interrupted else ""
+    moved = [(c, d) for d in summary.drifts for c in d.figures if c.moved]
+    if not moved:
+        return f"{begun}{said}."
+    course, drift = max(moved, key=lambda one: float(np.max(np.abs(one[0].away))))
+    far = int(np.argmax(np.abs(course.away)))
+    of = f" of {drift.robot}" if len(summary.drifts) > 1 else ""
+    by = f"{format_number(abs(float(course.away[far])), 2)} std in {course.items[far]}"
+    return f"{begun}{said}. What moved most{of} is {course.name}: {by}."
+
+
+def _wrong(summary: Summary) -> list[Section]:
+    """The items that are not in order, the worst first."""
+    wrong = sorted((r for r in summary.records if r.status != "ok"), key=lambda r: -list(_TONES).index(r.status))
+    if not wrong:
+        return []
+    rows = tuple((r.name, r.status, (r.error or {}).get("code", "").removeprefix("RRID-"), _why(r)) for r in wrong[:_ROWS])
+    table = Table(("item", "status", "code", "why"), rows, caption="What a code stands for is the same in every report.",
+                  tones=tuple(_TONES[r.status] for r in wrong[:_ROWS]))
+    return [Section("Not in order", tables=(table,))]
+
+
+def _why(record: Record) -> str:
+    if record.error is None:
+        return record.verdict
+    where = f"{record.error['where']}: " if record.error["where"] not in ("", ".") else ""
+    remedy = f" ({record.error['remedy']})" if record.error["remedy"] else ""
+    return f"{where}{record.error['message']}{remedy}"
+
+
+def _checks(summary: Summary) -> list[Section]:
+    return [Section("Beside the items", tables=(checks_table(summary.checks),))] if summary.checks else []
+
+
+def _all(summary: Summary) -> Section:
+    rows = tuple((r.name, r.status, r.verdict or _why(r)) for r in summary.records[:_ROWS])
+    more = len(summary.records) - len(rows)
+    text = (f"{more} more stand in summary.parquet and result.json.",) if more else ()
+    return Section("All items", text, tables=(Table(("item", "status", "verdict"), rows, tones=tuple(
+        _TONES[r.status] for r in summary.records[:_ROWS])),))
+
+
+def _drift_section(drift: Drift, baseline: ModelFile | None, figures: bool) -> list[Section]:
+    """How one robot's figures moved; nothing for a robot whose items share none."""
+    if not drift.figures and not drift.residuals:
+        return []
+    ranked = sorted(drift.figures, key=lambda one: -float(np.max(np.abs(one.away))))
+    numbers = sum(len(course.value) for course in ranked)
+    beyond = sum(len(course.moved) for course in ranked)
+    text = ["Each figure is compared with the mean of the other items, in standard deviations of the difference. "
+            f"Of {numbers} figures {beyond} are beyond {LIMIT:g}; chance alone would put {numbers * 0.0027:.1f} there. "
+            "The probability is that of so large a χ² if nothing moved."] if ranked else []
+    if drift.residuals:
+        text.append("A residual has no deviation of its own: it is compared with the median, in deviations estimated from most of "
+                    "the items; with fewer than five it is not judged.")
+    tables = (_figure_table(ranked),) if ranked else ()
+    return [Section(f"Drift of {drift.robot}", tuple(text), tables, _figures(drift, ranked, baseline) if figures else ())]
+
+
+def _figure_table(ranked: Sequence[Course]) -> Table:
+    rows = tuple((c.name, c.chi_square, c.freedom, c.probability, float(np.max(np.abs(c.away))), c.trend,
+                  ", ".join(c.moved[:4]) + (f" and {len(c.moved) - 4} more" if len(c.moved) > 4 else "")) for c in ranked[:_LISTED])
+    tones: tuple[Tone, ...] = tuple("attention" if c.moved else "neutral" for c in ranked[:_LISTED])
+    more = "" if len(ranked) <= _LISTED else f" The {len(ranked) - _LISTED} that moved least stand in result.json."
+    return Table(("figure", "χ²", "freedom", "probability", "largest [std]", "first to last [std]", "moved"), rows,
+                 caption=f"What moved most stands first.{more}", tones=tones)
+
+
+def _figures(drift: Drift, ranked: Sequence[Course], baseline: ModelFile | None) -> tuple[Figure, ...]:
+    drawn = []
+    before = {} if baseline is None else known_figures(baseline)
+    for name, courses, words in (("drift", ranked, "The figures that moved most, with one std; those beyond three are red."),
+                                 ("residuals", drift.residuals, "What is left of torque or motion, item by item.")):
+        whole = [c for c in courses if courses and len(c.items) == max(len(one.items) for one in courses)]
+        same = [c for c in whole if c.items == whole[0].items][:_DRAWN]
+        if same:
+            panels = [Panel(c.name, c.unit, c.value, c.std, c.beyond, before.get(c.name)) for c in same]
+            grey = " The band is the baseline." if any(panel.before for panel in panels) else ""
+            drawn.append(drift_figure(f"{name}-{drift.robot}", words + grey, panels, same[0].items))
+    return tuple(drawn)
