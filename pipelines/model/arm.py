@@ -129,7 +129,11 @@ class Arm:
         rigid = replace(self, friction=(), effects=())
         torque = np.zeros_like(motion.q)
         for law in self.friction:
-            torque += law.effect.torque(motion, rigid, law.values)
+            curve = law.effect.speed_curve(law.values)
+            if curve is not None and law.effect.joint is not None:
+                torque[:, law.effect.joint - 1] += curve.torque(motion.dq[:, law.effect.joint - 1])
+            else:
+                torque += law.effect.torque(motion, rigid, law.values)
         return torque
 
     def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:

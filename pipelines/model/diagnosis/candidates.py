@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.data import Data, LogData
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -51,7 +52,7 @@ class Laid:
 
     first: int  # shape
     table: Array  # (shapes, k, rows here)
-    rows: Indices | slice  # which of all rows
+    rows: Indices  # which of all rows
 
 
 def place_of(cause: str, joint: int | None) -> str:
@@ -100,18 +101,37 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     for first in range(0, len(family.shapes), size):
         some = family.shapes[first:first + size]
         with np.errstate(all="ignore"):
-            tables = [[_finite(shape.columns(one.motion, arm)) for shape in some] for one in data.logs]
-        k = tables[0][0].shape[2]
-        acting = np.flatnonzero(np.any([table.any(axis=(0, 2)) for per_log in tables for table in per_log], axis=0))
-        laid = []
-        for one, per_log in zip(data.logs, tables, strict=True):
-            flat = np.concatenate([table[:, acting].transpose(2, 1, 0).reshape(-1, len(table)) for table in per_log])
-            laid.append(one.lay_signals(flat).reshape(len(some), k, -1))
+            acting, parts = _own(data, some, arm) if some[0].from_motion and family.joint else _anywhere(data, some, arm)
         rows = np.flatnonzero(np.isin(data.joint, acting))
-        found = np.concatenate(laid, axis=2)
+        found = np.concatenate(parts, axis=2)
         if not data.counts.all():
             found = np.where(data.counts[rows], found, 0.0)
         yield Laid(first, found, rows)
+
+
+def _own(data: Data, some: Sequence[Effect], arm: Arm) -> tuple[Indices, list[Array]]:
+    """The joint that they act on, and of each log (shapes, k, rows of that joint): kept, for they follow from the motion alone."""
+    laid = [one.keep(tuple(some), partial(_laid_own, one, some, arm)) for one in data.logs]
+    return np.array([(some[0].joint or 1) - 1]), [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
+
+
+def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
+    table = some[0].own_columns(some, one.motion, arm)
+    for shape in table:
+        shape[...] = _finite(shape)
+    return one.lay_signals(table.reshape(-1, table.shape[2]))
+
+
+def _anywhere(data: Data, some: Sequence[Effect], arm: Arm) -> tuple[Indices, list[Array]]:
+    """Joints that they act on, and of each log (shapes, k, rows of those joints)."""
+    tables = [[_finite(shape.columns(one.motion, arm)) for shape in some] for one in data.logs]
+    k = tables[0][0].shape[2]
+    acting = np.flatnonzero(np.any([table.any(axis=(0, 2)) for per_log in tables for table in per_log], axis=0))
+    laid = []
+    for one, per_log in zip(data.logs, tables, strict=True):
+        flat = np.concatenate([table[:, acting].transpose(2, 1, 0).reshape(-1, len(table)) for table in per_log])
+        laid.append(one.lay_signals(flat).reshape(len(some), k, -1))
+    return acting, laid
 
 
 def _finite(table: Array) -> Array:

@@ -12,7 +12,7 @@ next to the end of a stretch, where the low-pass has to guess what was before, a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.diagnosis.kept import Kept
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.rigid.body import Motion
@@ -33,6 +34,7 @@ Indices = npt.NDArray[np.intp]
 
 _PAD = 4.0  # periods of the cut-off a stretch is continued by
 _AMPLE = 24.0  # samples a period of the cut-off, at which columns are worked out at least
+_AT_ONCE = 8  # channels, which stay near the processor
 _END = 1.0  # periods of the cut-off left out at either end of a stretch
 
 
@@ -60,13 +62,18 @@ class _Run:
         return self._through(tau, self.response)
 
     def _through(self, x: Array, response: Array) -> Array:
-        pad, wide = self.pad, np.empty((len(x), x.shape[1] + 2 * self.pad))
-        wide[:, pad:-pad] = x
-        np.subtract(2.0 * x[:, :1], x[:, pad:0:-1], out=wide[:, :pad])
-        np.subtract(2.0 * x[:, -1:], x[:, -2:-pad - 2:-1], out=wide[:, -pad:])
-        spectrum = np.fft.rfft(wide, n=self.size, axis=1)[:, :len(response)]
-        spectrum *= response / self.every
-        return np.asarray(np.fft.irfft(spectrum, n=self.size // self.every, axis=1)[:, self.chosen + pad // self.every])
+        pad, end, out = self.pad, x.shape[1] + self.pad, np.empty((len(x), len(self.chosen)))
+        wide, places = np.zeros((min(len(x), _AT_ONCE), self.size)), self.chosen + pad // self.every
+        for first in range(0, len(x), _AT_ONCE):
+            some = x[first:first + _AT_ONCE]
+            table = wide[:len(some)]
+            table[:, pad:end] = some
+            np.subtract(2.0 * some[:, :1], some[:, pad:0:-1], out=table[:, :pad])
+            np.subtract(2.0 * some[:, -1:], some[:, -2:-pad - 2:-1], out=table[:, end:end + pad])
+            spectrum = np.fft.rfft(table, axis=1)[:, :len(response)]
+            spectrum *= response / self.every
+            out[first:first + _AT_ONCE] = np.fft.irfft(spectrum, n=self.size // self.every, axis=1)[:, places]
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +87,8 @@ class LogData:
     weighed: npt.NDArray[np.bool_]  # (joints, rows) which rows count: those of a joint that is not too slow
     pieces: tuple[slice, ...]  # of each run among those samples
     runs: tuple[_Run, ...]
+    kept: Kept  # what was laid before, of all logs gathered with it
+    place: int  # among them
 
     @property
     def n_joints(self) -> int:
@@ -109,6 +118,10 @@ class LogData:
         if table.ndim == 2:
             return out
         return out.reshape(table.shape[1], table.shape[2], self.rows).transpose(1, 0, 2)
+
+    def keep(self, key: Hashable, lay: Callable[[], Array]) -> Array:
+        """What `lay()` makes, or made before under the same key; not to be written to."""
+        return self.kept.of((self.place, key), lay)
 
     def lay_signals(self, x: Array) -> Array:
         """(channels, samples) -> (channels, rows)."""
@@ -168,6 +181,11 @@ class Data:
         laid = [one.lay(torque(self.first + k, one.motion)) for k, one in enumerate(self.logs)]
         return self._counted(np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1))
 
+    def lay_kept(self, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
+        """As `lay` of columns (samples, joints, k) that follow from the motion alone; `key` says which they are."""
+        laid = [_kept(one, key, torque) for one in self.logs]
+        return self._counted(np.concatenate([x.reshape(len(x), -1) for x in laid], axis=-1))
+
     def blocks(self, count: int) -> Indices:
         """(rows,) to which of about `count` stretches of time a row belongs, each within one log, all joints alike."""
         total = sum(one.rows for one in self.logs)
@@ -195,6 +213,10 @@ class Data:
         return x if self.counts.all() else np.where(self.counts, x, 0.0)
 
 
+def _kept(one: LogData, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
+    return one.keep(key, lambda: one.lay(torque(one.motion)))
+
+
 def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Rows] | None = None, first: int = 0) -> Data:
     """The rows of the logs; `recipe` with its cut-off.
 
@@ -205,11 +227,11 @@ def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Ro
     Raises:
         InputRejected: T04, every stretch of a log is too short for the low-pass, or spoilt.
     """
-    logs = zip(motions, equations_of(motions, recipe, columns, rows), strict=True)
-    return Data(tuple(_of_log(log, equations) for (log, _), equations in logs), first)
+    logs, kept = zip(motions, equations_of(motions, recipe, columns, rows), strict=True), Kept()
+    return Data(tuple(_of_log(log, equations, kept, k) for k, ((log, _), equations) in enumerate(logs)), first)
 
 
-def _of_log(log: ExperimentLog, equations: LogEquations) -> LogData:
+def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int) -> LogData:
     stretches = [equations.stretch(run) for run in equations.runs]
     fine = [_run(equations, run) for run in equations.runs]
     y = np.concatenate([run.lay_command(tau.T) for run, (_, tau) in zip(fine, stretches, strict=True)], axis=1)
@@ -221,7 +243,7 @@ def _of_log(log: ExperimentLog, equations: LogEquations) -> LogData:
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     runs = tuple(_run(equations, run, skip) for run in equations.runs)
     slow = np.concatenate([equations.rows.slow[run][one.chosen * one.every] for run, one in zip(equations.runs, fine, strict=True)])
-    return LogData(log, equations, Motion(t, q, dq, ddq, tau), y, ~slow.T, pieces, runs)
+    return LogData(log, equations, Motion(t, q, dq, ddq, tau), y, ~slow.T, pieces, runs, kept, place)
 
 
 def _skipped(equations: LogEquations) -> int:

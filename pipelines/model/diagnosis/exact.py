@@ -20,7 +20,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.nominal import Fit, law_rows, law_slopes, nominal_arm, rigid_rows
+from pipelines.model.diagnosis.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 
@@ -101,9 +101,37 @@ class Exact:
                   for one in self.effects if one.log in (None, log)]
         return self.nominal.extended(*acting)
 
+    @property
+    def core(self) -> int:
+        """How many of the effects the torque has to be worked out with as a whole: all up to the last that does not just add."""
+        return max((k + 1 for k, one in enumerate(self.effects) if not one.effect.adds), default=0)
+
     def torque(self, data: Data) -> Array:
         """(rows,)"""
-        return data.lay_each(lambda log, motion: self.arm_in(log).torque(motion))
+        core = self.core
+        parts = [self.added(data, one) for one in self.effects[core:]]
+        return np.asarray(sum(parts, self.core_torque(data, core)))
+
+    def core_torque(self, data: Data, core: int) -> Array:
+        """(rows,) of the nominal model and the first `core` effects."""
+        if core:
+            inner = replace(self, effects=self.effects[:core])
+            return data.lay_each(lambda log, motion: inner.arm_in(log).torque(motion))
+        if not all(law.from_motion for law in self.columns.laws):
+            return data.lay(self.nominal.torque)
+        kept = len(self.columns.kept)
+        torque, first = self.beta[:kept] @ rigid_rows(data, self.columns), kept
+        for law in self.columns.laws:
+            count = sum(not q.shape for q in law.parameters)
+            torque = torque + self.beta[first:first + count] @ law_rows(data, law, self.columns)
+            first += count
+        return np.asarray(torque)
+
+    def added(self, data: Data, one: Named) -> Array:
+        """(rows,) what an effect adds, beside the nominal model, in the logs it belongs to."""
+        values = one.values
+        torque = one.effect.amplitudes(values) @ effect_rows(data, one.effect.at(values), self.nominal)
+        return np.asarray(torque if one.log is None else np.where(data.log_of == one.log - data.first, torque, 0.0))
 
     def moved(self, shift: Array, names: list[tuple[int, int, str]]) -> Exact:
         """Every number moved: base first, then what `names` says: shapes of laws, numbers of effects."""
@@ -189,7 +217,7 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
     rigid = rigid_rows(data, model.columns)
     left = y - model.torque(data)
     now = float(np.sum(np.square(left * weights)))
-    slopes, names = _slopes(model, data, rigid, y - left)
+    slopes, names = _slopes(model, data, rigid)
     for _ in range(steps):
         better = False
         for ridge in _RIDGES:
@@ -206,23 +234,29 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
         if not better:
             break
         gained, model, left, now = 1.0 - power / now, there, other, power
-        slopes, names = _slopes(model, data, rigid, y - left)
+        slopes, names = _slopes(model, data, rigid)
         if gained < _GAIN:
             break
     return Refined(model, data, weight, left, slopes, tuple(names))
 
 
-def _slopes(model: Exact, data: Data, rigid: Array, torque: Array) -> tuple[Array, list[tuple[int, int, str]]]:
+def _slopes(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[tuple[int, int, str]]]:
     laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
     bent, which = law_slopes(data, model.columns, model.beta)
     names = [(0, place, name) for place, name in which]
-    more = list(bent)
+    more, core = list(bent), model.core
+    here = model.core_torque(data, core) if core else np.zeros(0)
     for place, one in enumerate(model.effects):
+        alone = model.added(data, one) if place >= core else here
         for name, step in _steps(one):
             names.append((1, place, name))
-            effects = list(model.effects)
-            effects[place] = number_moved(one, name, step)
-            more.append((replace(model, effects=tuple(effects)).torque(data) - torque)[None] / step)
+            moved = number_moved(one, name, step)
+            if place >= core:
+                there = model.added(data, moved)
+            else:
+                effects = (*model.effects[:place], moved, *model.effects[place + 1:core])
+                there = replace(model, effects=effects).core_torque(data, core)
+            more.append((there - alone)[None] / step)
     return np.concatenate([rigid, *laws, *more]), names
 
 

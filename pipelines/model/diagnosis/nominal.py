@@ -17,12 +17,12 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.effects.base import Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
 
-__all__ = ["Fit", "fit_columns", "fit_nominal", "law_rows", "law_slopes", "nominal_arm", "orthonormal", "polish", "rigid_rows",
-           "rows_of"]
+__all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_slopes", "nominal_arm", "orthonormal", "polish",
+           "rigid_rows", "rows_of"]
 
 _RANK = 1e-12  # of the largest: smaller eigenvalues of the Gram matrix of unit columns are rounding
 _ROUNDS = 6  # of weights
@@ -123,11 +123,20 @@ def rows_of(data: Data, columns: Columns) -> Array:
 
 def rigid_rows(data: Data, columns: Columns) -> Array:
     kept = list(columns.kept)
-    return data.lay(lambda motion: columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept])
+    return data.lay_kept((columns.body, columns.kept),
+                         lambda motion: columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept])
 
 
 def law_rows(data: Data, law: Effect, columns: Columns) -> Array:
-    return data.lay(lambda motion: law.columns(motion, columns.arm))
+    """(k, rows)"""
+    return effect_rows(data, law, columns.arm)
+
+
+def effect_rows(data: Data, effect: Effect, arm: ArmModel) -> Array:
+    """(k, rows) columns of an effect in one shape."""
+    if effect.from_motion:
+        return data.lay_kept(effect, lambda motion: effect.columns(motion, arm))
+    return data.lay(lambda motion: effect.columns(motion, arm))
 
 
 def fit_nominal(data: Data, columns: Columns) -> tuple[Columns, Fit]:

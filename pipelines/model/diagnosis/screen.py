@@ -69,9 +69,9 @@ def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arra
             shapes = tuple(family.shapes[0].promising(one.motion, arm, full))
             if not shapes:
                 continue
-            for laid in lay_family(data, replace(family, shapes=shapes), arm):
-                only = data.log_of[laid.rows] == place
-                gains, seen, size = gains_of(replace(laid, table=np.where(only, laid.table, 0.0)), fit, residual[None])
+            alone, start = replace(data, logs=(one,)), int(np.argmax(data.log_of == place))
+            for laid in lay_family(alone, replace(family, shapes=shapes), arm):
+                gains, seen, size = gains_of(replace(laid, rows=start + laid.rows), fit, residual[None])
                 reach.append(float(np.median(size)))
                 width = laid.table.shape[1]
                 top = int(np.argmax(gains[:, 0]))

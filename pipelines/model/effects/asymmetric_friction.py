@@ -35,6 +35,7 @@ class AsymmetricFriction(Effect):
     remedy = "Compensate each direction with its own coefficients; look at preload and seals."
     experiment = "Hold still for two seconds in several positions, then move at several equal speeds in both directions."
     twins = ("torque_offset", "spring")
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)

@@ -174,6 +174,7 @@ class Effect(ABC):
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
     evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
+    from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
 
     def __post_init__(self) -> None:
@@ -184,6 +185,10 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         """Its torque per unit of each amplitude, to first order, (samples, joints, amplitudes)."""
+
+    def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
+        """Of several shapes at this joint that act on it alone: (shapes, amplitudes, samples)."""
+        return np.stack([shape.columns(motion, arm)[:, self._index].T for shape in shapes])
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Itself with every combination of non-linear numbers worth trying on this motion."""
@@ -225,6 +230,11 @@ class Effect(ABC):
         None where nobody wrote it down: then it is found by differences.
         """
         return None
+
+    @property
+    def adds(self) -> bool:
+        """Whether all it does is to add its columns to the torque, so that nothing else has to be worked out with it."""
+        return type(self).apply is Effect.apply and type(self).torque is Effect.torque
 
     def at(self, values: Values) -> Self:
         """Itself with the non-linear numbers out of `values`."""

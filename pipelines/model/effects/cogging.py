@@ -18,6 +18,7 @@ _WAVES = 1.5  # in the range travelled, at least: fewer are the curve of a sprin
 _HIGHEST = 150.0  # order that is searched for
 _MOST = 200  # orders on the grid
 _PEAKS = 24
+_ROUNDED = 1e-11  # difference of orders that is rounding
 
 
 @dataclass(frozen=True)
@@ -50,11 +51,27 @@ class Cogging(Effect):
     experiment = "Turn the joint slowly through its whole range, both ways, at two speeds."
     twins = ("position_friction", "spring", "gravity_tilt", "encoder_eccentricity")
     per_log = ("phase", "phase_2", "phase_3")  # where an encoder is zeroed at each start
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         once = np.exp(1j * self.order * self.own(motion.q))
         waves = [once**m for m in range(1, self.harmonics + 1)]
         return self.on_own_row(arm, *(part for wave in waves for part in (wave.imag, wave.real)))
+
+    def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
+        """One wave from the one before: e^(i k' q) = e^(i k q) e^(i (k' - k) q), for orders come in equal steps."""
+        if any(one.harmonics != 1 for one in shapes):
+            return super().own_columns(shapes, motion, arm)
+        q, order, by = self.own(motion.q), 0.0, 0.0
+        wave = turn = np.ones(len(q), dtype=complex)
+        table = np.empty((len(shapes), 2, len(q)))
+        for k, one in enumerate(shapes):
+            if abs(one.order - order - by) > _ROUNDED:
+                by = one.order - order
+                turn = np.exp(1j * by * q)
+            wave, order = wave * turn, one.order
+            table[k] = wave.imag, wave.real
+        return table
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """From the fewest waves in the range travelled, in steps of half of what it can tell apart: whole ones over many turns."""

@@ -32,6 +32,7 @@ class ConcaveFriction(Effect):
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
     twins = ("stribeck", "quadratic_drag", "viscous", "three_sigmoid")
     friction = True
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, np.tanh(self.own(motion.dq) / self.speed))

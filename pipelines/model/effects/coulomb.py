@@ -40,6 +40,7 @@ class Coulomb(Effect):
     evidence = "none"
     twins = ("viscous", "three_sigmoid", "asymmetric_friction", "presliding")
     friction = True
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, np.tanh(self.sharpness * self.own(motion.dq)))

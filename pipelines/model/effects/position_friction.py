@@ -39,6 +39,7 @@ class PositionFriction(Effect):
     remedy = "Compensate it with the angle; look for wear, a bent shaft or cables that rub."
     experiment = "Turn the joint slowly through its whole range in both directions, at two speeds."
     twins = ("cogging", "load_friction", "viscous_drift")
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         side, angle = np.tanh(self.sharpness * self.own(motion.dq)), self.order * self.own(motion.q)

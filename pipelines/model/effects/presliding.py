@@ -38,6 +38,7 @@ class Presliding(Effect):
     remedy = "Simulate it where slow reversals matter; friction compensation by the sign of speed alone pushes too early."
     experiment = "Reverse the joint slowly and often, with strokes from a tenth of the distance to many times it."
     twins = ("backlash", "coulomb", "stribeck")
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)

@@ -25,6 +25,7 @@ class QuadraticDrag(Effect):
     experiment = "Move the joint in both directions at seven to ten constant speeds up to the highest it allows."
     twins = ("stribeck", "concave_friction", "viscous")
     friction = True
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)

@@ -44,6 +44,7 @@ class Spring(Effect):
     remedy = "Add it to the model; look for a cable that is led too short or has come loose."
     experiment = "Hold the joint at rest in many angles over its whole range, with the joint before it in two postures."
     twins = ("gravity_tilt", "cogging", "torque_offset")
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         q = self.own(motion.q)

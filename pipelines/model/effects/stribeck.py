@@ -38,6 +38,7 @@ class Stribeck(Effect):
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
     twins = ("quadratic_drag", "three_sigmoid", "concave_friction", "presliding")
     friction = True
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)

@@ -44,6 +44,7 @@ class ThreeSigmoid(Effect):
     evidence = "none"
     twins = ("coulomb", "viscous", "stribeck", "concave_friction")
     friction = True
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)

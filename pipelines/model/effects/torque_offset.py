@@ -24,6 +24,7 @@ class TorqueOffset(Effect):
     remedy = "Calibrate the zero of the current measurement; look for a cable under tension."
     experiment = "Hold still for two seconds, and cross the same position in both directions."
     twins = ("asymmetric_friction", "spring")
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, np.ones(len(motion.t)))

@@ -24,6 +24,7 @@ class Viscous(Effect):
     evidence = "none"
     twins = ("coulomb", "three_sigmoid", "quadratic_drag", "viscous_drift")
     friction = True
+    from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self.own(motion.dq))

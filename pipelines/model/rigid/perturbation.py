@@ -99,13 +99,36 @@ def _propagated(h: Array, m: Array, c: Array, k: Array, f: Array) -> tuple[Array
     one, other = np.exp((1j * w - a) * h), np.exp((-1j * w - a) * h)
     cos, sinc = 0.5 * (one + other).real, ((one - other) / np.where(w == 0.0, 1.0, 2j * w)).real  # e^(-at) cos wt, sin wt / w
     sinc, lag = np.where(w == 0.0, h * one.real, sinc), c * s / k**2
-    columns = (cos + a * sinc, sinc, -sinc * k / m, cos - a * sinc,
-               f[:-1] / k - lag, f[1:] / k - lag, s / k)
-    y, dy = (float(column[0]) if len(column) else 0.0 for column in (columns[4], columns[6]))  # settled: no ringing at the start
-    found = [(y, dy)]
-    for p11, p12, p21, p22, before, after, speed in zip(*(column.tolist() for column in columns), strict=True):
-        u, v = y - before, dy - speed
-        y, dy = after + p11 * u + p12 * v, speed + p21 * u + p22 * v
-        found.append((y, dy))
-    both = np.array(found)
-    return both[:, 0], both[:, 1]
+    along = np.array([[cos + a * sinc, sinc], [-sinc * k / m, cos - a * sinc]])  # (2, 2, intervals)
+    before, after, speed = f[:-1] / k - lag, f[1:] / k - lag, s / k
+    still = np.array([before[:1], speed[:1]]) if len(h) else np.zeros((2, 1))  # settled: no ringing at the start
+    onto = np.array([after, speed]) - np.einsum("ijn,jn->in", along, np.array([before, speed]))
+    y, dy = _recurred(along, onto, still[:, 0])
+    return y, dy
+
+
+def _recurred(along: Array, onto: Array, start: Array) -> Array:
+    """z (2, steps + 1) of z' = A z + b with A (2, 2, steps), b (2, steps): many stretches at once, then put one behind the other.
+
+    In each stretch the product of all A and the motion from rest are known without the others; z at its start follows from them.
+    """
+    steps = along.shape[2]
+    length = max(1, int(np.sqrt(steps / 4.0)))
+    count = -(-steps // length)
+    padded = count * length - steps
+    still = np.broadcast_to(np.eye(2)[:, :, None], (2, 2, padded))
+    a = np.concatenate([along, still], axis=2).reshape(2, 2, count, length).transpose(3, 0, 1, 2).copy()
+    b = np.concatenate([onto, np.zeros((2, padded))], axis=1).reshape(2, count, length).transpose(2, 0, 1).copy()
+    moved = np.empty((length + 1, 2, 3, count))  # from rest, and from unit starts
+    moved[0] = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])[:, :, None]
+    for k in range(length):
+        np.multiply(a[k, :, 0, None], moved[k, 0], out=moved[k + 1])
+        moved[k + 1] += a[k, :, 1, None] * moved[k, 1]
+        moved[k + 1, :, 0] += b[k]
+    starts = np.empty((2, count))
+    u, v = start.tolist()
+    for k, ((c1, p11, p12), (c2, p21, p22)) in enumerate(moved[-1].transpose(2, 0, 1).tolist()):
+        starts[:, k] = u, v
+        u, v = c1 + p11 * u + p12 * v, c2 + p21 * u + p22 * v
+    z = moved[1:, :, 0] + moved[1:, :, 1] * starts[0] + moved[1:, :, 2] * starts[1]
+    return np.concatenate([start[:, None], z.transpose(1, 2, 0).reshape(2, -1)[:, :steps]], axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -164,6 +165,17 @@ def test_columns(kind: type[Effect], arm: Arm, motion: Motion) -> None:
         assert np.abs(columns).max() > 0
     np.testing.assert_array_equal(motion.q, before[0])
     np.testing.assert_array_equal(motion.dq, before[1])
+
+
+@pytest.mark.parametrize("kind", [kind for kind in all_effects() if kind.from_motion], ids=lambda kind: kind.name)
+def test_columns_from_the_motion_alone(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """They are those of any arm, act on their own joint only, and come out the same for many shapes at once."""
+    other = Arm("another", arm.body, tuple(replace(p, value=1.7 * p.value + 0.1) for p in arm.base))
+    shapes = list(placed(kind).shapes(motion, arm))
+    apart = np.array([shape.columns(motion, other) for shape in shapes])
+    assert not np.delete(apart, 1, axis=2).any()
+    together = shapes[0].own_columns(shapes, motion, arm)
+    np.testing.assert_allclose(together.transpose(0, 2, 1), apart[:, :, 1], rtol=1e-9, atol=1e-9 * np.abs(apart).max())
 
 
 @every_effect
