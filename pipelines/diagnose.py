@@ -132,4 +132,4 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, None, _exit_code,
-              lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result))
+              lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result), hands_on="material")

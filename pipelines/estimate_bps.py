@@ -14,6 +14,7 @@ from pathlib import Path
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.fit.identifiability import hard_to_see
 from pipelines.log.canonical import digest_of
+from pipelines.log.covariance_file import read_covariance, write_covariance
 from pipelines.log.derive import derive, recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
@@ -33,11 +34,12 @@ from pipelines.model.estimation.outcome import torques as torque_parts
 from pipelines.model.estimation.result import Result
 from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstructed, reconstruct
+from pipelines.model.parameter import Uncertainty
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -223,8 +225,10 @@ def _checks(result: Result) -> tuple[Check, ...]:
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
-    """model.json, and every log with the model's torque and the residual."""
+    """model.json, its covariance, and every log with the model's torque and the residual."""
     write_model(folder / "model.json", result.model)
+    if (known := result.arm.uncertainty) is not None:
+        write_covariance(folder / "covariance.json", known.names, known.covariance)
     for name, log in result.derived:
         write_log(folder / f"logs/{name}.{request.format}", log)
 
@@ -234,6 +238,19 @@ def report(result: Result) -> Report:
     return bps_report(result)
 
 
+def _reads(log: ExperimentLog, settings: Settings) -> bool:
+    """Logs to fit, and those that judge."""
+    return log.role == "validate" or (log.role == "identify" and log.experiment in FITTED)
+
+
+def _restored(result: Result, folder: Path) -> Result:
+    """A stored result with its model, out of the files that `write` wrote."""
+    arm = Arm.from_model(read_model(folder / "model.json"), folder)
+    known = folder / "covariance.json"
+    return replace(result, arm=replace(arm, uncertainty=Uncertainty(*read_covariance(known)) if known.is_file() else None))
+
+
 STAGE = Stage("estimate-bps", "Estimate the base parameter set", Settings, compute, report, read, write,
               lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks,
-              lambda result, inputs: replace(inputs, material=result.arm))
+              lambda result, inputs: replace(inputs, material=result.arm), hands_on="material", restored=_restored,
+              uses=Uses(_reads, before=True))

@@ -34,7 +34,7 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.named_cause import wanted_cause
 from pipelines.report.extension_report import extension_report
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, read_by_role, slug
+from pipelines.stage import Inputs, Request, Stage, Uses, read_by_role, slug
 
 __all__ = ["STAGE", "Extension", "Settings", "compute", "read", "report"]
 
@@ -170,4 +170,4 @@ def report(result: Extension) -> Report:
 
 
 STAGE = Stage("extend", "Extend the model by named causes", Settings, compute, report, read, write,
-              lambda result, check: int(check and not result.accepted), lambda result: result.doctor)
+              lambda result, check: int(check and not result.accepted), lambda result: result.doctor, uses=Uses(before=True))

@@ -20,7 +20,7 @@ from pipelines.log.derive import derive, recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
-from pipelines.log.model_file import Source, write_model
+from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.log.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe
@@ -40,7 +40,7 @@ from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
 from pipelines.report.friction_report import friction_report
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "report"]
 
@@ -208,8 +208,13 @@ def _onward(result: Result, inputs: Inputs) -> Inputs:
     return replace(inputs, material=arm) if whole else inputs
 
 
+def _reads(log: ExperimentLog, settings: Settings) -> bool:
+    return log.experiment in ("friction", "hold") or (settings.together and log.experiment in ("excitation", "free"))
+
+
 STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report, read_logs, write,
               lambda result, check: int(check and any(found.gate for found in result.checks)),
               lambda result: result.checks, _onward,
               # estimate-bps fits Coulomb and viscous friction itself: half a minute of choosing laws would not be handed on
-              Settings(together=False))
+              in_run=Settings(together=False), hands_on="material", uses=Uses(_reads),
+              restored=lambda result, folder: replace(result, model=read_model(folder / "model.json")))

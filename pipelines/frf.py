@@ -28,7 +28,7 @@ from pipelines.model.frf.responses import How
 from pipelines.model.frf.result import Classified, Method, Posture, Undecided, classified, methods_of, posture_of, undecided
 from pipelines.report.frf_report import frf_report
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, read_logs
+from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -150,4 +150,5 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("frf", "Measure frequency responses and what gives way", Settings, compute, report, read, None,
-              lambda result, check: int(check and any(found.gate for found in result.doctor)), lambda result: result.doctor)
+              lambda result, check: int(check and any(found.gate for found in result.doctor)), lambda result: result.doctor,
+              uses=Uses(lambda log, settings: log.experiment == "frf", before=True))

@@ -29,7 +29,7 @@ from pipelines.model.plausibility import plausibility_findings
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import checks_table, level_tone
-from pipelines.stage import Inputs, Request, Stage, read_logs
+from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "LogSummary", "Range", "Result", "Settings", "compute", "report"]
 
@@ -296,4 +296,5 @@ def _onward(result: Result, inputs: Inputs) -> Inputs:
 
 
 STAGE = Stage("inspect", "Examine logs", Settings, compute, report, read, exit_code=exit_code,
-              checks=lambda result: result.checks[result.from_reading:], onward=_onward)
+              checks=lambda result: result.checks[result.from_reading:], onward=_onward, hands_on="choice",
+              uses=Uses(rejected=True))

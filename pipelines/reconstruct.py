@@ -23,7 +23,7 @@ from pipelines.errors import Check, InputRejected, NothingMatched
 from pipelines.log.derive import derive, recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import Array
-from pipelines.log.files import Opened, write_log
+from pipelines.log.files import Opened, open_log, write_log
 from pipelines.log.robot import RobotDescription, format_robot
 from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstruction, reconstruct
@@ -139,9 +139,16 @@ def report(result: Result) -> Report:
 def _onward(result: Result, inputs: Inputs) -> Inputs:
     """Later stages take the motion from the derived logs instead of reconstructing it again."""
     found = iter(result.logs)
-    logs = tuple(opened if opened.log.origin == "planned" else replace(opened, log=next(found).log) for opened in inputs.logs)
+    logs = tuple(opened if opened.log.origin == "planned" else
+                 replace(opened, log=replace(next(found).log, source=opened.log.source)) for opened in inputs.logs)
     return replace(inputs, logs=logs)
 
 
+def _restored(result: Result, folder: Path) -> Result:
+    """A stored result with its logs, out of the files that `write` wrote."""
+    files = {path.stem: path for path in (folder / "logs").iterdir()}
+    return replace(result, logs=tuple(replace(item, log=open_log(files[Path(item.file).name]).log) for item in result.logs))
+
+
 STAGE = Stage("reconstruct", "Reconstruct motion", Settings, compute, report, read_logs, write,
-              exit_code=exit_code, checks=lambda result: result.checks, onward=_onward)
+              exit_code=exit_code, checks=lambda result: result.checks, onward=_onward, hands_on="logs", restored=_restored)

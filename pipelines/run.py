@@ -3,31 +3,43 @@
 Reads    a folder of logs of one robot; several robots or days of recording below it are taken apart
 Writes   result.json with every stage's result, one report.html, and each stage's own files in a folder of its name
 Source   cli-contract.md; the order is the way of the data: what a stage finds, the next ones build on
+
+Only what changed is computed again: a stage whose logs, settings, code, libraries and stages before it are the same is taken
+back from the last run in the same output folder, or from one that was killed there (`pipelines/recall`).
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+import typing
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import Check, InputRejected, Level, NothingMatched, RrridError, UsageError, did_you_mean
-from pipelines.log.files import Opened
-from pipelines.log.results import FLAT, NOT_STORED
+from pipelines.errors import Check, InputRejected, Level, NothingMatched, UsageError, did_you_mean
+from pipelines.log.files import expanded
+from pipelines.log.places import renamed, short_names
+from pipelines.log.results import decode, encode
+from pipelines.log.robot import format_robot
+from pipelines.log.schema import FORMAT_VERSION
+from pipelines.log.sessions import sessions
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+from pipelines.recall.code import code_of, libraries
+from pipelines.recall.key import Key, digest_of_json
+from pipelines.recall.pictures import Pictures, pictures_of, with_pictures, write_drawing
+from pipelines.recall.store import CACHE, Kept, Missed, Store
+from pipelines.report.report import Report
+from pipelines.report.run_report import run_report
+from pipelines.report.run_result import Group, Result, Step
+from pipelines.stage import Inputs, Request, Stage, default_out, read_logs, slug
 
-__all__ = ["STAGE", "STEPS", "Group", "Result", "Settings", "Step", "compute", "report"]
+__all__ = ["STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report"]
 
 # Modules of the stages, in the order they are run.
 STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing", "frf", "diagnose", "extend")
-
-_WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
+_MODULES = tuple(f"pipelines.{module}" for module in ("run", *STEPS))
 
 
 @dataclass(frozen=True)
@@ -36,47 +48,57 @@ class Settings:
 
     stages: Mapping[str, Any] = field(default_factory=dict, metadata={"option": False})  # filled by --set and --config
     skip: tuple[str, ...] = ()  # stages that are left out
+    fresh: bool = False  # compute everything, whatever earlier runs have left
 
 
 @dataclass(frozen=True)
-class Step:
-    """One stage's outcome: its exit code under --check, and its result."""
+class Material:
+    """What a run knows beside its logs."""
 
-    name: str
-    exit: int
-    result: Any
-    report: Report = field(metadata=NOT_STORED, repr=False)
-    checks: tuple[Check, ...] = field(metadata=NOT_STORED, repr=False)
-
-
-@dataclass(frozen=True)
-class Group:
-    """The logs of one robot, recorded on one day, and what the stages made of them."""
-
-    name: str
-    stages: tuple[Step, ...]
-    diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
+    store: Store
+    pictures: Pictures
+    names: Mapping[str, str]  # folders of inputs -> how results name them
+    options: Mapping[str, Any]  # of the request, as far as they change what logs say
+    request: Request
 
 
 @dataclass(frozen=True)
-class Result:
-    """One group's stages; with several groups, `runs` holds each of them and `stages` is empty."""
+class Planned:
+    """What a run would do with one stage of one group of logs, and why."""
 
-    stages: tuple[Step, ...]
-    runs: tuple[Group, ...] = ()
-    diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
+    logs: str
+    stage: str
+    computed: bool  # else taken back
+    why: str
 
-    @property
-    def groups(self) -> tuple[Group, ...]:
-        return self.runs or (Group("", self.stages, self.diagnosis),)
+
+def read(request: Request, settings: Settings) -> Inputs:
+    """Every log that can be opened, and what earlier runs have left."""
+    inputs = read_logs(request, settings, keep_rejected=True)
+    out = request.out or default_out(inputs, "run")
+    robot = None if inputs.robot is None else digest_of_json(format_robot(inputs.robot))
+    options: dict[str, Any] = {"robot": robot, "assume_units": request.assume_units, "joints": list(request.joints),
+                               "format": request.format, "folder": inputs.label}
+    names = short_names(request.named)
+    if request.roles:
+        options["roles"] = {str(renamed(str(opened.path), names)): opened.log.role for opened in inputs.logs}
+    pictures = Pictures(out, {}) if settings.fresh else pictures_of(out, _MODULES)
+    return dataclasses.replace(inputs, material=Material(Store(out, settings.fresh), pictures, names, options, request))
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
-    """Run every stage on every group of logs."""
+    """Every stage on every group of logs; what is unchanged is taken back."""
     _refuse_strange(settings)
-    done = [(name, _stages(part, settings)) for name, part in _apart(inputs)]
+    done = [(name, _stages(name, part, settings)) for name, part in _apart(inputs)]
     groups = tuple(Group(name, steps, _diagnosis(steps)) for name, steps in done)
     return Result((), groups) if len(groups) > 1 else Result(groups[0].stages, diagnosis=groups[0].diagnosis)
+
+
+def plan(request: Request, settings: Settings) -> tuple[Planned, ...]:
+    """What `compute` would do. Nothing is written; the doctor alone is asked, for it decides which logs the others get."""
+    _refuse_strange(settings)
+    request = dataclasses.replace(request, paths=tuple(path.absolute() for path in expanded(request.paths)))
+    return tuple(one for name, part in _apart(read(request, settings)) for one in _planned(name, part, settings))
 
 
 def _refuse_strange(settings: Settings) -> None:
@@ -94,35 +116,145 @@ def _diagnosis(steps: Iterable[Step]) -> Diagnosis | None:
         found, evidence=(), findings=tuple(dataclasses.replace(one, proof=None) for one in found.findings))
 
 
-def _stages(inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
-    """Every stage in turn, each on what those before it leave; one that finds nothing to read is passed over."""
-    steps = []
+def _wanted(settings: Settings) -> Iterator[tuple[Stage[Any, Any], Any]]:
+    """The stages with their settings, in order."""
     for module in STEPS:
         stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
-        if stage.name in settings.skip:
-            continue
-        try:
-            result = stage.compute(inputs, settings.stages.get(stage.name) or stage.in_run or stage.settings())
-        except (NothingMatched, InputRejected) as problem:
-            steps.append(_without(stage, problem))
-            continue
-        steps.append(Step(stage.name, stage.exit_code(result, True), result, stage.report(result), stage.checks(result)))
-        inputs = stage.onward(result, inputs)
+        if stage.name not in settings.skip:
+            yield stage, settings.stages.get(stage.name) or stage.in_run or stage.settings()
+
+
+def _stages(group: str, inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
+    """Every stage in turn, each on what those before it leave; one that finds nothing to read is passed over."""
+    given: Material = inputs.material
+    chain, steps = _Chain(inputs), []
+    for stage, own in _wanted(settings):
+        key, place = chain.key(stage, own), _place(group, stage.name)
+        kept = given.store.recall(place, key)
+        given.request.tell(f"{place}: {'unchanged' if isinstance(kept, Kept) else kept.why}")
+        if isinstance(kept, Kept):
+            step = _step(stage, kept)
+            step = dataclasses.replace(step, report=with_pictures(step.report, given.pictures))
+            chain.taken_back(stage, key, step.result, kept.files)
+        else:
+            kept, result = _computed(stage, own, chain.inputs_of(stage), place, key, given)
+            step = _step(stage, kept)
+            chain.passed(stage, key, result)
+        steps.append(step)
     return tuple(steps)
 
 
-def _without(stage: Stage[Any, Any], problem: RrridError) -> Step:
+def _planned(group: str, inputs: Inputs, settings: Settings) -> Iterator[Planned]:
+    given: Material = inputs.material
+    chain = _Chain(inputs)
+    for stage, own in _wanted(settings):
+        key, place = chain.key(stage, own), _place(group, stage.name)
+        kept = given.store.recall(place, key, dry=True)
+        yield Planned(group or "all", stage.name, isinstance(kept, Missed), "unchanged" if isinstance(kept, Kept) else kept.why)
+        if isinstance(kept, Kept):
+            chain.taken_back(stage, key, _step(stage, kept).result, kept.files)
+        else:
+            chain.passed(stage, key, stage.compute(chain.inputs_of(stage), own) if stage.hands_on == "choice" else None)
+
+
+def _place(group: str, stage: str) -> str:
+    return f"{slug(group)}/{stage}" if group else stage
+
+
+def _computed(stage: Stage[Any, Any], settings: Any, inputs: Inputs, place: str, key: Key, given: Material) -> tuple[Kept, Any]:
+    """Compute one stage and store what it found, or why it found nothing."""
+    try:
+        result = renamed(stage.compute(inputs, settings), given.names)
+    except (NothingMatched, InputRejected) as problem:
+        told = renamed(problem.as_dict(), given.names) | {"exit": problem.exit_code}
+        return given.store.keep(place, key, {"problem": told}, None, lambda folder: None), None
+    about = {"exit": stage.exit_code(result, True), "problem": None,
+             "checks": [renamed(check.as_dict(), given.names) for check in stage.checks(result)]}
+    write = stage.write or (lambda result, folder, request: None)
+    return given.store.keep(place, key, about, encode(result), lambda folder: write(result, folder, given.request)), result
+
+
+def _step(stage: Stage[Any, Any], kept: Kept) -> Step:
+    """What is stored of a stage as its outcome: the same whether it was computed now or earlier."""
+    about = kept.about
+    if (problem := about["problem"]) is not None:
+        report, check = _without(stage, problem)
+        return Step(stage.name, problem["exit"], None, report, (check,), kept)
+    result = decode(typing.get_type_hints(stage.compute)["return"], *kept.result())
+    return Step(stage.name, about["exit"], result, stage.report(result), tuple(Check(**told) for told in about["checks"]), kept)
+
+
+def _without(stage: Stage[Any, Any], problem: Mapping[str, Any]) -> tuple[Report, Check]:
     """A stage that has no result: nothing to read (passed over), or an input it cannot use."""
-    passed_over = problem.exit_code == 5
-    words = f"{'Passed over' if passed_over else 'Not done'}: {problem.message}. {problem.remedy[:1].upper()}{problem.remedy[1:]}."
+    passed_over = problem["exit"] == NothingMatched.exit_code
+    remedy = problem["remedy"]
+    words = f"{'Passed over' if passed_over else 'Not done'}: {problem['message']}. {remedy[:1].upper()}{remedy[1:]}."
     level: Level = "warn" if passed_over else "reject"
-    check = Check(problem.code, level, problem.message, problem.where, problem.remedy, not passed_over)
-    return Step(stage.name, problem.exit_code, None, Report(stage.title, words, "neutral" if passed_over else "bad"), (check,))
+    check = Check(problem["code"], level, problem["message"], problem["where"], remedy, not passed_over)
+    return Report(stage.title, words, "neutral" if passed_over else "bad"), check
+
+
+class _Chain:
+    """The inputs on their way through the stages, and where they come from.
+
+    What a stage that was taken back would hand on is read out of its files only when a stage after it is computed.
+    """
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.given: Material = inputs.material
+        self.inputs = dataclasses.replace(inputs, material=None)
+        self.waiting: list[tuple[Stage[Any, Any], Any, Path]] = []
+        self.through: dict[str, str] = {}
+        self.upon: dict[str, str] = {}
+
+    def key(self, stage: Stage[Any, Any], settings: Any) -> Key:
+        """All that the outcome of `stage` depends on."""
+        logs = [opened for opened in self.inputs.logs if stage.uses.logs(opened.log, settings)]
+        others = {f"{o.log.experiment} ({o.log.role}, {o.log.origin})" for o in self.inputs.logs} if len(
+            logs) < len(self.inputs.logs) else set()
+        unusable = {self._name(one.path): digest_of_json(renamed(one.error.as_dict(), self.given.names))
+                    for one in self.inputs.rejected} if stage.uses.rejected else {}
+        return Key(stage.name, encode(settings)[0], {self._name(o.path): o.sha256 for o in logs}, tuple(sorted(others)), unusable,
+                   self.given.options, code_of(stage.compute.__module__, ("pipelines.report",)), libraries(),
+                   f"log {FORMAT_VERSION}", self.through, self.upon if stage.uses.before else {})
+
+    def _name(self, path: Path) -> str:
+        return str(renamed(str(path), self.given.names))
+
+    def inputs_of(self, stage: Stage[Any, Any]) -> Inputs:
+        """What `stage` gets: of what came before, no more than it says that it uses."""
+        for earlier, result, files in self.waiting:
+            self.inputs = earlier.onward(earlier.restored(result, files) if earlier.restored else result, self.inputs)
+        self.waiting = []
+        uses = stage.uses
+        return dataclasses.replace(self.inputs, material=self.inputs.material if uses.before else None,
+                                   rejected=self.inputs.rejected if uses.rejected else ())
+
+    def passed(self, stage: Stage[Any, Any], key: Key, result: Any) -> None:
+        """`stage` was computed; None where it had no result."""
+        if result is not None:
+            self.inputs = stage.onward(result, self.inputs)
+        self._handed(stage, key)
+
+    def taken_back(self, stage: Stage[Any, Any], key: Key, result: Any, files: Path) -> None:
+        """`stage` was not computed; its files lie in `files`."""
+        if result is not None and stage.hands_on:
+            if stage.hands_on == "choice" and not self.waiting:
+                self.inputs = stage.onward(result, self.inputs)
+            else:
+                self.waiting.append((stage, result, files))
+        self._handed(stage, key)
+
+    def _handed(self, stage: Stage[Any, Any], key: Key) -> None:
+        if stage.hands_on == "logs":
+            self.through = self.through | {stage.name: key.treatment}
+        if stage.hands_on == "material":
+            self.upon = {stage.name: key.digest}
 
 
 def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
     """The inputs, one robot and one day of recording at a time. Files that no log came out of go with the first."""
-    groups = _sessions(inputs.logs)
+    groups = sessions(inputs.logs)
     if len(groups) < 2:
         return [("", inputs)]
     parts = []
@@ -133,62 +265,18 @@ def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
     return [(name if names.count(name) == 1 else f"{name} ({i + 1})", part) for i, (name, part) in enumerate(parts)]
 
 
-def _sessions(logs: Iterable[Opened]) -> dict[tuple[str, str, str], list[Opened]]:
-    """Logs by the robot's name, its description, and the day.
-
-    What a robot was like before (role "reference") goes with every later day, or with the only one.
-    """
-    groups: dict[tuple[str, str, str], list[Opened]] = {}
-    by_day = [((o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]), o) for o in logs]
-    for key, opened in by_day:
-        if opened.log.role != "reference":
-            groups.setdefault(key, []).append(opened)
-    sessions = tuple(groups)
-    for key, opened in by_day:
-        if opened.log.role == "reference":
-            days = [other for other in sessions if other[:2] == key[:2]]
-            later = [other for other in days if not other[2] or key[2] <= other[2]]
-            for other in later or (days if len(days) == 1 else [key]):
-                groups.setdefault(other, []).append(opened)
-    return groups
-
-
 def report(result: Result) -> Report:
-    """The worst verdict first, one table of all stages, what diagnosis says, then every other stage's report."""
-    steps = [(group.name, step) for group in result.groups for step in group.stages]
-    tone = max((step.report.tone for _, step in steps), key=_WORST.index)
-    verdicts = [text for group in result.groups for text in _verdicts(group)]
-    table = Table(("logs", "stage", "verdict"), tuple((name or "all", step.name, step.report.verdict) for name, step in steps),
-                  caption="Each stage in the order it was run.", tones=tuple(step.report.tone for _, step in steps))
-    single = len(steps) == 1
-    sections = [Section("Stages", tables=(table,))] if not single else []
-    for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):  # the answer before its sources
-        sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
-    return Report("Run", " ".join(verdicts), tone, steps[0][1].report.key_figures if single else None, tuple(sections))
-
-
-def _verdicts(group: Group) -> list[str]:
-    """What the last stage that had a result says, after whatever is not in order before it."""
-    last = max((i for i, step in enumerate(group.stages) if step.result is not None), default=-1)
-    shown = [step for i, step in enumerate(group.stages) if i == last or step.report.tone in ("attention", "bad")]
-    return [f"{group.name}: {step.report.verdict}" if group.name else step.report.verdict for step in shown]
-
-
-def _titled(sections: Iterable[Section], prefix: str) -> list[Section]:
-    """`sections`, their titles and figures told apart from those of other stages."""
-    return [dataclasses.replace(
-        section, title=f"{prefix}: {section.title}" if prefix else section.title,
-        figures=tuple(dataclasses.replace(f, name=f"{slug(prefix)}-{f.name}" if prefix else f.name) for f in section.figures))
-        for section in sections]
+    """The verdict, one table of all stages, what diagnosis says, then every other stage's report."""
+    return run_report(result)
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
-    """Let every stage write its files into a folder of its name."""
+    """The files of every stage in a folder of its name, and what the next run may take back."""
     for group in result.groups:
         for step in group.stages:
-            stage: Stage[Any, Any] = import_module(f"pipelines.{step.name.replace('-', '_')}").STAGE
-            if stage.write is not None and step.result is not None:
-                stage.write(step.result, folder / slug(group.name) / step.name if group.name else folder / step.name, request)
+            step.kept.put(folder, _place(group.name, step.name))
+    if not request.no_report:
+        write_drawing(folder, _MODULES)
 
 
 def _exit_code(result: Result, check: bool) -> int:
@@ -200,5 +288,10 @@ def _checks(result: Result) -> tuple[Check, ...]:
     return tuple(check for group in result.groups for step in group.stages for check in step.checks)
 
 
-STAGE = Stage("run", "Run the whole workflow on a folder of logs", Settings, compute, report,
-              partial(read_logs, keep_rejected=True), write, _exit_code, _checks)
+def _remakes(name: str) -> bool:
+    """What only rrrid reads: stored results and derived logs. A model or a report may have been edited by somebody."""
+    return name.startswith(f"{CACHE}/") or name in ("result.json", "result.h5") or "/logs/" in name
+
+
+STAGE = Stage("run", "Run the whole workflow on a folder of logs", Settings, compute, report, read, write, _exit_code, _checks,
+              remakes=_remakes, ended=lambda inputs, finished: inputs.material.store.release(finished))

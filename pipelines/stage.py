@@ -18,11 +18,12 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, InputRejected, RrridError, UsageError, clean
 from pipelines.log.atomic import replace_folder, staging_folder, write_file
+from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, Opened, expanded, find_logs, hash_file, open_log
 from pipelines.log.places import given_names, keep_apart, refuse_foreign, renamed, short_names, slug, tilde, written_by
 from pipelines.log.results import encode, json_text, write_series
@@ -30,8 +31,8 @@ from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.report.report import Report
 
-__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "read_by_role", "read_logs", "refuse_foreign", "run_stage",
-           "slug", "tilde"]
+__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "read_by_role", "read_logs",
+           "refuse_foreign", "run_stage", "slug", "tilde"]
 
 _NAMED = 6  # rejected files, in one error
 
@@ -54,6 +55,12 @@ class Request:
     format: str = "h5"  # of derived logs
     tell: Callable[[str], None] = field(default=lambda words: None, compare=False)  # progress, in words
     joints: tuple[int, ...] = ()  # 1-based: the joints to take of every log, in this order; none: all
+    roles: Mapping[str, Sequence[str]] = field(default_factory=dict)  # role -> paths of logs that have it, whatever they say
+
+    @property
+    def named(self) -> tuple[Path, ...]:
+        """Every input, also those that are named for a role."""
+        return (*self.paths, *(Path(path).expanduser().absolute() for paths in self.roles.values() for path in paths))
 
 
 @dataclass(frozen=True)
@@ -81,6 +88,18 @@ class Inputs:
 
 
 @dataclass(frozen=True)
+class Uses:
+    """What of a run's inputs a stage looks at: within `run` it is computed again where this has changed, and only there.
+
+    Of a log that `logs` leaves out it may know what the log says of itself (experiment, role, robot), and no sample.
+    """
+
+    logs: Callable[[ExperimentLog, Any], bool] = lambda log, settings: True  # (a log by what it says of itself, the settings)
+    before: bool = False  # `material`: what a stage before it handed on
+    rejected: bool = False  # files that could not be opened
+
+
+@dataclass(frozen=True)
 class Stage(Generic[S, R]):
     """One command's computation, between reading and writing."""
 
@@ -93,9 +112,14 @@ class Stage(Generic[S, R]):
     write: Callable[[R, Path, Request], None] | None = None  # derived logs and tables, into the folder it is given
     exit_code: Callable[[R, bool], int] = lambda result, check: 0  # (result, --check)
     checks: Callable[[R], tuple[Check, ...]] = lambda result: ()  # what compute found or mended
-    onward: Callable[[R, Inputs], Inputs] = lambda result, inputs: inputs  # what `run` hands to the stages after it
+    onward: Callable[[R, Inputs], Inputs] = lambda result, inputs: inputs  # what `run` hands to the stages after it:
+    hands_on: Literal["", "choice", "logs", "material"] = ""  # fewer logs, each log by itself with more in it, or material
+    restored: Callable[[R, Path], R] | None = None  # a stored result with what `onward` needs out of the files it has written
+    uses: Uses = field(default_factory=Uses)
     in_run: S | None = None  # settings within `run`, where they are others than by default
     durations: Callable[[R], dict[str, float]] = lambda result: {}  # [s] of parts of compute, for provenance.json alone
+    remakes: Callable[[str], bool] = lambda name: False  # own files that are made again where they were changed (P10)
+    ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None  # told at the end; `finished`: not by a signal
 
 
 @dataclass(frozen=True)
@@ -117,7 +141,8 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
         InputRejected: some of them are rejected, unless `keep_rejected` (the doctor looks at those too). The error is
             the first one's, and names the others.
     """
-    del settings
+    if request.roles:
+        return read_by_role(dataclasses.replace(request, roles={}), settings, request.roles, keep_rejected=keep_rejected)
     paths, checks = find_logs(request.paths)
     robot = load_robot(request.robot) if request.robot is not None else None
     opened: list[Opened] = []
@@ -138,7 +163,7 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
                   robot_name=names[0] if len(names) == 1 else "several" if names else "unknown")
 
 
-def read_by_role(request: Request, settings: object, named: Mapping[str, Sequence[str]]) -> Inputs:
+def read_by_role(request: Request, settings: object, named: Mapping[str, Sequence[str]], *, keep_rejected: bool = False) -> Inputs:
     """The same with `named`: role -> paths. A log named for a role has it, whatever it says of itself; the others that say they
     have this role are left out.
 
@@ -149,7 +174,7 @@ def read_by_role(request: Request, settings: object, named: Mapping[str, Sequenc
     every = tuple(dict.fromkeys((*request.paths, *(path for given in paths.values() for path in given))))
     if not every:
         raise UsageError("C02", "no logs", where="LOGS", remedy="name logs, or folders of logs")
-    inputs = read_logs(dataclasses.replace(request, paths=every), settings)
+    inputs = read_logs(dataclasses.replace(request, paths=every), settings, keep_rejected=keep_rejected)
     roles: dict[Path, str] = {}
     for role, given in paths.items():
         for file in find_logs(given)[0]:
@@ -203,22 +228,37 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         raise
 
 
+def default_out(inputs: Inputs, command: str) -> Path:
+    """Where the outcome of `command` goes when nobody says."""
+    return Path("runs") / slug(inputs.robot_name) / slug(inputs.label) / command
+
+
 def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     started = time.time()
     if request.out is not None:
         keep_apart(request.out, (), request.paths)
-        refuse_foreign(request.out, request.force)
+        refuse_foreign(request.out, request.force, stage.remakes)
     described = _hashes(robot_sources(request.robot), {}) if request.robot is not None else {}
     inputs = stage.read(request, settings)
-    out = request.out or Path("runs") / slug(inputs.robot_name) / slug(inputs.label) / stage.name
+    try:
+        outcome = _outcome(stage, request, settings, inputs, described, started)
+    except BaseException as problem:
+        stage.ended(inputs, isinstance(problem, Exception))
+        raise
+    stage.ended(inputs, True)
+    return outcome
+
+
+def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, described: dict[Path, str],
+             started: float) -> Outcome[R]:
+    out = request.out or default_out(inputs, stage.name)
     keep_apart(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))
-    if request.out is None:
-        refuse_foreign(out, request.force)
+    changed = refuse_foreign(out, request.force, stage.remakes)
     hashes = _hashes(inputs.sources, inputs.hashes) | described
     # Equal inputs give equal bytes, wherever they lie: no path of this machine goes into a result.
-    names = short_names(request.paths)
+    names = short_names(request.named)
     result = renamed(stage.compute(inputs, settings), names)
-    checks = (*inputs.checks, *(c for opened in inputs.logs for c in opened.checks), *stage.checks(result))
+    checks = (*_remade(changed), *inputs.checks, *(c for opened in inputs.logs for c in opened.checks), *stage.checks(result))
     if request.strict and (repair := next((c for c in checks if c.level == "repair"), None)):
         raise repair.as_error()
     request.tell("writing the report")
@@ -237,6 +277,13 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     finally:
         shutil.rmtree(staging, ignore_errors=True)
     return Outcome(result, object_, report, out, stage.exit_code(result, request.check), renamed(checks, names))
+
+
+def _remade(changed: Iterable[str]) -> Iterable[Check]:
+    """P10: what was no longer as rrrid had written it."""
+    for name in changed:
+        yield Check.of("P10", "warn", "was not what rrrid had written there; it was made again", where=name,
+                       remedy="look after the disk, or keep your own changes in another folder")
 
 
 def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: dict[str, Any], series: dict[str, Any],

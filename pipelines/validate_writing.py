@@ -32,7 +32,7 @@ from pipelines.model.writing.result import Gates, Result, SimulationError
 from pipelines.model.writing.validation import Effort, validate
 from pipelines.report.report import Report
 from pipelines.report.writing_report import writing_report
-from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -91,10 +91,10 @@ def read(request: Request, settings: Settings) -> Inputs:
     Raises:
         UsageError: C02, neither logs nor a task; C04, no such file.
     """
-    if not request.paths and not settings.designs:
+    if not (request.paths or request.roles or settings.designs):
         raise UsageError("C02", "no logs, and no text to write", where="validate-writing",
                          remedy="name logs to validate on, or design the task with --text RRR")
-    inputs = read_logs(request, settings) if request.paths else Inputs()
+    inputs = read_logs(request, settings) if request.paths or request.roles else Inputs()
     found = settings.model if settings.model is not None else _left_in(request.paths)
     model = None if found is None else read_model(found)
     sources = [] if found is None or not Path(found).is_file() else [Path(found).absolute()]
@@ -281,5 +281,10 @@ def report(result: Result) -> Report:
     return writing_report(result)
 
 
+def _reads(log: ExperimentLog, settings: Settings) -> bool:
+    """Logs that judge, and those that a model can be fitted to."""
+    return log.role == "validate" or (log.role == "identify" and log.experiment != "frf")
+
+
 STAGE = Stage("validate-writing", "Validate on the writing task", Settings, compute, report, read, write, _exit_code,
-              lambda result: result.doctor, durations=_durations)
+              lambda result: result.doctor, durations=_durations, uses=Uses(_reads, before=True))

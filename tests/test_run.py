@@ -85,7 +85,7 @@ def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> Non
     outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), WITHOUT)
     assert outcome.json["stages"] == []
     assert [group["name"] for group in outcome.json["runs"]] == ["rrr-tue", "other"]
-    assert {p.name for p in (tmp_path / "out").iterdir() if p.is_dir()} == {"rrr-tue", "other"}
+    assert {p.name for p in (tmp_path / "out").iterdir() if p.is_dir()} == {"rrr-tue", "other", ".cache"}
 
 
 def session(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> dict[str, set[str]]:

@@ -36,11 +36,15 @@ def keep_apart(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> N
             raise UsageError("C05", f"lies inside the input {folder}", where=out, remedy=_ELSEWHERE)
 
 
-def refuse_foreign(out: Path, force: bool = False) -> None:
+def refuse_foreign(out: Path, force: bool = False, remade: Callable[[str], bool] = lambda name: False) -> tuple[str, ...]:
     """C05: an output folder may be new, empty, or rrrid's own earlier output as it was left.
 
     Args:
         force: rrrid's output may be replaced even where files were added to it or changed since.
+        remade: own files, by their names in `out`, that nobody edits: changed ones are made again (P10).
+
+    Returns:
+        The names of such files.
 
     Raises:
         UsageError: it is anything else.
@@ -48,21 +52,23 @@ def refuse_foreign(out: Path, force: bool = False) -> None:
     if out.is_symlink() or (out.exists() and not out.is_dir()):
         raise UsageError("C05", "is not a folder", where=out, remedy=_ELSEWHERE)
     if not out.exists() or not any(out.iterdir()):
-        return
+        return ()
     try:
         ours: dict[str, object] = dict(_provenance(out)["outputs"])
     except (KeyError, TypeError, ValueError):
         ours = {}
     if ours and force:
-        return
+        return ()
     there = {path.relative_to(out).as_posix(): path for path in out.rglob("*") if path.is_symlink() or not path.is_dir()}
     foreign = sorted(set(there) - set(ours) - ({PROVENANCE} if ours else set()))
     if foreign:
         raise UsageError("C05", f"holds files that rrrid did not write there: {', '.join(foreign[:3])}", where=out,
                          remedy=f"{_ELSEWHERE}, or move them")
-    if edited := sorted(name for name, path in there.items() if name in ours and hash_file(path) != ours[name]):
-        raise UsageError("C05", f"holds files that were changed since rrrid wrote them: {', '.join(edited[:3])}", where=out,
+    edited = sorted(name for name, path in there.items() if name in ours and hash_file(path) != ours[name])
+    if kept := [name for name in edited if not remade(name)]:
+        raise UsageError("C05", f"holds files that were changed since rrrid wrote them: {', '.join(kept[:3])}", where=out,
                          remedy=f"{_ELSEWHERE}, or replace them with --force")
+    return tuple(edited)
 
 
 def written_by(folder: Path) -> str:

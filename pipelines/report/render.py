@@ -54,7 +54,7 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
         figures = []
         for figure in section.figures:
             name = names.unique(figure.name)
-            svg, files[f"figures/{name}.png"] = _draw(figure, name)
+            svg, files[f"figures/{name}.png"] = figure.finished(name) or _draw(figure, name)
             files[f"figures/{name}.svg"] = svg.encode()
             figures.append({"caption": _prose(figure.caption),
                             "svg": _inline(svg, f"f{len(names.taken)}-", figure.alt or figure.caption, glyphs)})

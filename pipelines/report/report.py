@@ -35,6 +35,8 @@ class Figure:
     draw: Callable[[Any], None] = field(compare=False)
     size: tuple[float, float] = (6.0, 3.2)  # [inch]; six inches wide: its words are legible on a phone as well
     alt: str = ""  # for readers who do not see it; the caption where empty
+    # SVG and PNG of the figure with this file name, where they are drawn already; else None
+    finished: Callable[[str], tuple[str, bytes] | None] = field(default=lambda name: None, compare=False)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,38 @@
+"""How the errors of a model's numbers go together, as a file beside model.json, which holds their standard deviations alone.
+
+    {"names": ["p1", …, "coulomb:1:torque", …], "covariance": [[…], …]}      null: a number that is not determined
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.log.atomic import write_file
+from pipelines.log.experiment import Array
+from pipelines.log.results import json_text
+from pipelines.log.text import read_small_text
+
+__all__ = ["read_covariance", "write_covariance"]
+
+
+def write_covariance(path: Path, names: Sequence[str], covariance: Array) -> None:
+    """Write `covariance` (k, k) of the `names`, atomically."""
+    rows = [[value if math.isfinite(value) else None for value in row] for row in covariance.tolist()]
+    text = json_text({"names": list(names), "covariance": rows})
+    write_file(path, lambda draft: _put(draft, text))
+
+
+def _put(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def read_covariance(path: Path) -> tuple[tuple[str, ...], Array]:
+    """What `write_covariance` wrote; NaN where a number is not determined."""
+    told = json.loads(read_small_text(path, what="a covariance (JSON)"))
+    rows = [[math.nan if value is None else float(value) for value in row] for row in told["covariance"]]
+    return tuple(map(str, told["names"])), np.array(rows).reshape(len(rows), len(rows))

@@ -1,0 +1,264 @@
+"""A run computes only what changed, and ends as if it had computed everything."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipelines import estimate_bps, inspect, reconstruct, run, validate_writing
+from pipelines.errors import EnvironmentFault, UsageError
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import open_log, write_log
+from pipelines.recall.store import CACHE, Store
+from pipelines.report import render
+from pipelines.stage import Outcome, Request, run_stage
+from tests.controlled import controlled_log
+
+SHORT = run.Settings(skip=tuple(m.replace("_", "-") for m in run.STEPS if m not in ("inspect", "reconstruct", "frf")))
+LONG = run.Settings(skip=("diagnose", "extend"), stages={"estimate-bps": estimate_bps.Settings(compare=False),
+                                                         "validate-writing": validate_writing.Settings(simulate=False)})
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    """Every file of an output but provenance.json, and but why a stored result was computed."""
+    return {p.relative_to(out).as_posix(): p.read_bytes() for p in sorted(out.rglob("*"))
+            if p.is_file() and p.name != "provenance.json"}
+
+
+def go(folder: Path, settings: run.Settings = SHORT, **more: Any) -> tuple[Outcome[run.Result], list[str]]:
+    """Run `folder`/logs into `folder`/out; the outcome, and which stages were computed."""
+    said: list[str] = []
+    outcome = run_stage(run.STAGE, Request((folder / "logs",), out=folder / "out", tell=said.append, **more), settings)
+    stages = [module.replace("_", "-") for module in run.STEPS]
+    return outcome, [line.partition(":")[0] for line in said
+                     if line.partition(":")[0] in stages and not line.endswith(": unchanged")]
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """Two short logs, run once."""
+    for seed in (1, 2):
+        write_log(tmp_path / f"logs/{seed}.h5", replace(controlled_log(400, seed), name=f"log {seed}"))
+    assert go(tmp_path, no_report=True)[1] == ["inspect", "reconstruct", "frf"]
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
+    """A run of six stages."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "logs").mkdir()
+    for name in ("excitation-1", "excitation-2", "friction-3", "hold-1"):
+        shutil.copy(samples / f"rrr-closed-form/{name}.h5", folder / "logs")
+    go(folder, LONG, no_report=True)
+    return folder
+
+
+def test_nothing_changed_nothing_computed(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All stages are taken back, figures too, and every byte is the same."""
+    assert go(small)[1] == []
+    before = contents(small / "out")
+    assert len([name for name in before if name.endswith(".png")]) > 2
+    with monkeypatch.context() as patched:
+        patched.setattr(render, "_draw", lambda figure, salt: pytest.fail(f"{salt} is drawn again"))
+        assert go(small)[1] == []
+    assert contents(small / "out") == before
+    figure = next((small / "out/figures").glob("*.png"))  # it may be somebody's (C05), unless --force says otherwise
+    figure.write_bytes(figure.read_bytes()[:-7])
+    with pytest.raises(UsageError, match="C05"):
+        go(small)
+    assert go(small, force=True)[1] == []
+    assert contents(small / "out") == before
+
+
+@pytest.mark.parametrize("stage", ["estimate-bps", "validate-writing"])
+def test_a_stage_computed_upon_what_was_taken_back(whole: Path, stage: str) -> None:
+    """Motion read back from derived logs, a model from model.json with its covariance: the same bytes come out."""
+    before = contents(whole / "out")
+    shutil.rmtree(whole / "out" / CACHE / stage)
+    assert go(whole, LONG, no_report=True)[1] == [stage]
+    assert contents(whole / "out") == before
+
+
+def test_logs_may_move_and_be_touched(small: Path) -> None:
+    """Contents are compared: neither a time stamp nor another place on the disk is a change."""
+    before = contents(small / "out")
+    (small / "elsewhere").mkdir()
+    shutil.copytree(small / "logs", small / "elsewhere/logs", copy_function=shutil.copyfile)
+    shutil.rmtree(small / "logs")
+    (small / "elsewhere/logs").rename(small / "logs")
+    assert go(small, no_report=True)[1] == []
+    assert contents(small / "out") == before
+
+
+def other_log(folder: Path) -> run.Settings:
+    write_log(folder / "logs/2.h5", replace(controlled_log(400, 3), name="log 2"))
+    return SHORT
+
+
+def bad_file(folder: Path) -> run.Settings:
+    (folder / "logs/cut.h5").write_bytes((folder / "logs/1.h5").read_bytes()[:3000])
+    return SHORT
+
+
+def another_name(folder: Path) -> run.Settings:
+    (folder / "logs/2.h5").rename(folder / "logs/3.h5")
+    return SHORT
+
+
+def own_setting(folder: Path) -> run.Settings:
+    return replace(SHORT, stages={"inspect": inspect.Settings(trust_units=True)})
+
+
+def setting_of_all_logs(folder: Path) -> run.Settings:
+    return replace(SHORT, stages={"reconstruct": reconstruct.Settings(order=3)})
+
+
+@pytest.mark.parametrize(("change", "computed", "why"), [
+    (other_log, ["inspect", "reconstruct"], "2.h5 has other content"),
+    (bad_file, ["inspect"], "new unusable file cut.h5"),
+    (another_name, ["inspect", "reconstruct"], "new log 3.h5; log gone: 2.h5"),
+    (own_setting, ["inspect"], "trust_units was false, is true"),
+    (setting_of_all_logs, ["reconstruct", "frf"], "order was 4, is 3"),
+])
+def test_exactly_what_is_affected(small: Path, change: Callable[[Path], run.Settings], computed: list[str], why: str) -> None:
+    """P09: one thing changes; --dry-run says which stages that concerns and why, writes nothing, and is right."""
+    settings = change(small)
+    before = contents(small)
+    planned = run.plan(Request((small / "logs",), out=small / "out", no_report=True), settings)
+    assert [one.stage for one in planned if one.computed] == computed
+    assert next(one.why for one in planned if one.computed) == why
+    assert contents(small) == before
+    assert go(small, settings, no_report=True)[1] == computed
+    again = replace(settings, fresh=True)
+    assert go(small, again, no_report=True)[1] == ["inspect", "reconstruct", "frf"]
+    assert go(small, settings, no_report=True)[1] == []
+
+
+def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """P09: a module of one stage alone, and a library of all."""
+    code = run.code_of
+    monkeypatch.setattr(run, "code_of", lambda module, without: code(module, without) | (
+        {"pipelines.signal.smoother": "other"} if module == "pipelines.reconstruct" else {}))
+    planned = run.plan(Request((small / "logs",), out=small / "out"), SHORT)
+    assert [(one.stage, one.why) for one in planned if one.computed] == [
+        ("reconstruct", "code of signal.smoother"), ("frf", "reconstruct before it changed")]
+    monkeypatch.setattr(run, "code_of", code)
+    monkeypatch.setattr(run, "libraries", lambda: {"numpy": "0.1"})
+    assert all(one.computed and "numpy" in one.why for one in run.plan(Request((small / "logs",), out=small / "out"), SHORT))
+
+
+@pytest.mark.parametrize("file", [".cache/reconstruct/result.h5", ".cache/reconstruct/entry.json", "reconstruct/logs/1.h5"])
+def test_a_damaged_store_is_computed_again(small: Path, file: str) -> None:
+    """P10: one flipped byte is noticed, told, and mended by computing."""
+    before = contents(small / "out")
+    content = bytearray((small / "out" / file).read_bytes())
+    content[len(content) // 2] ^= 1
+    (small / "out" / file).write_bytes(content)
+    outcome, computed = go(small, no_report=True)
+    assert computed == ["reconstruct"]
+    assert [(c.code, c.level, c.where) for c in outcome.checks if c.code == "RRID-P10"] == [("RRID-P10", "warn", file)]
+    assert contents(small / "out") == before
+
+
+def test_what_a_person_may_have_edited_is_refused(whole: Path) -> None:
+    """C05: a model that somebody changed by hand is not overwritten without --force."""
+    model = whole / "out/estimate-bps/model.json"
+    before = model.read_bytes()
+    model.write_bytes(before.replace(b"1", b"2"))
+    with pytest.raises(UsageError, match="C05"):
+        go(whole, LONG, no_report=True)
+    assert go(whole, LONG, no_report=True, force=True)[1] == ["estimate-bps"]
+    assert model.read_bytes() == before
+
+
+def test_two_runs_at_once(small: Path) -> None:
+    """P08: the second is told; when the first has ended, it may."""
+    holder = Store(small / "out")
+    holder._own()
+    with pytest.raises(EnvironmentFault, match="P08"):
+        go(small, no_report=True)
+    holder.release()
+    assert go(small, no_report=True)[1] == []
+    assert sorted(p.name for p in small.iterdir()) == ["logs", "out"]
+
+
+def test_an_interrupted_run_goes_on(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """P07: what was finished before the interruption is not computed again, and the end is that of an uninterrupted run."""
+    before = contents(small / "out")
+    shutil.rmtree(small / "out")
+    frf = import_module("pipelines.frf")
+
+    def stopped(inputs: Any, settings: Any) -> Any:
+        raise KeyboardInterrupt
+
+    stopped.__module__ = frf.__name__
+    monkeypatch.setattr(frf, "STAGE", replace(frf.STAGE, compute=stopped))
+    with pytest.raises(KeyboardInterrupt):
+        go(small, no_report=True)
+    assert not (small / "out").exists()
+    monkeypatch.undo()
+    assert go(small, no_report=True)[1] == ["frf"]
+    assert contents(small / "out") == before
+    assert sorted(p.name for p in small.iterdir()) == ["logs", "out"]
+
+
+def test_a_failed_run_leaves_nothing(small: Path) -> None:
+    """A run that ends in an error leaves what was there, and no hidden folder."""
+    before = contents(small / "out")
+    wrong = replace(SHORT, stages={"frf": import_module("pipelines.frf").Settings(low=-1.0)})
+    with pytest.raises(UsageError):
+        go(small, wrong, no_report=True)
+    assert contents(small / "out") == before
+    assert sorted(p.name for p in small.iterdir()) == ["logs", "out"]
+
+
+class Shut(ExperimentLog):
+    """A log that says what it is, and shows no sample."""
+
+    def __getattribute__(self, name: str) -> Any:
+        assert name not in ("signals", "t", "q", "tau", "n_samples"), f"{name} of a log that is not read"
+        return super().__getattribute__(name)
+
+
+def _shut(log: ExperimentLog) -> Shut:
+    same = object.__new__(Shut)
+    same.__dict__.update(log.__dict__)
+    return same
+
+
+@pytest.mark.parametrize("module", ["fit_friction", "estimate_bps", "validate_writing", "frf"])
+def test_a_stage_reads_no_other_logs_than_it_says(module: str, samples: Path) -> None:
+    """`Uses` is the truth: with every other log shut, the result is the same."""
+    from pipelines.errors import NothingMatched
+    from pipelines.stage import read_logs
+
+    stage = import_module(f"pipelines.{module}").STAGE
+    settings = stage.in_run or stage.settings()
+    if module == "estimate_bps":
+        settings = replace(settings, compare=False)
+    if module == "validate_writing":
+        settings = replace(settings, simulate=False)
+    names = ("friction-1", "hold-1", "excitation-1", "excitation-2", "free-1")
+    inputs = read_logs(Request(tuple(samples / f"rrr-closed-form/{name}.h5" for name in names)), settings)
+    shut = tuple(opened if stage.uses.logs(opened.log, settings) else replace(opened, log=_shut(opened.log))
+                 for opened in inputs.logs)
+    assert any(isinstance(opened.log, Shut) for opened in shut) or module == "validate_writing"
+    try:
+        assert stage.compute(replace(inputs, logs=shut), settings) is not None
+    except NothingMatched:
+        assert module == "frf"
+
+
+def test_entries_are_open_files(small: Path) -> None:
+    """What is stored is JSON, HDF5 and logs; the key stands in it in plain words."""
+    entry = json.loads((small / "out" / CACHE / "reconstruct/entry.json").read_text())
+    assert list(entry["parts"]["logs"]) == [[name, open_log(small / f"logs/{name}").sha256] for name in ("1.h5", "2.h5")]
+    assert {p.suffix for p in (small / "out").rglob("*") if p.is_file()} == {".json", ".h5"}
