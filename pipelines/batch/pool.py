@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import sys
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -35,7 +36,7 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
     one_thread()
     # Forked from a clean server that has imported everything once: quick to replace, and no locks of our threads in it.
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["pipelines.batch.work", plan.module])
+    context.set_forkserver_preload(["pipelines.batch.work", plan.module, *_main()])
     waiting, starts, text = deque(items), 0, plan_text(plan)
     while waiting and not stopped():
         pool: Any = ProcessPool(jobs, initializer=_begin, initargs=(text, key), context=context)
@@ -51,6 +52,12 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
         finally:
             pool.stop()
             pool.join()
+
+
+def _main() -> list[str]:
+    """What every worker imports again of the program that runs: a file, or a module by its name."""
+    spec = getattr(sys.modules["__main__"], "__spec__", None)
+    return ["__main__"] if spec is None else [spec.name]
 
 
 def _begin(text: str, key: str) -> None:

@@ -46,6 +46,8 @@ def fault_of(problem: OSError, path: Path) -> EnvironmentFault:
 def write_file(path: Path, fill: Callable[[Path], None]) -> None:
     """Let `fill` write a hidden file beside `path`, then move it over `path` in one step.
 
+    Inside a folder that is being filled nothing is flushed to the disk yet: `replace_folder` does it for all of it at once.
+
     Raises:
         EnvironmentFault: disk full, no permission. The old file is then untouched and nothing partial is left.
     """
@@ -53,15 +55,18 @@ def write_file(path: Path, fill: Callable[[Path], None]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         # The ending stays: writers choose the container by it.
         sweep(path.parent)
+        staged = any(part.startswith(_MARK) for part in path.parts[:-1])
         draft = path.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}{path.suffix}"
         try:
             fill(draft)
-            _sync(draft)
+            if not staged:
+                _sync(draft)
             os.replace(draft, path)
         except BaseException:
             draft.unlink(missing_ok=True)
             raise
-        _sync(path.parent)
+        if not staged:
+            _sync(path.parent)
 
 
 def staging_folder(target: Path) -> Path:
@@ -119,7 +124,10 @@ def _alive(process: int) -> bool:
         return False
     except PermissionError:
         return True
-    return True
+    try:  # Linux: one that is dead, and whose parent has not taken notice, still has its number
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (OSError, IndexError):
+        return True
 
 
 def _exchange(a: Path, b: Path) -> bool:

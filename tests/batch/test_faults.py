@@ -1,0 +1,94 @@
+"""One bad item costs itself and nothing else: crash, hang, memory, bug, rejection, full disk (P02-P05, P11)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from pipelines.batch.plan import Options
+from pipelines.errors import EnvironmentFault, NothingMatched
+from tests.batch.conftest import Lay, contents, obey, statuses
+
+GOOD = {f"good-{i}": f"value {i} std 0.1" for i in range(6)}
+
+
+def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
+    """P03, P04, P05 and a bug of ours beside good items: each failed with its code and cause, the others as if alone."""
+    alone = obey(lay(GOOD))
+    before = {place: bytes_ for place, bytes_ in contents(alone.folder).items() if place.startswith("items/")}
+    bad = {"big": "memory", "bug": "bug", "hung": "sleep 60", "rejected": "reject", "segfault": "crash"}
+    outcome = obey(lay(bad), Options(no_report=True, timeout=2.0, memory=1 << 30), jobs=2)
+    assert statuses(outcome) == dict.fromkeys(GOOD, "ok") | {
+        "big": "failed RRID-P03", "bug": "failed RRID-Z70", "hung": "failed RRID-P05", "rejected": "rejected RRID-F02",
+        "segfault": "failed RRID-P04"}
+    assert outcome.exit_code == 4
+    said = {item["name"]: item["error"]["message"] for item in outcome.json["items"] if item["error"]}
+    assert said["big"].startswith("memory")
+    assert said["hung"].startswith("timeout")
+    assert said["segfault"].startswith("crashed signal 11")
+    assert {place: bytes_ for place, bytes_ in contents(outcome.folder).items() if place.startswith("items/")} == before
+    assert "nobody foresaw it" in (outcome.folder / "crashes/bug.txt").read_text()
+    cases = {case.get("name"): [e.tag for e in case] for case in ElementTree.parse(outcome.folder / "junit.xml").iter("testcase")}
+    assert {name for name, tags in cases.items() if tags == ["error"]} == set(bad)
+    assert len(cases) == 11
+
+
+def test_all_bad_is_exit_4_with_a_table(lay: Lay) -> None:
+    """P11: nothing that could be used, and still every form of the summary."""
+    outcome = obey(lay({"a": "reject", "b/c": "reject"}))
+    assert (outcome.exit_code, statuses(outcome)) == (4, {"a": "rejected RRID-F02", "b/c": "rejected RRID-F02"})
+    assert {p.name for p in outcome.folder.iterdir()} >= {"result.json", "summary.parquet", "junit.xml", "provenance.json"}
+    assert outcome.json["items"][1]["error"]["where"] == "b/c/log.h5"
+
+
+def test_found_is_exit_1_with_check_alone(lay: Lay) -> None:
+    """1 where something was found and none failed, with --check; 4 where one failed, with or without."""
+    root = lay({"a": "found", "b": "fine"})
+    assert [obey(root, check=check).exit_code for check in (False, True)] == [0, 1]
+    assert obey(lay({"c": "reject"}), check=True).exit_code == 4
+
+
+def test_an_item_that_failed_leaves_no_older_result(lay: Lay) -> None:
+    """What is in items/ belongs to the logs as they are now."""
+    root = lay({"a": "fine", "b": "fine"})
+    assert (obey(root).folder / "items/b/result.json").is_file()
+    outcome = obey(lay({"b": "reject"}))
+    assert [p.name for p in (outcome.folder / "items").iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize("fault", ["full", "unreadable"])
+def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, fault: str) -> None:
+    """P02: exit 6 at once, nothing partial, the summary says what is missing; --resume does the rest, to the same bytes."""
+    items = {f"{i:02d}": "fine" for i in range(12)}
+    whole = contents(obey(lay(items | {"05": "fine again"}), out=tmp_path / "whole").folder)
+    with pytest.raises(EnvironmentFault) as stopped:
+        obey(lay({"05": fault}))
+    assert (stopped.value.exit_code, stopped.value.code) == (6, "RRID-P02")
+    out = tmp_path / "out"
+    assert not list(out.rglob(".rrrid-tmp-*"))
+    there = json.loads((out / "result.json").read_text())["items"]
+    assert {item["error"]["code"] for item in there if item["status"] != "ok"} == {"RRID-P06"}
+    assert there[-1]["status"] == "failed"
+    outcome = obey(lay({"05": "fine again"}), resume=True)
+    assert outcome.exit_code == 0
+    assert contents(outcome.folder) == whole
+
+
+def test_abort_stops_at_the_first_error(lay: Lay) -> None:
+    """--on-error abort: what was not begun is not done, and said so."""
+    outcome = obey(lay({"00": "reject"} | {f"{i:02d}": "sleep 0.02" for i in range(1, 40)}), on_error="abort")
+    codes = [(item["error"] or {}).get("code") for item in outcome.json["items"]]
+    assert outcome.exit_code == 4
+    assert codes[0] == "RRID-F02"
+    assert codes.count("RRID-P06") > 30
+
+
+def test_nothing_below_the_root_is_exit_5(tmp_path: Path) -> None:
+    """C06."""
+    (tmp_path / "root/empty").mkdir(parents=True)
+    with pytest.raises(NothingMatched):
+        obey(tmp_path / "root")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,78 @@
+"""One batch at a time in one folder, and no folder that is another's (P08, C05)."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipelines.batch.lock import LOCK, locked
+from pipelines.errors import EnvironmentFault, UsageError
+from tests.batch.conftest import Lay, obey
+from tests.cli.commands import REPO
+
+HOLD = """
+import sys
+from pathlib import Path
+from pipelines.batch.lock import locked
+with locked(Path(sys.argv[1])):
+    print("mine", flush=True)
+    sys.stdin.readline()
+"""
+
+
+def test_the_second_batch_is_told_who_has_the_folder(lay: Lay, tmp_path: Path) -> None:
+    """P08: exit 6 with process and host; when that process is killed, the next batch goes on at once."""
+    root = lay({"a": "fine"})
+    out = obey(root).folder
+    before = (out / "provenance.json").read_bytes()
+    with subprocess.Popen([sys.executable, "-c", HOLD, str(out)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                          env=os.environ | {"PYTHONPATH": str(REPO)}) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "mine\n"
+        with pytest.raises(EnvironmentFault) as refused:
+            obey(root)
+        holder.kill()
+    assert (refused.value.code, refused.value.exit_code) == ("RRID-P08", 6)
+    assert refused.value.message == f"locked by process {holder.pid} on {platform.node()}"
+    assert (out / "provenance.json").read_bytes() == before
+    assert (out / LOCK).exists()  # the dead one's
+    assert obey(root, resume=True).exit_code == 0
+    assert not (out / LOCK).exists()
+
+
+def test_a_lock_that_was_left_behind_locks_nobody_out(tmp_path: Path) -> None:
+    """Whatever a dead process's file says, even the number of one that lives: the kernel knows better."""
+    (tmp_path / LOCK).write_text(json.dumps({"pid": os.getppid(), "host": platform.node()}))
+    with locked(tmp_path):
+        assert json.loads((tmp_path / LOCK).read_text())["pid"] == os.getpid()
+    assert not (tmp_path / LOCK).exists()
+
+
+@pytest.mark.parametrize("what", ["foreign", "other", "added", "file", "link", "inside"])
+def test_a_folder_that_is_not_a_batchs_is_refused(lay: Lay, tmp_path: Path, what: str) -> None:
+    """C05: somebody's files, another command's result, a batch's with a foreign file, a file, a link, a place in the input."""
+    root, out = lay({"a": "fine"}), tmp_path / "out"
+    if what == "foreign":
+        out.mkdir()
+        (out / "thesis.tex").write_text("x")
+    if what == "other":
+        out.mkdir()
+        (out / "provenance.json").write_text(json.dumps({"tool": "rrrid", "command": "inspect", "outputs": {}}))
+    if what == "added":
+        obey(root)
+        (out / "notes.txt").write_text("x")
+    if what == "file":
+        out.write_text("x")
+    if what == "link":
+        (tmp_path / "there").mkdir()
+        out.symlink_to(tmp_path / "there")
+    with pytest.raises(UsageError) as refused:
+        obey(root, out=root / "a/out" if what == "inside" else out)
+    assert (refused.value.code, refused.value.exit_code) == ("RRID-C05", 2)
+    assert not (root / "a/out").exists()
