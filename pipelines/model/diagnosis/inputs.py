@@ -1,6 +1,7 @@
 """The logs of a diagnosis, and what is made of them before anything is suspected.
 
     prepared = prepare(logs, settings, arm)
+    prepared = narrowed(prepared, 20.0, speeds)  the same through a lower low-pass, without slow samples
     prepared.data, prepared.judge, prepared.columns
 """
 
@@ -9,18 +10,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+import numpy.typing as npt
+
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.estimation.logs import Motions, Recipe, motions_of, with_cutoff
+from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstruction
 
-__all__ = ["Logs", "Prepared", "prepare"]
+__all__ = ["Logs", "Prepared", "narrowed", "prepare"]
 
+Joints = npt.NDArray[np.bool_]
+
+_HELD = 0.02  # of its largest speed in all logs, below which a joint is held throughout a log
 _MOVING = ("excitation", "free", "writing")  # experiments in which all joints move: a joint that is held sticks, and no law tells
 
 
@@ -74,10 +81,38 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     how = Reconstruction()
     fitted, judging, referring = (motions_of(part, how) for part in (logs.identify, logs.validate, logs.reference))
     recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed), (*fitted, *referring))
-    count = len(fitted)
-    return Prepared(logs, columns, recipe, fitted, judging, referring, gather(fitted, columns, recipe),
-                    gather(judging, columns, recipe, first=count) if judging else None,
-                    gather(referring, columns, recipe, first=count + len(judging)) if referring else None)
+    return _laid(logs, columns, recipe, fitted, judging, referring)
+
+
+def narrowed(prepared: Prepared, cutoff_hz: float, min_speed: Sequence[float]) -> Prepared:
+    """The same logs through a low-pass at `cutoff_hz` at most, without samples of a joint slower than its `min_speed` [rad/s]."""
+    recipe = prepared.recipe
+    lower = cutoff_hz if recipe.cutoff_hz is None else min(cutoff_hz, recipe.cutoff_hz)
+    speeds = tuple(np.maximum(np.broadcast_to(np.array(recipe.min_speed), len(min_speed)), min_speed).tolist())
+    return _laid(prepared.logs, prepared.columns, replace(recipe, cutoff_hz=lower, min_speed=speeds), prepared.motions,
+                 prepared.judging, prepared.referring)
+
+
+def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging: Motions, referring: Motions) -> Prepared:
+    fastest = [np.abs(found.motion.dq[found.good.kept]).max(axis=0, initial=0.0) for _, found in (*fitted, *judging, *referring)]
+    held = list(np.array(fastest) < _HELD * np.max(fastest, axis=0))
+    rows: list[Data | None] = []
+    first = 0
+    for part in (fitted, judging, referring):
+        rows.append(_moving(part, columns, recipe, held[first:first + len(part)], first) if part else None)
+        first += len(part)
+    data, judge, reference = rows
+    assert data is not None  # prepare refuses logs without any to fit
+    return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
+
+
+def _moving(motions: Motions, columns: Columns, recipe: Recipe, held: Sequence[Joints], first: int) -> Data:
+    """The rows of logs; those of a joint that is held throughout a log do not count: it sticks, and no law tells its torque."""
+    if not any(still.any() for still in held):
+        return gather(motions, columns, recipe, first=first)
+    equations = equations_of(motions, recipe, columns)
+    rows = [replace(one.rows, slow=one.rows.slow | still) for one, still in zip(equations, held, strict=True)]
+    return gather(motions, columns, recipe, rows, first)
 
 
 def _columns(logs: Logs, arm: Arm | None) -> Columns:

@@ -18,7 +18,7 @@ from pipelines.model.diagnosis.beside import Held, beside, less, torque_of
 from pipelines.model.diagnosis.compliance import Compliance, compared, compliance
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.inputs import Prepared, narrowed
 from pipelines.model.diagnosis.linear import deviations
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
 from pipelines.model.diagnosis.result import NotTestable, Standing, Value
@@ -26,6 +26,12 @@ from pipelines.model.diagnosis.search import Case
 
 __all__ = ["Responding", "responding"]
 
+# Of the frequency at which the link, or the arm's base, swings while the encoder stands: there a torque out of motion is the noise
+# of the encoder, times a hundred.
+_BELOW = 0.7
+# Of the speed at which friction has turned over: the drive's noise lets a motor on a spring rattle by less than the encoder counts,
+# and where it hardly moves that smears its friction.
+_RATTLES = 3.0
 _SURE = 3.0  # standard deviations
 _THERE, _NOT_THERE = 0.4, 0.6  # of its strength now, that the reference shows at least; at most
 _OPEN = "it gives way now; whether it did before, the reference logs do not tell"
@@ -47,6 +53,7 @@ def responding(case: Case, prepared: Prepared, without: Sequence[str] = ()) -> R
     stiff = compliance(logs.frf, arm, without)
     if stiff is None or not stiff.named:
         return Responding(stiff, Held(case, prepared, ()))
+    case, prepared = _told_apart(case, prepared, stiff.named)
     if prepared.reference is None:
         return Responding(stiff, beside(case, prepared, stiff.named))
     new, old, open_ = _apart(stiff, compliance(logs.frf_before, arm, without), prepared.reference, arm, prepared)
@@ -58,6 +65,18 @@ def responding(case: Case, prepared: Prepared, without: Sequence[str] = ()) -> R
     left = tuple(NotTestable(one.effect.name, one.effect.joint, _OPEN, f"{one.effect.experiment} Before and after.")
                  for one in open_)
     return Responding(stiff, beside(case, prepared, new), tuple(told), left)
+
+
+def _told_apart(case: Case, prepared: Prepared, named: Sequence[Acting]) -> tuple[Case, Prepared]:
+    """Rows in which what gives way can be told from the noise of encoder and drive."""
+    arm, speeds = case.model.nominal, [0.0] * case.data.n_joints
+    for joint in {one.effect.joint for one in named} - {None}:
+        assert joint is not None
+        sharp = [w for curve in arm.friction_curves(joint) or () for w in curve.sharpnesses]
+        speeds[joint - 1] = _RATTLES / max(sharp) if sharp else 0.0
+    prepared = narrowed(prepared, _BELOW * min(one.values["frequency"] for one in named), speeds)
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    return replace(case, data=prepared.data, judge=prepared.judge, model=Exact.start(columns, fit), weight=fit.weight), prepared
 
 
 def _apart(stiff: Compliance, before: Compliance | None, reference: Data, arm: Arm,
