@@ -143,6 +143,8 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     """
     if request.roles:
         return read_by_role(dataclasses.replace(request, roles={}), settings, request.roles, keep_rejected=keep_rejected)
+    if not request.paths:
+        raise _no_logs()
     paths, checks = find_logs(request.paths)
     robot = load_robot(request.robot) if request.robot is not None else None
     opened: list[Opened] = []
@@ -173,7 +175,7 @@ def read_by_role(request: Request, settings: object, named: Mapping[str, Sequenc
     paths = {role: tuple(Path(path).expanduser().absolute() for path in given) for role, given in named.items() if given}
     every = tuple(dict.fromkeys((*request.paths, *(path for given in paths.values() for path in given))))
     if not every:
-        raise UsageError("C02", "no logs", where="LOGS", remedy="name logs, or folders of logs")
+        raise _no_logs()
     inputs = read_logs(dataclasses.replace(request, paths=every), settings, keep_rejected=keep_rejected)
     roles: dict[Path, str] = {}
     for role, given in paths.items():
@@ -187,6 +189,10 @@ def read_by_role(request: Request, settings: object, named: Mapping[str, Sequenc
                  for opened, role in kept)
     beside = tuple(path for given in paths.values() for path in given)
     return dataclasses.replace(inputs, logs=logs, folders=(*inputs.folders, *beside))
+
+
+def _no_logs() -> UsageError:
+    return UsageError("C02", "no logs", where="LOGS", remedy="name logs, or folders of logs")
 
 
 def _all_of(rejected: list[Rejected]) -> RrridError:
@@ -220,11 +226,13 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed.
     """
     request = dataclasses.replace(request, paths=expanded(request.paths))
-    given = given_names(request.paths)
+    given, inputs = given_names(request.paths), ", ".join(map(str, request.paths))
     try:
         return _run(stage, dataclasses.replace(request, paths=tuple(path.absolute() for path in request.paths)), settings)
     except RrridError as problem:
-        problem.where, problem.message = renamed(problem.where, given), renamed(problem.message, given)
+        # What knows no file, such as a filter of samples, leaves the place to who knows the inputs.
+        problem.where = renamed(problem.where, given) or clean(inputs or f"rrrid {stage.name}")
+        problem.message = renamed(problem.message, given)
         raise
 
 

@@ -6,7 +6,7 @@ Results go to standard output, everything else to standard error, so that `--jso
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pipelines.errors import Check, RrridError, clean
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pipelines.report.report import Table
     from pipelines.stage import Outcome
 
-__all__ = ["Teller", "say_error", "say_outcome"]
+__all__ = ["Teller", "say_error", "say_outcome", "say_table"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
 _MOST = 12
@@ -66,9 +66,14 @@ def _say_table(table: Table, stream: Any) -> None:
     """The rows of a table; its head as well, where a row is more than a name and a figure."""
     from pipelines.report.style import format_number
 
-    head = [table.columns] if len(table.columns) > 2 and table.rows else []
-    cells = [[format_number(c) if isinstance(c, float) else clean("–" if c is None else c, 60) for c in row]
-             for row in (*head, *table.rows)]
+    head = table.columns if len(table.columns) > 2 and table.rows else ()
+    say_table(head, [[format_number(c) if isinstance(c, float) else clean("–" if c is None else c, 60) for c in row]
+                     for row in table.rows], stream)
+
+
+def say_table(head: Sequence[str], rows: Iterable[Sequence[str]], stream: Any = None) -> None:
+    """Words in columns, on standard output where nothing else is said."""
+    cells = [[clean(cell, 200) for cell in row] for row in (*((head,) if head else ()), *rows)]
     widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))] if cells else []
     for row in cells:
         print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip(), file=stream)

@@ -34,6 +34,8 @@ def entry() -> NoReturn:
     sys.unraisablehook = _again
     as_json, debug = "--json" in sys.argv, "--debug" in sys.argv
     try:
+        if "_RRRID_COMPLETE" in os.environ:  # a shell asks how the line could go on
+            app(prog_name="rrrid", complete_var="_RRRID_COMPLETE")
         _call(sys.argv[1:])
     except typer.Exit as ended:
         _deaf()

@@ -14,10 +14,26 @@ import typer
 from pipelines.errors import UsageError
 from rrrid_cli.conversion import plainly
 
-__all__ = ["Common", "LogPaths", "StageCommand", "StageGroup", "numbers", "whole_numbers", "with_common"]
+__all__ = ["Common", "LogPaths", "Roles", "SomeLogs", "StageCommand", "StageGroup", "numbers", "whole_numbers", "with_common"]
 
 LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
                                                   readable=False)]  # rrrid says it better: exit 6, RRID-F13
+SomeLogs = Annotated[list[Path] | None, typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
+                                                       readable=False)]  # of commands that take --identify in their place
+
+
+@dataclass(frozen=True)
+class Roles:
+    """Logs named for a role, whatever they say of themselves."""
+
+    identify: tuple[str, ...] = ()
+    validate: tuple[str, ...] = ()
+    reference: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> dict[str, tuple[str, ...]]:
+        """Role -> paths, of those that were given."""
+        return {role: paths for role in ("identify", "validate", "reference") if (paths := getattr(self, role))}
 
 
 @dataclass(frozen=True)
@@ -77,11 +93,25 @@ def _path(words: str, *names: str) -> Any:
     return typer.Option(*names, help=words, readable=False)
 
 
+_ORDER = ("run", "batch", "demo", "inspect", "import", "convert", "design-excitation", "fit-friction", "reconstruct",
+          "estimate-bps", "validate-writing", "frf", "simulate", "diagnose", "extend", "compare", "report", "schema", "doctor")
+
+
 class StageGroup(typer.core.TyperGroup):
-    """All commands together, with --help and --version."""
+    """All commands together, with --help and --version, in the order in which they are needed."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return sorted(super().list_commands(ctx), key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
 
     def get_params(self, ctx: Any) -> list[Any]:
         return plainly(super().get_params(ctx))
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Every command with its whole sentence: it is wrapped, where the parser's own list would cut it."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        rows = [(name, " ".join((command.help or "").split("\n\n")[0].split())) for name, command in commands if command]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
 
 class StageCommand(typer.core.TyperCommand):
@@ -121,19 +151,28 @@ _JOINTS = ("joints", Annotated[str | None, _flag("Joints to take of every log: 1
                                                   "--joints")], None)
 
 
+# Of the commands that read logs by their roles.
+_ROLES: tuple[tuple[str, Any, Any], ...] = tuple((role, Annotated[list[str], _flag(words, f"--{role}")], []) for role, words in (
+    ("identify", "Logs to fit, whatever they say of themselves. Repeatable."), ("validate", "Logs that judge. Repeatable."),
+    ("reference", "Logs of the arm as it was before. Repeatable.")))
+
+
 def with_common(command: Callable[..., None]) -> Callable[..., None]:
-    """`command(own options…, common)` as a command that takes the shared options as well."""
+    """`command(own options…, common)` as a command that takes the shared options as well; with `roles`, those too."""
     own = inspect.signature(command, eval_str=True)
-    options = (*_SHARED, _JOINTS) if "logs" in own.parameters else _SHARED
+    by_role = _ROLES if "roles" in own.parameters else ()
+    options = (*by_role, *_SHARED, *((_JOINTS,) if "logs" in own.parameters else ()))
     shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
               for name, kind, default in options]
-    kept = [p for p in own.parameters.values() if p.name != "common"]
+    kept = [p for p in own.parameters.values() if p.name not in ("common", "roles")]
 
     @functools.wraps(command)
     def run(**given: Any) -> None:
         said = {name: given.pop(name) for name, _, _ in options}
         if said["quiet"] and said["verbose"]:
             raise UsageError("C02", "-q and -v ask for opposite things", where="-q, -v", remedy="give one of them")
+        if by_role:
+            given["roles"] = Roles(**{role: tuple(said.pop(role) or ()) for role, _, _ in by_role})
         command(**given, common=Common(**(said | {"joints": _joints(said.get("joints"))})))
 
     parameters = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in kept] + shared

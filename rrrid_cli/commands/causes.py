@@ -1,0 +1,59 @@
+"""What the simulation gets wrong, why, and the model that has it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rrrid_cli.commands.application import app, go
+from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, numbers, with_common
+
+__all__ = ["diagnose", "extend"]
+
+
+@app.command(cls=StageCommand)
+@with_common
+def diagnose(
+    common: Common, roles: Roles,
+    logs: SomeLogs = None,
+    without: Annotated[list[str] | None, typer.Option(help="Cause that it is not, you know: cogging. Repeatable.")] = None,
+    model: Annotated[str | None, typer.Option(help="model.json whose friction laws are taken. [Coulomb and viscous]")] = None,
+    replicas: Annotated[int | None, typer.Option(help="Simulated twins that say what is normal; 0: none. [10]")] = None,
+    most: Annotated[int | None, typer.Option(help="Causes to look for, at most. [4]")] = None,
+    blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
+    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
+    min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the twins' noise. [1]")] = None,
+    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Diagnose torque that looks misplaced.")] = None,
+) -> None:
+    """Say what the simulation gets wrong, why, what to check, and how much better the model becomes."""
+    from pipelines.diagnose import STAGE
+
+    go(STAGE, tuple(logs or ()), common, {
+        **roles.named, "without": tuple(without or ()) or None, "model": model,
+        "replicas": replicas, "most": most, "blocks": blocks, "filter": filter, "decimate": decimate,
+        "min_speed": numbers(min_speed, "--min-speed"), "seed": seed, "allow_mismatch": allow_mismatch})
+
+
+@app.command(cls=StageCommand)
+@with_common
+def extend(
+    common: Common, roles: Roles,
+    logs: SomeLogs = None,
+    with_: Annotated[list[str] | None, typer.Option("--with", help="CAUSE:JOINT, or CAUSE:JOINT:NAME=VALUE with a start for a "
+                                                    "non-linear number: cogging:2:order=18. Repeatable.")] = None,
+    model: Annotated[str | None, typer.Option(help="model.json to extend: its effects are kept, and fitted anew.")] = None,
+    blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
+    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
+    min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
+    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Fit torque that looks misplaced.")] = None,
+) -> None:
+    """Extend the model by named causes, refit everything, and judge it on held-out logs."""
+    from pipelines.extend import STAGE
+
+    go(STAGE, tuple(logs or ()), common, {
+        "causes": tuple(with_ or ()) or None, **roles.named, "model": model, "blocks": blocks,
+        "filter": filter, "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "allow_mismatch": allow_mismatch})

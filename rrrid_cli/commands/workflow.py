@@ -1,0 +1,47 @@
+"""The whole workflow: on one folder of logs, and on many."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from rrrid_cli.batch import BatchCommand, batch
+from rrrid_cli.commands.application import app, asked, go
+from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, with_common
+
+__all__ = ["batch", "run"]
+
+
+@app.command(cls=StageCommand)
+@with_common
+def run(
+    common: Common, roles: Roles, logs: SomeLogs = None,
+    skip: Annotated[list[str] | None, typer.Option(help="Stage to leave out, such as diagnose. Repeatable.")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be computed, and why; compute nothing.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Compute everything, also what has not changed.")] = False,
+) -> None:
+    """Do the whole workflow on a folder of logs; one report. What has not changed is not computed again."""
+    from pipelines.run import STAGE, plan
+
+    given = {"skip": tuple(skip or ()) or None, "fresh": fresh or None}
+    if not dry_run:
+        go(STAGE, tuple(logs or ()), common, given, roles=roles)
+    request, settings, teller = asked(STAGE, tuple(logs or ()), common, given, roles=roles)
+    try:
+        planned = plan(request, settings)
+    finally:
+        teller.done()
+    if common.json:
+        from pipelines.log.results import encode, json_text
+
+        sys.stdout.write(json_text({"command": "run", "stages": encode(planned)[0]}))
+    elif not common.quiet:
+        from rrrid_cli.console import say_table
+
+        say_table(("logs", "stage", "would be", "because"),
+                  [(one.logs, one.stage, "computed" if one.computed else "taken back", one.why) for one in planned])
+
+
+app.command(cls=BatchCommand)(batch)
