@@ -26,7 +26,7 @@ from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
+from pipelines.model.simulation import Experiment, Noise, Simulated, simulate, simulate_together
 
 __all__ = ["Twin", "drive_noise", "make_twin", "replayable", "white"]
 
@@ -126,7 +126,8 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
     columns = model.columns
     drawn = Noise(noise, np.zeros_like(noise))
     seeds = range(seed, seed + replicas)
-    runs = {place: simulate(model.nominal, Experiment.of_log(motions[place][0]), drawn, seeds) for place in places}
+    every = simulate_together(model.nominal, [Experiment.of_log(motions[place][0]) for place in places], drawn, seeds)
+    runs = dict(zip(places, every, strict=True))
     found = []
     for k in range(replicas):
         parts = [_motion(motions[place][0], done, k, recipe) for place, done in runs.items()]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["AsymmetricFriction"]
@@ -44,3 +45,7 @@ class AsymmetricFriction(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
             yield replace(self, sharpness=sharpness)
+
+    def own_load(self, values: Values) -> OwnLoad:
+        (coulomb, viscous), sharpness = (0.5 * self.amplitudes(values)).tolist(), values["sharpness"]
+        return lambda angle, speed: coulomb * abs(math.tanh(sharpness * speed)) + viscous * abs(speed)

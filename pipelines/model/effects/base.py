@@ -45,7 +45,7 @@ import numpy.typing as npt
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["ArmModel", "Effect", "Hooks", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
+__all__ = ["ArmModel", "Effect", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
 
 Values = Mapping[str, float]
 
@@ -85,6 +85,7 @@ class ArmModel(Protocol):
 
 
 Predict = Callable[[Motion, ArmModel], Array]
+OwnLoad = Callable[[float, float], float]  # angle [rad], speed [rad/s] -> [N m]
 
 
 @dataclass(frozen=True)
@@ -276,6 +277,13 @@ class Effect(ABC):
 
     def speed_curve(self, values: Values) -> SpeedCurve | None:
         """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
+        return None
+
+    def own_load(self, values: Values) -> OwnLoad | None:
+        """What `simulate` has as load, as a function of angle and speed of its own joint, where it follows from these alone.
+
+        A simulation of one robot asks it: plain numbers are several times faster there than arrays.
+        """
         return None
 
     def predicted(self, motion: Motion, arm: ArmModel) -> Array:

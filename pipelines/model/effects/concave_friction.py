@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ConcaveFriction"]
@@ -42,3 +42,6 @@ class ConcaveFriction(Effect):
         fast = float(np.abs(self.own(motion.dq)).max(initial=0.0)) or 1.0
         for speed in np.geomspace(fast / 30.0, fast, 8).tolist():
             yield replace(self, speed=float(np.clip(speed, 0.01, 20.0)))
+
+    def speed_curve(self, values: Values) -> SpeedCurve:
+        return SpeedCurve(heights=(self.amplitudes(values).item(),), sharpnesses=(1.0 / values["speed"],))

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["PositionFriction"]
@@ -50,6 +50,10 @@ class PositionFriction(Effect):
         step = 1.0 if np.ptp(self.own(motion.q)) < 2.0 * math.pi else 0.5
         for order in np.arange(1.0, 8.0 + step, step).tolist():
             yield replace(self, order=order)
+
+    def own_load(self, values: Values) -> OwnLoad:
+        amplitude, order, phase, sharpness = (values[name] for name in ("amplitude", "order", "phase", "sharpness"))
+        return lambda angle, speed: amplitude * math.tanh(sharpness * speed) * math.sin(order * angle + phase)
 
     def amplitudes(self, values: Values) -> Array:
         return values["amplitude"] * np.array([math.cos(values["phase"]), math.sin(values["phase"])])

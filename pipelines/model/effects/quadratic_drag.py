@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["QuadraticDrag"]
@@ -30,3 +30,7 @@ class QuadraticDrag(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)
         return self.on_own_row(arm, v * np.abs(v))
+
+    def own_load(self, values: Values) -> OwnLoad:
+        coefficient = self.amplitudes(values).item()
+        return lambda angle, speed: coefficient * speed * abs(speed)

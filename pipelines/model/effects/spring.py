@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Spring"]
@@ -55,6 +55,18 @@ class Spring(Effect):
 
     def full(self) -> Self:
         return replace(self, degree=_DEGREE)
+
+    def own_load(self, values: Values) -> OwnLoad:
+        slope, constant, *rest = self.amplitudes(values).tolist()
+        falling = (*rest[::-1], slope, constant)
+
+        def load(angle: float, speed: float) -> float:
+            torque = 0.0
+            for coefficient in falling:  # Horner
+                torque = torque * angle + coefficient
+            return torque
+
+        return load
 
     def amplitudes(self, values: Values) -> Array:
         constant, slope, *rest = _about([0.0, *(values[name] for name in _TERMS)], -values["rest_angle"])[:1 + self.degree]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Stribeck"]
@@ -49,3 +50,7 @@ class Stribeck(Effect):
         fast = float(np.abs(self.own(motion.dq)).max(initial=0.0)) or 1.0
         for speed in np.geomspace(2.0 / self.sharpness, max(fast / 3.0, 4.0 / self.sharpness), 8).tolist():
             yield replace(self, speed=float(np.clip(speed, 1e-3, 5.0)))
+
+    def own_load(self, values: Values) -> OwnLoad:
+        amplitude, sharpness, narrow = self.amplitudes(values).item(), values["sharpness"], 1.0 / values["speed"] ** 2
+        return lambda angle, speed: amplitude * math.exp(-narrow * speed * speed) * math.tanh(sharpness * speed)

@@ -9,17 +9,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.accuracy import Step, choose_step
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.plant import Plant
-from pipelines.model.simulation.replicas import Noise, Simulated, run
+from pipelines.model.simulation.replicas import Noise, Simulated, run, run_together
 from pipelines.model.simulation.windows import Windows, simulate_windows
 
-__all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "run", "simulate", "simulate_windows"]
+__all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "run", "simulate", "simulate_together",
+           "simulate_windows"]
 
 
 def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds: Iterable[int] = (0,), p: Array | None = None,
@@ -40,3 +41,19 @@ def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds
         raise ValueError(f"p has {len(p)} rows for {len(seeds)} seeds")
     plant = Plant.of(arm, p)
     return run(plant, experiment, choose_step(plant, experiment, noise).per_sample if steps is None else steps, noise, seeds)
+
+
+def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None,
+                      seeds: Iterable[int] = (0,)) -> list[Simulated]:
+    """`simulate` of several experiments, side by side as far as their sample times agree; the step is fine enough for all.
+
+    Raises:
+        InputRejected: D17, the arm runs away, or no step is small enough.
+    """
+    plant, drawn, found = Plant.of(arm), tuple(seeds), dict[int, Simulated]()
+    for time in dict.fromkeys(one.sample_time for one in experiments):
+        places = [k for k, one in enumerate(experiments) if one.sample_time == time]
+        some = [experiments[k] for k in places]
+        steps = max(choose_step(plant, one, noise).per_sample for one in some)
+        found |= dict(zip(places, run_together(plant, some, steps, noise, drawn), strict=True))
+    return [found[k] for k in range(len(experiments))]

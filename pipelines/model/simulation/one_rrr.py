@@ -8,7 +8,7 @@ would cost as much as the arithmetic.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, sin, tanh
+from math import cos, nan, sin, tanh
 from typing import Any
 
 from pipelines.model.rigid.body import Array
@@ -58,23 +58,27 @@ _ACCELERATION = """
 
 # Kutta's stages k, l, m, n: the slope of the position is the speed of the stage.
 _STEP = """
-def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh):
+def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads):
+{unpacked}
 {first}
     w1 = v1 + {half} * k1
     w2 = v2 + {half} * k2
     w3 = v3 + {half} * k3
+    y1 = q1 + {half} * v1
     y2 = q2 + {half} * v2
     y3 = q3 + {half} * v3
 {second}
     z1 = v1 + {half} * l1
     z2 = v2 + {half} * l2
     z3 = v3 + {half} * l3
+    y1 = q1 + {half} * w1
     y2 = q2 + {half} * w2
     y3 = q3 + {half} * w3
 {third}
     o1 = v1 + {h} * m1
     o2 = v2 + {h} * m2
     o3 = v3 + {h} * m3
+    y1 = q1 + {h} * z1
     y2 = q2 + {h} * z2
     y3 = q3 + {h} * z3
 {fourth}
@@ -88,7 +92,7 @@ _Step = Callable[..., tuple[float, float, float, float, float, float]]
 
 
 class OneRRR:
-    """The integrator of one arm that nothing but rigid body and friction moves; used as `RungeKutta` is."""
+    """The integrator of one arm that nothing moves but rigid body, friction and loads of single joints; used as `RungeKutta` is."""
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
         """`plant` as `fits` it; `steps` of equal size make one control sample."""
@@ -103,8 +107,11 @@ class OneRRR:
         """Move `state` (6, 1) on by one sample, in place; there are no memories, and nothing depends on time."""
         del t
         step, now, torque = self._step, state[:, 0].tolist(), command[:, 0].tolist()
-        for _ in range(self._steps):
-            now = step(*now, *torque)
+        try:
+            for _ in range(self._steps):
+                now = step(*now, *torque)
+        except (ValueError, OverflowError):  # of an infinite number there is no sine
+            now = [nan] * len(now)
         state[:, 0] = now
         return states
 
@@ -113,8 +120,10 @@ def _compiled(plant: Plant, h: float) -> _Step:
     """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, u1, u2, u3) -> the first six after it."""
     numbers = _numbers(plant)
     stages = {name: _ACCELERATION.format(**numbers, **_names(plant, *letters)) for name, letters in _STAGES.items()}
-    text = _STEP.format(**stages, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))
-    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh}
+    loads = tuple(own[1] for own in plant.own_loads if own is not None)
+    unpacked = f"    {', '.join(f'load{k}' for k in range(len(loads)))}, = loads" if loads else ""
+    text = _STEP.format(**stages, unpacked=unpacked, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))
+    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, "loads": loads}
     exec(compile(text, "<one step of an RRR arm>", "exec"), scope)
     step: _Step = scope["step"]
     return step
@@ -134,12 +143,14 @@ def _numbers(plant: Plant) -> dict[str, str]:
 
 
 def _names(plant: Plant, position: str, speed: str, slope: str) -> dict[str, str]:
-    """The variables of one stage, and friction as text over its speeds."""
+    """The variables of one stage, and friction with the loads of single joints as text over them."""
+    loads = [own[0] for own in plant.own_loads if own is not None]
     names = {f"{kind}{k}": f"{letter}{k}" for kind, letter in (("q", position), ("v", speed), ("a", slope)) for k in (1, 2, 3)}
     curves = plant.curves
     for j in range(3):
         v = f"{speed}{j + 1}"
         sigmoids = zip(curves.heights[:, j].tolist(), curves.sharpnesses[:, j].tolist(), strict=True)
         terms = [f"({curves.viscous[j].item()!r}) * {v}", *(f"({f!r}) * tanh({w!r} * {v})" for f, w in sigmoids if f)]
+        terms += [f"load{k}({position}{j + 1}, {v})" for k, joint in enumerate(loads) if joint == j]
         names[f"friction{j + 1}"] = " + ".join([*terms, repr(curves.constant[j].item())] if curves.constant[j] else terms)
     return names

@@ -17,7 +17,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.model.arm import Arm
-from pipelines.model.effects.base import ArmModel, Hooks
+from pipelines.model.effects.base import ArmModel, Hooks, OwnLoad
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.rrr import RRR
@@ -41,6 +41,7 @@ class Plant:
     hooks: tuple[Hooks, ...]  # of all other effects
     needed: Callable[[Motion], Array]  # torque that a motion at the start needs [N m], for memories that are not empty
     records: tuple[Callable[[Array, Array], Array], ...] = ()  # what comes between a command and the log
+    own_loads: tuple[tuple[int, OwnLoad] | None, ...] = ()  # of the hooks whose load follows from their own joint (0-based) alone
 
     @classmethod
     def of(cls, arm: Arm, p: Array | None = None) -> Plant:
@@ -52,7 +53,7 @@ class Plant:
         if p is not None and (p.ndim != 2 or p.shape[1] != len(arm.p)):
             raise ValueError(f"p has the shape {p.shape}, wanted is (replicas, {len(arm.p)})")
         rigid, acting_on = Arm(arm.name, arm.body, arm.base), cast("ArmModel", arm.nominal)
-        curves, hooks, records, added = [], [], [], np.zeros((arm.n_joints, arm.n_joints))
+        curves, hooks, alone, records, added = [], [], [], [], np.zeros((arm.n_joints, arm.n_joints))
         laws = [(law, True) for law in arm.friction]
         for acting, friction in (*laws, *((effect, False) for effect in arm.effects)):
             curve = acting.effect.speed_curve(acting.values)
@@ -65,9 +66,11 @@ class Plant:
             records += [own.record] if own.record else []
             if any((own.load, own.actuator, own.sensor, own.settled, own.states)):
                 hooks.append(own)
+                load = acting.effect.own_load(acting.values)
+                alone.append(None if load is None or acting.effect.joint is None else (acting.effect.joint - 1, load))
         parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
         return cls(acting_on.body, parameters, added, stacked(curves, arm.n_joints), tuple(hooks), arm.nominal.torque,
-                   tuple(records))
+                   tuple(records), tuple(alone))
 
     @property
     def n_joints(self) -> int:
@@ -81,8 +84,9 @@ class Plant:
 
     @property
     def plain(self) -> bool:
-        """Whether nothing but rigid body and friction moves it: no hook has to be asked on the way."""
-        return all(not any((hook.load, hook.actuator, hook.states)) for hook in self.hooks)
+        """Whether nothing moves it but rigid body, friction, and loads of single joints: no hook has to be asked on the way."""
+        return all(own is not None or not any((hook.load, hook.actuator, hook.states))
+                   for hook, own in zip(self.hooks, self.own_loads, strict=True))
 
     def refuse_unphysical(self, q: Array) -> None:
         """Look at the inertia matrix in the postures q (postures, joints).

@@ -264,5 +264,19 @@ def test_simulation_hooks(kind: type[Effect], arm: Arm, motion: Motion) -> None:
                                       placed(kind).torque(motion, arm, values))
 
 
+@every_effect
+def test_a_load_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """Where it follows from angle and speed of its own joint alone, it is the same as the torque by arrays."""
+    values = drawn(placed(kind), 7)
+    load = placed(kind).own_load(values)
+    if load is None:
+        return
+    some = slice(0, None, 50)
+    torque = placed(kind).torque(motion, arm, values)[some]
+    plain = [load(angle, speed) for angle, speed in zip(motion.q[some, 1].tolist(), motion.dq[some, 1].tolist(), strict=True)]
+    np.testing.assert_allclose(plain, torque[:, 1], rtol=1e-9, atol=1e-12 * np.abs(torque).max())
+    assert not np.delete(torque, 1, axis=1).any()
+
+
 def first_order(effect: Effect, motion: Motion, arm: Arm, values: dict[str, float]) -> Array:
     return np.asarray(effect.at(values).columns(motion, arm) @ effect.amplitudes(values))

@@ -12,6 +12,7 @@ from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Noise, Plant, run
+from pipelines.model.simulation.replicas import run_together
 from tests.model.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop, TransferObserver
 
@@ -169,3 +170,16 @@ def test_noise_is_each_replicas_own() -> None:
     calm = run(plant, asked, 2)
     spread = [np.sqrt(np.mean((x.true_q - calm.true_q) ** 2)) for x in (many, loud)]
     assert spread[1] / spread[0] == pytest.approx(2.0, rel=0.05)
+
+
+def test_experiments_side_by_side_do_what_they_do_alone() -> None:
+    """Three experiments of different length and reference, two replicas each, run at once: bit for bit the same."""
+    plant = Plant.of(rrr().arm)
+    several = [experiment(plain(), samples) for samples in (60, 90, 40)]
+    several[1] = replace(several[1], q_ref=several[1].q_ref[::-1].copy(), dq_ref=-several[1].dq_ref[::-1],
+                         q0=several[1].q_ref[-1],
+                         dq0=-several[1].dq_ref[-1])
+    for one, alone in zip(run_together(plant, several, 2, NOISE, (3, 4)), [run(plant, one, 2, NOISE, (3, 4)) for one in several],
+                          strict=True):
+        np.testing.assert_array_equal(one.q, alone.q)
+        np.testing.assert_array_equal(one.tau, alone.tau)
