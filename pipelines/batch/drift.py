@@ -5,8 +5,8 @@ A figure x of n items, each with its standard deviation s: if nothing moved,
     χ² = Σ ((xᵢ - x̄) / sᵢ)²,    x̄ = Σ (xᵢ/sᵢ²) / Σ (1/sᵢ²)
 
 follows a χ² distribution with n - 1 degrees of freedom (Bevington and Robinson 2003, eq. (4.17) for x̄, (4.19) for its variance,
-§ 4.4 for χ²). An item has moved where it lies more than 3 std from the mean of the others. A residual has no std of its own:
-it is judged by how much it scatters, from a median absolute deviation, where there are enough items.
+§ 4.4 for χ²). An item has moved where it lies more than 3 std from the mean of the others that have not. A residual has no std
+of its own: it is judged by how much it scatters, from a median absolute deviation, where there are enough items.
 """
 
 from __future__ import annotations
@@ -101,11 +101,32 @@ def _residuals(done: Sequence[Record]) -> tuple[Course, ...]:
 
 
 def from_others(value: Array, std: Array) -> Array:
-    """[std] by which each value is away from the weighted mean of the others."""
-    weight = 1.0 / std**2
-    others = np.sum(weight) - weight
-    mean = (np.sum(weight * value) - weight * value) / others
-    return np.asarray((value - mean) / np.sqrt(std**2 + 1.0 / others))
+    """[std] by which each value is away from the weighted mean of the others that have not moved.
+
+    What has moved most is taken out of the mean first, and the rest looked at anew: one that is far away would draw the mean to
+    itself, and others would seem to have moved. At least half of them stay.
+    """
+    kept = np.ones(len(value), dtype=bool)
+    while True:
+        away = _from_mean(value, std, kept)
+        worst = int(np.argmax(np.where(kept, np.abs(away), 0.0)))
+        if abs(away[worst]) <= LIMIT or np.sum(kept) <= max(2, (len(value) + 1) // 2):
+            return away
+        kept[worst] = False
+
+
+def _from_mean(value: Array, std: Array, kept: npt.NDArray[np.bool_]) -> Array:
+    """[std] by which each value is away from the weighted mean of the other `kept` ones."""
+    weight = np.where(kept, 1.0 / std**2, 0.0)
+    others = _sum_of_others(weight)
+    return np.asarray((value - _sum_of_others(weight * value) / others) / np.sqrt(std**2 + 1.0 / others))
+
+
+def _sum_of_others(x: Array) -> Array:
+    """For each the sum of all but it; summed, not subtracted: beside a sure item the others would vanish in its digits."""
+    before = np.concatenate(([0.0], np.cumsum(x[:-1])))
+    after = np.concatenate((np.cumsum(x[:0:-1])[::-1], [0.0]))
+    return before + after
 
 
 def _chi_square(value: Array, std: Array) -> float:

@@ -7,20 +7,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
-import platform
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import Any, Final
 
-import pipelines
 from pipelines.errors import UsageError, did_you_mean
+from pipelines.log.files import hash_file
 from pipelines.log.results import decode, encode
 from pipelines.log.robot_files import robot_sources
+from pipelines.recall.code import code_of, libraries
+from pipelines.recall.key import digest_of_json
 from pipelines.stage import Stage
 
 __all__ = ["STAGES", "Options", "Plan", "load_stage", "module_of", "plan_key", "plan_text", "read_plan"]
@@ -117,29 +114,12 @@ def plan_key(plan: Plan) -> str:
         del about["options"][name]
     for name in ("root", "out", "folder"):  # where things lie decides nothing
         del about[name]
-    robot = [hashlib.sha256(path.read_bytes()).hexdigest() for path in robot_sources(plan.options.robot) if path.is_file()] if (
-        plan.options.robot is not None) else []
-    whole = json.dumps([about, robot, _code(), _versions(_LIBRARIES), platform.python_version()], sort_keys=True)
-    return hashlib.sha256(whole.encode()).hexdigest()
+    sources = robot_sources(plan.options.robot) if plan.options.robot is not None else ()
+    robot = [hash_file(path) for path in sources if path.is_file()]
+    return digest_of_json([about, robot, _code(plan.module), libraries(_LIBRARIES)])
 
 
-def _code() -> str:
-    """SHA-256 of every module of rrrid: whatever changed in them, a stage may have used it."""
-    whole = hashlib.sha256()
-    for root in sorted(pipelines.__path__):
-        for path in sorted(Path(root).rglob("*.py")):
-            if "bench" not in path.relative_to(root).parts[:1]:
-                whole.update(os.fsencode(path.relative_to(root)) + b"\0" + path.read_bytes() + b"\0")
-    return whole.hexdigest()
-
-
-def _versions(names: Iterable[str]) -> dict[str, str]:
-    from importlib.metadata import PackageNotFoundError, version
-
-    found = {}
-    for name in names:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:  # an optional one
-            found[name] = ""
-    return found
+def _code(module: str) -> dict[str, dict[str, str]]:
+    """The hashes of the code that a stage consists of; of `run` the code of every stage."""
+    modules = [module_of(name) for name in STAGES] if module == "pipelines.run" else [module]
+    return {name: code_of(name) for name in modules}

@@ -148,7 +148,8 @@ def _drift_section(drift: Drift, baseline: ModelFile | None, figures: bool) -> l
     ranked = sorted(drift.figures, key=lambda one: -float(np.max(np.abs(one.away))))
     numbers = sum(len(course.value) for course in ranked)
     beyond = sum(len(course.moved) for course in ranked)
-    text = ["Each figure is compared with the mean of the other items, in standard deviations of the difference. "
+    text = ["Each figure is compared with the mean of the other items that have not moved, in standard deviations of the "
+            "difference. "
             f"Of {numbers} figures {beyond} are beyond {LIMIT:g}; chance alone would put {numbers * 0.0027:.1f} there. "
             "The probability is that of so large a χ² if nothing moved."] if ranked else []
     if drift.residuals:

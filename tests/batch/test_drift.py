@@ -1,0 +1,141 @@
+"""What moved from item to item is told, and what only scattered is not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.batch.baseline import against
+from pipelines.batch.drift import drift_of, from_others
+from pipelines.batch.figures import fitted, residuals
+from pipelines.batch.record import Record
+from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
+from tests.batch.conftest import Lay, obey
+
+STD = 0.02
+
+
+def _records(values: np.ndarray, **more: object) -> list[Record]:
+    """Items recorded one a day, in an order that is not that of their names."""
+    order = np.random.default_rng(0).permutation(len(values))
+    return [Record(f"item {order[i]:03d}", str(i), "ok", 0, figures={"p1": (float(value), STD, "kg m^2")}, robot="arm",
+                   recorded=f"2026-01-{i + 1:02d}T00:00:00Z", **more) for i, value in enumerate(values)]  # type: ignore[arg-type]
+
+
+def test_normal_scatter_is_no_drift() -> None:
+    """400 batches of 12 items that only scatter: χ² has its mean and its quantiles, and 3 std are passed as rarely as by chance."""
+    rng = np.random.default_rng(1)
+    courses = [drift_of(_records(1.0 + STD * rng.normal(size=12)))[0].figures[0] for _ in range(400)]
+    chi_square = np.array([course.chi_square for course in courses])
+    assert courses[0].freedom == 11
+    assert abs(chi_square.mean() - 11.0) < 4.0 * np.sqrt(22.0 / 400)
+    assert 0.02 < np.mean([course.probability < 0.05 for course in courses]) < 0.09  # type: ignore[operator]
+    assert np.mean([abs(far) > 3.0 for course in courses for far in course.away]) < 0.006
+
+
+def test_a_step_is_dated(lay: Lay) -> None:
+    """Six std in one item: that one has moved, by about as much, no other is blamed for it, and χ² says that something did."""
+    values = 1.0 + STD * np.random.default_rng(2).normal(size=10)
+    values[6] += 6.0 * STD
+    course = drift_of(_records(values))[0].figures[0]
+    records = _records(values)
+    assert course.moved == (records[6].name,)
+    assert 4.0 < course.away[6] < 8.0
+    assert course.probability is not None
+    assert course.probability < 1e-3
+    assert course.items == tuple(record.name for record in records)  # by the time of recording, not by name
+
+
+def test_the_others_weigh_by_their_uncertainty() -> None:
+    """A vague item neither accuses a sure one nor hides it; by the text book: x₁ against the weighted mean of x₂ and x₃."""
+    value, std = np.array([0.3, 0.0, 9.0]), np.array([0.1, 0.1, 100.0])
+    mean = (0.0 / 0.1**2 + 9.0 / 100.0**2) / (1 / 0.1**2 + 1 / 100.0**2)
+    assert from_others(value, std)[0] == pytest.approx((0.3 - mean) / np.sqrt(0.1**2 + 1 / (1 / 0.1**2 + 1 / 100.0**2)), rel=1e-12)
+    assert abs(from_others(value, std)[2]) < 0.1
+    certain = from_others(np.array([1.0, 1.2, 1.1]), np.array([1e-12, 0.1, 0.1]))
+    assert np.allclose(certain, [-0.15 / np.hypot(1e-12, 0.1 / np.sqrt(2.0)), 2.0, 1.0], rtol=1e-6)
+
+
+def test_a_residual_is_judged_by_the_scatter_of_most() -> None:
+    """One item with ten times the residual stands out of six; of four nobody can tell."""
+    def course(values: list[float]) -> tuple[str, ...]:
+        records = [Record(str(i), str(i), "ok", 0, residuals={"torque rms": (value, "N m")}, robot="arm")
+                   for i, value in enumerate(values)]
+        return drift_of(records)[0].residuals[0].moved
+
+    assert course([0.10, 0.11, 0.09, 1.0, 0.105, 0.095]) == ("3",)
+    assert course([0.10, 0.11, 0.09, 1.0]) == ()
+
+
+def test_robots_are_not_mixed(lay: Lay) -> None:
+    """Two arms differ by nature."""
+    records = [Record(f"{robot}{i}", f"{robot}{i}", "ok", 0, figures={"p1": (value, STD, "kg m^2")}, robot=robot)
+               for robot, value in (("a", 1.0), ("b", 2.0)) for i in range(3)]
+    assert [(drift.robot, drift.figures[0].moved) for drift in drift_of(records)] == [("a", ()), ("b", ())]
+
+
+def test_figures_are_named_by_where_they_stand() -> None:
+    """In any stage's result: by name, by joint, by cause; not what has no std, and no figure of a run twice."""
+    figure = {"value": 1.0, "std": 0.1, "unit": "N m"}
+    friction = {"joints": [{"joint": 2, "law": "coulomb", "parameters": {"level": figure, "bare": {**figure, "std": None}}}]}
+    assert list(fitted(friction)) == ["coulomb joint 2 level"]
+    diagnosis = {"findings": [{"cause": "cogging", "joint": 2, "parameters": {"amplitude": figure}}]}
+    stages = [{"name": "estimate-bps", "exit": 0, "result": {"parameters": [{"name": "p1", **figure}], "torque_rms": {
+        "validate": [0.1, 0.2]}}}, {"name": "diagnose", "exit": 1, "result": diagnosis}, {"name": "frf", "exit": 5, "result": None}]
+    assert list(fitted({**diagnosis, "stages": stages})) == ["estimate-bps p1", "diagnose cogging joint 2 amplitude"]
+    assert residuals({"stages": stages}) == {"estimate-bps torque rms validate joint 1": (0.1, "N m"),
+                                             "estimate-bps torque rms validate joint 2": (0.2, "N m")}
+
+
+def _baseline() -> ModelFile:
+    cogging = StoredEffect("cogging", 2, {"amplitude": StoredValue(0.5, 0.01, "N m", "fitted")})
+    return ModelFile("known", "", (StoredParameter("p1", 1.0, STD, "kg m^2", True, "fitted", "J"),), effects=(cogging,))
+
+
+def _found(amplitude: float, joint: int = 2, p1: float = 1.0, accepts: bool = True) -> Record:
+    finding = {"cause": "cogging", "joint": joint, "parameters": {"amplitude": {"value": amplitude, "std": 0.01, "unit": "N m"}}}
+    return Record("a", "a", "found", 1, figures={"p1": (p1, STD, "kg m^2")}, findings=(finding,), accepts=accepts)
+
+
+def test_a_baseline_accepts_what_is_known() -> None:
+    """A known cause at its known strength is in order; stronger, elsewhere, beside other trouble, or moved parameters are not."""
+    baseline = _baseline()
+    assert against(_found(0.51), baseline).status == "ok"
+    for changed, says in ((_found(0.6), "cogging:2 amplitude"), (_found(0.5, joint=3), "cogging:3"), (_found(0.5, p1=1.1), "p1")):
+        judged = against(changed, baseline)
+        assert judged.status == "found"
+        assert says in judged.verdict
+    assert against(_found(0.5, accepts=False), baseline).status == "found"
+    rejected = Record("a", "a", "rejected", 3)
+    assert against(rejected, baseline) is rejected
+
+
+def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Path) -> None:
+    """--check with --baseline: 0 while every figure is within its uncertainty, 1 when one item's is beyond."""
+    from pipelines.log.model_file import write_model
+
+    rrr = (Path(__file__).parents[2] / "sample_logs/robots/rrr.toml").read_text()
+    write_model(tmp_path / "model.json", ModelFile("known", rrr, _baseline().base_parameters))
+    root = lay({f"{i}": f"value {1.0 + 0.01 * i} std {STD}" for i in range(3)})
+    assert obey(root, baseline=str(tmp_path / "model.json"), check=True).exit_code == 0
+    outcome = obey(lay({"1": f"value 1.3 std {STD}"}), baseline=str(tmp_path / "model.json"), check=True)
+    assert outcome.exit_code == 1
+    assert {item["name"]: item["status"] for item in outcome.json["items"]} == {"0": "ok", "1": "found", "2": "ok"}
+    assert outcome.json["drift"][0]["figures"][0]["moved"] == ["1"]
+
+
+def test_the_summary_table_holds_every_figure(lay: Lay) -> None:
+    """summary.parquet, one row a figure, for whoever wants to plot it: with value, std, unit, and how far it is away."""
+    import pyarrow.parquet as pq
+
+    outcome = obey(lay({"a": "value 1 std 0.1 rms 0.3", "b": "value 2 std 0.1 rms 0.3", "c": "reject"}))
+    rows = pq.read_table(outcome.folder / "summary.parquet").to_pylist()
+    assert [(row["item"], row["status"], row["quantity"], row["value"], row["std"], row["unit"]) for row in rows] == [
+        ("a", "ok", "p1", 1.0, 0.1, "kg m^2"), ("a", "ok", "torque rms joint 1", 0.3, None, "N m"),
+        ("b", "ok", "p1", 2.0, 0.1, "kg m^2"), ("b", "ok", "torque rms joint 1", 0.3, None, "N m"),
+        ("c", "rejected", None, None, None, None)]
+    assert rows[0]["away"] == pytest.approx(-1.0 / np.sqrt(0.02))
+    assert json.loads((outcome.folder / "result.json").read_text())["counts"] == {"ok": 2, "found": 0, "rejected": 1, "failed": 0}
