@@ -11,7 +11,6 @@ back from the last run in the same output folder, or from one that was killed th
 from __future__ import annotations
 
 import dataclasses
-import typing
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -33,7 +32,7 @@ from pipelines.recall.store import CACHE, Kept, Missed, Store
 from pipelines.report.report import Report
 from pipelines.report.run_report import run_report
 from pipelines.report.run_result import Group, Result, Step
-from pipelines.stage import Inputs, Request, Stage, default_out, read_logs, slug
+from pipelines.stage import Inputs, Request, Stage, default_out, read_logs, result_type, slug
 
 __all__ = ["STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report"]
 
@@ -180,7 +179,7 @@ def _step(stage: Stage[Any, Any], kept: Kept) -> Step:
     if (problem := about["problem"]) is not None:
         report, check = _without(stage, problem)
         return Step(stage.name, problem["exit"], None, report, (check,), kept)
-    result = decode(typing.get_type_hints(stage.compute)["return"], *kept.result())
+    result = decode(result_type(stage), *kept.result())
     return Step(stage.name, about["exit"], result, stage.report(result), tuple(Check(**told) for told in about["checks"]), kept)
 
 

@@ -15,6 +15,7 @@ import platform
 import shutil
 import sys
 import time
+import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,7 +33,7 @@ from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.report.report import Report
 
 __all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "read_by_role", "read_logs",
-           "refuse_foreign", "run_stage", "slug", "tilde"]
+           "refuse_foreign", "result_type", "run_stage", "slug", "tilde"]
 
 _NAMED = 6  # rejected files, in one error
 
@@ -234,6 +235,12 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
         problem.where = renamed(problem.where, given) or clean(inputs or f"rrrid {stage.name}")
         problem.message = renamed(problem.message, given)
         raise
+
+
+def result_type(stage: Stage[Any, R]) -> type[R]:
+    """The dataclass that a stage's `compute` fills in."""
+    found: type[R] = typing.get_type_hints(stage.compute)["return"]
+    return found
 
 
 def default_out(inputs: Inputs, command: str) -> Path:

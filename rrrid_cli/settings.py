@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from pipelines.errors import UsageError, did_you_mean
 from pipelines.log.text import read_small_text
 
-__all__ = ["known_options", "make_settings"]
+__all__ = ["known_options", "make_settings", "stage_of"]
 
 S = TypeVar("S")
 
@@ -72,9 +72,14 @@ def _said(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def _settings_of(stage: str) -> type[Any]:
     """The settings of a stage by its command's name."""
-    module = "import_log" if stage == "import" else stage.replace("-", "_")  # `import` is a word of the language
-    kind: type[Any] = import_module(f"pipelines.{module}").STAGE.settings
+    kind: type[Any] = stage_of(stage).settings
     return kind
+
+
+def stage_of(command: str) -> Any:
+    """The stage of a command."""
+    module = "import_log" if command == "import" else command.replace("-", "_")  # `import` is a word of the language
+    return import_module(f"pipelines.{module}").STAGE
 
 
 def _from_file(path: Path | None) -> list[tuple[str, dict[str, Any]]]:

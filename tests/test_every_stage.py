@@ -11,10 +11,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 
 from pipelines.errors import Check
 from pipelines.log.files import open_log, write_log
+from pipelines.log.result_schema import result_schema
 from pipelines.log.results import decode, encode, read_series
 from pipelines.log.table import write_csv
 from pipelines.report.report import Report
@@ -119,6 +121,7 @@ def test_a_stored_result_redraws_its_report(module: str, tmp_path: Path, samples
 
     stage, outcome = _run(module, tmp_path, samples, no_report=True)
     stored = json.loads((outcome.folder / "result.json").read_text())
+    jsonschema.validate(stored, result_schema(type(outcome.result), stage.name))
     assert stored.pop("command") == stage.name
     series = read_series(outcome.folder / "result.h5") if (outcome.folder / "result.h5").exists() else {}
     again = decode(type(outcome.result), stored, series)
