@@ -34,7 +34,7 @@ class Source:
     where: str
     kind: type[RrridError]
 
-    def wrong(self, message: str, remedy: str = "", code: str = "S17") -> RrridError:
+    def wrong(self, message: str, remedy: str = "correct the URDF there, or export it again", code: str = "S17") -> RrridError:
         return self.kind(code, f"URDF: {message}", where=self.where, remedy=remedy)
 
 
@@ -70,11 +70,11 @@ def read(path: Path, source: Source) -> bytes:
         raise _xacro(source)
     try:
         if not path.is_file():  # a pipe or device would hang
-            raise source.wrong("no such file" if not path.exists() else "not a regular file", code="C04")
+            raise source.wrong("no such file" if not path.exists() else "not a regular file", "check the path", code="C04")
         with path.open("rb") as file:
             text = file.read(_LARGEST + 1)
     except (OSError, ValueError) as problem:
-        raise source.wrong(f"cannot be read: {problem}", code="C04") from None
+        raise source.wrong(f"cannot be read: {problem}", "check the file and its permissions", code="C04") from None
     return text
 
 

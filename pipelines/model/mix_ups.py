@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from itertools import combinations, permutations
 
 import numpy as np
@@ -9,12 +10,13 @@ import numpy as np
 from pipelines.errors import Check
 from pipelines.model.evidence import Evidence
 from pipelines.model.rigid.body import Array
-from pipelines.model.row_fit import Sampled, quick_residual
+from pipelines.model.row_fit import Sampled, quick_residual, shared_residual
 
 __all__ = ["encoder_scale", "position_columns", "torque_columns"]
 
 _BAD, _GOOD, _MUCH_BETTER = 0.15, 0.3, 0.35  # relative residuals, and the ratio of two
-_SCALE_BAD, _SCALE_BETTER = 0.02, 0.25  # a wrong scale can hide well, but the right one then is far better
+# A wrong scale can hide well, but the right one then is far better.
+_SCALE_BAD, _SHARED_BAD, _SCALE_BETTER = 0.02, 0.01, 0.25
 _SCALES = {"0.5": 0.5, "2": 2.0, "0.1": 0.1, "10": 10.0, "pi/180 (degrees)": np.pi / 180, "180/pi": 180 / np.pi,
            "2 pi (turns)": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi, "-1": -1.0}
 
@@ -93,24 +95,34 @@ def position_columns(e: Evidence) -> list[Check]:
 
 
 def encoder_scale(e: Evidence) -> list[Check]:
-    """S15: would one joint's angle fit better in another scale? Only a joint whose angle bends the arm can tell."""
-    told = e.telling
-    if _rms(e.residual[told]) < _SCALE_BAD:
+    """S15: would one joint's angle fit better in another scale?
+
+    First with one set of rigid parameters for all rows, where the scale of a joint tells that bends nothing and moves little.
+    Then with parameters of its own for each row, where a joint's angle bends the arm: that holds whatever the torques' scales.
+    """
+    motion, told = e.thinned().motion, e.telling
+    # The direction of a joint that bends nothing is that of its torque: S14 tells.
+    magnitudes = {name: factor for name, factor in _SCALES.items() if factor > 0}
+    return (_scaled(e, lambda **other: shared_residual(e.body, motion, **other)[told], _SHARED_BAD, magnitudes)
+            or _scaled(e, lambda **other: np.diag(quick_residual(e.body, motion, **other))[told], _SCALE_BAD, _SCALES))
+
+
+def _scaled(e: Evidence, residual: Callable[..., Array], bad: float, scales: Mapping[str, float]) -> list[Check]:
+    """The angle and the scale that leave least, where the log as it is leaves more than `bad` and far more than that."""
+    motion = e.thinned().motion
+    before = _rms(residual())
+    if before < bad:
         return []
-    few = e.thinned()
     best: tuple[float, int, str] | None = None
-    for joint in told.tolist():
-        for name, factor in _SCALES.items():
+    for joint in e.telling.tolist():
+        for name, factor in scales.items():
             scale = np.where(np.arange(e.n_joints) == joint, factor, 1.0)
-            residual = np.diag(quick_residual(e.body, few.motion, q=few.motion.q * scale, dq=few.motion.dq * scale,
-                                              ddq=few.motion.ddq * scale))[told]
-            if best is None or _rms(residual) < best[0]:
-                best = (_rms(residual), joint, name)
-    before = _rms(few.residual[told])
+            left = _rms(residual(q=motion.q * scale, dq=motion.dq * scale, ddq=motion.ddq * scale))
+            if best is None or left < best[0]:
+                best = (left, joint, name)
     if best is None or best[0] > _GOOD or best[0] > _SCALE_BETTER * before:
         return []
     return [e.subject.say("S15", "warn",
-                          f"q of joint {best[1] + 1} fits if multiplied by {best[2]}, residual {before:.2f} -> "
-                          f"{best[0]:.2f}",
+                          f"q of joint {best[1] + 1} fits if multiplied by {best[2]}, residual {before:.2g} -> {best[0]:.2g}",
                           signal="q", joint=best[1], gate=True,
                           remedy="correct the gear ratio, the direction or the counts per turn of this encoder")]

@@ -32,6 +32,7 @@ def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") ->
     kind = find_effect(name)
     joint, numbers = _place(text, kind, rest, len(revolute), where)
     values = _values(text, kind, kind(joint=joint), numbers, where)
+    _refuse_unfit(text, kind, values, joint, len(revolute), where)
     return Acting.of(kind(joint=joint), values, origin="assumed", revolute=joint is None or revolute[joint - 1])
 
 
@@ -51,6 +52,7 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
     if not numbers:
         return effect, {}
     values = _values(text, kind, effect, numbers, where)
+    _refuse_unfit(text, kind, values, joint, len(revolute), where)
     given = [part.partition("=")[0].strip() for part in numbers.split(",") if part.strip()]
     shapes = [q.name for q in kind.parameters if q.shape and not q.derived]
     if linear := [one for one in given if one not in shapes]:
@@ -91,6 +93,13 @@ def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: 
         if not known[name].low <= values[name] <= known[name].high:
             raise UsageError("C02", f"{name} = {values[name]:g} is out of range", where=where, remedy=f"it takes {ranges}")
     return values
+
+
+def _refuse_unfit(text: str, kind: type[Effect], values: dict[str, float], joint: int | None, joints: int, where: str) -> None:
+    """C02, a number that names a joint which the arm does not have."""
+    for quantity in kind.parameters:
+        if why := quantity.unfit(values[quantity.name], joint, joints):
+            raise UsageError("C02", f"'{text}': {why}", where=where, remedy=f"give {quantity.name} another joint of the arm")
 
 
 def _number(text: str, name: str, where: str) -> float:

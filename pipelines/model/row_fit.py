@@ -15,7 +15,8 @@ from pipelines.log.doctor.segments import Usable
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.signal.derivatives import apply_kernel, half_width, kernel, local_polynomial
 
-__all__ = ["Row", "Sampled", "quick_residual", "relative_residual", "row_columns", "row_fits", "sample_motion"]
+__all__ = ["Row", "Sampled", "quick_residual", "relative_residual", "row_columns", "row_fits", "sample_motion",
+           "shared_residual"]
 
 _CUTOFF_HZ = 20.0  # above the motion of a robot arm, below its elastic modes and the drive's noise
 _SPACING = 0.01  # [s] between the samples of the fit
@@ -162,6 +163,26 @@ def quick_residual(body: RigidBody, motion: Sampled, **other: Array) -> Array:
         explained = np.sum((vectors[:, seen].T @ (columns.T @ tau)) ** 2 / values[seen, None], axis=0)
         left.append(np.sum(tau**2, axis=0) - explained)
     return np.asarray(np.sqrt(np.maximum(left, 0.0) / np.where(power > 0, power, 1.0)))
+
+
+def shared_residual(body: RigidBody, motion: Sampled, **other: Array) -> Array:
+    """(joints,) what of each torque's variation is left when all rows share one set of rigid parameters, for another motion.
+
+    A row by itself takes a wrong scale of a speed for another inertia; together they cannot: in the row of the joint itself
+    inertia takes the inverse of the scale, in the rows of the others, by the centrifugal torque, its square.
+    """
+    q, dq, ddq = (other.get(k, getattr(motion, k)) for k in ("q", "dq", "ddq"))
+    n = motion.tau.shape[1]
+    size = np.linalg.norm(motion.tau - motion.tau.mean(axis=0), axis=0)
+    size = np.where(size > 0, size, 1.0)
+    own = np.einsum("mjc,jk->mjkc", np.stack([ddq, dq, motion.coulomb, np.ones_like(q)], axis=-1), np.eye(n))
+    columns = np.concatenate([body.regressor(q, dq, ddq), own.reshape(len(q), n, -1)], axis=2) / size[:, None]
+    flat = columns.reshape(len(q) * n, -1)
+    scale = np.linalg.norm(flat, axis=0)
+    flat = flat / np.where(scale > 0, scale, 1.0)
+    tau = (motion.tau / size).ravel()
+    left = tau - flat @ np.linalg.lstsq(flat, tau, rcond=_RANK)[0]
+    return np.asarray(np.linalg.norm(left.reshape(-1, n), axis=0))
 
 
 def row_fits(body: RigidBody, motion: Sampled, **other: Array) -> tuple[Row, ...]:

@@ -127,6 +127,8 @@ def test_through_a_model_file_and_back(arm: Arm, motion: Motion) -> None:
     assert model_text(back.to_model()) == model_text(extended.to_model())
 
 
+CROSSTALK = StoredEffect("encoder_crosstalk", 1, {"coefficient": StoredValue(0.1, None, "1", "fitted"),
+                                                  "from_joint": StoredValue(9.0, None, "1", "fitted")})
 VISCOUS = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.1, None, "N m s/rad", "fitted")})
 
 
@@ -140,6 +142,8 @@ VISCOUS = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.1, None, "N m
      "did you mean 'coefficient'"),
     ({"effects": (replace(VISCOUS, parameters={"coefficient": StoredValue(1.0, None, "N m", "fitted")}),)},
      "in N m, not N m s/rad"),
+    ({"effects": (CROSSTALK,)}, "from_joint = 9 is no other joint of this arm, which has 3"),
+    ({"effects": (replace(CROSSTALK, effect="torque_crosstalk"),)}, "from_joint = 9 is no other joint"),
     ({"base_parameters": ()}, "p1, p2"),
     ({"base_parameters": (StoredParameter("p16", 1.0, None, "kg", True, "fitted", ""),)}, "p16"),
     ({"robot": "name = 1"}, "robot description"),

@@ -44,6 +44,9 @@ def test_units_follow_the_kind_of_joint() -> None:
     ("coulomb:2:level=nan", "C02", "not a number"),
     ("coulomb:2:level=-1", "C02", "out of range"),
     ("coulomb:2:level=1e9", "C02", "out of range"),
+    ("encoder_crosstalk:1:from_joint=9", "C02", "no other joint of this arm, which has 3"),
+    ("torque_crosstalk:2:coefficient=0.1,from_joint=2", "C02", "no other joint"),
+    ("torque_crosstalk:2:coefficient=0.1,from_joint=1.5", "C02", "no other joint"),
 ])
 def test_anything_else_is_refused(text: str, code: str, words: str) -> None:
     """With a code, and a hint where a name is nearly right."""

@@ -107,6 +107,18 @@ def test_an_encoder_scale_is_hinted_at(joint: int, factor: float, hint: str) -> 
     assert f"q of joint {joint + 1} fits if multiplied by {hint}" in found[0].message
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("level", [1.0, 0.3])
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_scale_of_two_is_told_of_every_joint(seed: int, level: float, factor: float) -> None:
+    """Of joint 1 too, whose angle bends nothing, and of joints that move by a third of a radian."""
+    log = healthy_without_reference(make_log(fourier(np.random.default_rng(1000 + seed), level=level), seed=seed))
+    for joint in range(3):
+        wrong = with_signal(log, q=log.q * np.where(np.arange(3) == joint, factor, 1.0))
+        assert (joint, factor, [c.message.partition(",")[0] for c in plausibility(Subject(wrong)) if c.code == "RRID-S15"]) == (
+            joint, factor, [f"q of joint {joint + 1} fits if multiplied by {1 / factor:g}"])
+
+
 def test_a_locked_joint_hides_parameters_and_they_are_named() -> None:
     """With joint 1 at rest nothing of its inertia shows: p7 is its own, p1, p2, p5, p6 turn with it."""
     log = make_log(one_joint(fourier(np.random.default_rng(1)), 2))

@@ -100,6 +100,13 @@ class Quantity:
     shape: bool = False  # non-linear: a field of the effect, scanned by `shapes`; otherwise an amplitude
     discrete: bool = False  # a shape that is a whole number, such as another joint: chosen, never moved a little
     derived: bool = False  # follows from the other parameters
+    joint: bool = False  # the number of another joint of the arm, 1-based
+
+    def unfit(self, value: float, own: int | None, n_joints: int) -> str:
+        """Why no arm of `n_joints` joints can have this value of an effect at joint `own`; empty where it can."""
+        if not self.joint or (value in range(1, n_joints + 1) and value != own):
+            return ""
+        return f"{self.name} = {value:g} is no other joint of this arm, which has {n_joints}"
 
     def unit_at(self, revolute: bool) -> str:
         """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m."""
@@ -186,6 +193,10 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         """Its torque per unit of each amplitude, to first order, (samples, joints, amplitudes)."""
+
+    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
+        """`columns` of several shapes of itself."""
+        return [shape.columns(motion, arm) for shape in shapes]
 
     def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
         """Of several shapes at this joint that act on it alone: (shapes, amplitudes, samples)."""

@@ -26,7 +26,7 @@ class EncoderCrosstalk(Effect):
     title = "Encoder that follows another joint"
     parameters = (
         Quantity("coefficient", "1", -0.5, 0.5, "part of the other joint's angle in this one's reading"),
-        Quantity("from_joint", "1", 1.0, 64.0, "the other joint", shape=True, discrete=True),
+        Quantity("from_joint", "1", 1.0, 64.0, "the other joint", shape=True, discrete=True, joint=True),
     )
     signature = "An error of this joint's angle that follows the angle of another one, felt by all rows."
     explanation = "Belts, cables or a parallel rod turn this encoder a little when another joint moves, or two channels mix."

@@ -22,7 +22,7 @@ class TorqueCrosstalk(Effect):
     title = "Torque of another joint"
     parameters = (
         Quantity("coefficient", "1", -1.0, 1.0, "share of the other joint's torque that this joint has to give more"),
-        Quantity("from_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True),
+        Quantity("from_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
     )
     signature = "A residual in proportion to another joint's torque."
     explanation = "Two current measurements or motor cables influence each other, or a transmission leads torque past its joint."

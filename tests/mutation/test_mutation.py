@@ -1,0 +1,85 @@
+"""Damaged bytes, whatever they say: every reader takes them or refuses them in words, in bounded time and memory.
+
+In CI each reader meets a hundred; the campaign is `pytest -m slow tests/mutation -s -k hdf5`, ten thousand a reader.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from tests.mutation.contained import Contained, Outcome
+from tests.mutation.edits import Edit, damaged, edits
+from tests.mutation.readers import READERS, Reader
+
+_SECONDS, _BYTES = 10.0, 1e9
+FEW, MANY = 100, int(os.environ.get("RRRID_MUTATIONS", "10000"))
+
+
+def _outcomes(reader: Reader, folder: Path, examples: int) -> list[Outcome]:
+    """Every example's outcome; the bytes of each bad one are kept in the folder."""
+    place = folder / "data" / f"a{reader.ending}"
+    place.parent.mkdir()
+    seeds = reader.seeds(folder)
+    found: list[Outcome] = []
+
+    def work(data: bytes) -> None:
+        place.write_bytes(data)
+        reader.work(place)
+
+    with Contained(work) as child:
+        for seed in seeds:
+            assert (good := child.run(seed)).exit == 0, good
+
+        @settings(max_examples=examples, deadline=None, database=None, derandomize=True, phases=[Phase.generate],
+                  suppress_health_check=list(HealthCheck))
+        @given(st.integers(0, len(seeds) - 1), edits())
+        def meet(which: int, many: list[Edit]) -> None:
+            data = damaged(seeds[which], many)
+            outcome = child.run(data)
+            if outcome.exit not in reader.exits or outcome.seconds > _SECONDS or outcome.words.startswith("INCOMPLETE"):
+                (folder / f"bad-{len(found)}{reader.ending}").write_bytes(data)
+            found.append(outcome)
+
+        meet()
+    return found
+
+
+def _table(reader: Reader, found: list[Outcome]) -> str:
+    """A line of the campaign's table, and every kind of outcome that breaks a bar."""
+    exits = Counter(outcome.exit for outcome in found)
+    crashes = sum("crashed" in outcome.words for outcome in found)
+    hangs = sum("did not end" in outcome.words for outcome in found)
+    bad = Counter((o.exit, o.code, o.words[:160]) for o in found if o.exit not in reader.exits or o.words.startswith("INCOMPLETE"))
+    lines = [f"{reader.name}: {len(found)} inputs, exits {dict(sorted(exits.items()))}, library crashed {crashes}, hung {hangs}, "
+             f"worst {max(o.seconds for o in found):.2f} s, {max(o.memory for o in found) / 1e6:.0f} MB"]
+    return "\n".join([*lines, *(f"  {count} x {kind}" for kind, count in bad.most_common())])
+
+
+def _hold(reader: Reader, found: list[Outcome]) -> None:
+    said = _table(reader, found)
+    print(said)
+    assert {outcome.exit for outcome in found} <= reader.exits, said
+    assert not any(outcome.words.startswith("INCOMPLETE") for outcome in found), said
+    assert max(outcome.seconds for outcome in found) <= _SECONDS, said
+    assert max(outcome.memory for outcome in found) <= _BYTES, said
+    # A campaign of which nothing was refused has damaged nothing.
+    assert sum(outcome.exit != 0 for outcome in found) > len(found) // 10, said
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
+    """Exit 0, 3 (2 for descriptions and configurations): place and remedy said, in 10 s and 1 GB; a checksummed log is itself."""
+    _hold(READERS[name], _outcomes(READERS[name], tmp_path, FEW))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READERS)
+def test_ten_thousand_damaged_files(name: str, tmp_path: Path) -> None:
+    """The same, ten thousand a reader."""
+    _hold(READERS[name], _outcomes(READERS[name], tmp_path, MANY))
