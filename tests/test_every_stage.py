@@ -27,6 +27,7 @@ from tests.diagnose.sessions import but, session, written
 from tests.log.recording.good import RECIPE, good, text, write
 from tests.log.recording.good import run as run_import
 from tests.repairs import REPAIRS, Repair
+from tests.test_compare import written as written_result
 
 REPO = Path(__file__).resolve().parents[1]
 MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if path.stem not in ("__init__", "stage", "errors")]
@@ -75,6 +76,8 @@ def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) ->
         more: dict[str, Any] = {"without": but("cogging"), "replicas": 0, "most": 1} if module == "diagnose" else {
             "causes": ("cogging:1",)}
         settings = dataclasses.replace(settings, **more)
+    if module == "compare":
+        paths = (written_result(tmp_path / "a", 1), written_result(tmp_path / "b", 2))
     if module == "design_excitation":
         settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out", no_report=no_report), settings)
@@ -151,7 +154,7 @@ def _examined(folder: Path, out: Path) -> tuple[int, list[Check]]:
     return len(result.logs), [c for c in result.checks if c.level in ("reject", "repair")]
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m not in ("inspect", "run", "frf", "diagnose")])
+@pytest.mark.parametrize("module", [m for m in MODULES if m not in ("inspect", "run", "frf", "diagnose", "compare")])
 def test_every_log_a_stage_writes_is_in_order(module: str, tmp_path: Path, samples: Path) -> None:
     """`inspect` passes on every log that any stage writes; these stages write some."""
     _, outcome = _run(module, tmp_path, samples, no_report=True)

@@ -24,6 +24,7 @@ LAYERS = {
     "pipelines.recall": 7,
     "pipelines.stage": 7,
     "pipelines": 8,
+    "pipelines.batch.figures": 1,  # reads stored results, and imports nothing
     "pipelines.batch": 9,  # calls stages, and nothing but the command line calls it
     "rrrid_cli": 10,
 }

@@ -1,8 +1,8 @@
 """The JSON Schema (draft 2020-12) of a log's description: all of a log but its samples.
 
 It is the JSON object under the key `rrrid` of a Parquet log's metadata; an HDF5 log has the same as attributes of `/`,
-`/controller` and `/derived`. Samples are columns NAME or NAME_1 … NAME_n in Parquet, `/signals/NAME`, (N,) or (N, n), in HDF5; each carries the
-attributes that `$defs/signals` lists by its name.
+`/controller` and `/derived`. Samples are columns NAME or NAME_1 … NAME_n in Parquet, `/signals/NAME`, (N,) or (N, n), in HDF5;
+each carries the attributes that `$defs/signals` lists by its name.
 """
 
 from __future__ import annotations

@@ -1,16 +1,33 @@
-"""What is no stage: schemas, the state of the installation."""
+"""What is done with results: compare two, draw a report again, say what they consist of; and the state of the installation."""
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from pipelines.errors import UsageError, did_you_mean
-from rrrid_cli.commands.application import STAGES, app
+from rrrid_cli.commands.application import STAGES, app, go
+from rrrid_cli.options import Common, StageCommand, with_common
 
-__all__ = ["schema"]
+__all__ = ["compare", "schema"]
+
+
+@app.command(cls=StageCommand)
+@with_common
+def compare(
+    common: Common,
+    a: Annotated[Path, typer.Argument(help="A folder that a command has left, its result.json, or a model.json.",
+                                      show_default=False, readable=False)],
+    b: Annotated[Path, typer.Argument(help="Another one of the same command.", show_default=False, readable=False)],
+    alpha: Annotated[float | None, typer.Option(help="How often two results of one arm may be said to differ. [0.01]")] = None,
+) -> None:
+    """Compare two results: what differs beyond its uncertainty; with --check exit 1 where something does."""
+    from pipelines.compare import STAGE
+
+    go(STAGE, (a, b), common, {"alpha": alpha})
 
 
 @app.command()

@@ -1,0 +1,172 @@
+"""The report of a comparison: the verdict, every figure by how far it moved, residuals side by side, what was said."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pipelines.report.report import Figure as Picture
+from pipelines.report.report import Report, Section, Table, Tone
+from pipelines.report.style import format_number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["Answer", "Comparison", "Figure", "Residual", "comparison_report"]
+
+_SHOWN = 40  # lines of a table or a figure
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of both results."""
+
+    name: str
+    unit: str
+    a: float
+    a_std: float
+    b: float
+    b_std: float
+    away: float  # [std of the difference] b - a
+    beyond: bool  # farther than chance moves the farthest of all
+
+
+@dataclass(frozen=True)
+class Residual:
+    """An error that is left, in both results."""
+
+    name: str
+    unit: str
+    a: float
+    b: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What both say in words."""
+
+    what: str
+    a: str
+    b: str
+
+    @property
+    def differs(self) -> bool:
+        return self.a != self.b
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two results of one command, side by side."""
+
+    compared: str  # the command whose results they are
+    names: tuple[str, str]
+    differ: bool
+    limit: float  # [std] beyond which a figure differs
+    alpha: float
+    figures: tuple[Figure, ...]  # the farthest first
+    only_a: tuple[str, ...]  # figures that only one has
+    only_b: tuple[str, ...]
+    residuals: tuple[Residual, ...]
+    answers: tuple[Answer, ...]
+
+
+def comparison_report(result: Comparison) -> Report:
+    """The verdict first, then the evidence."""
+    tone: Tone = "attention" if result.differ else "good"
+    return Report(f"Comparison of two results of {result.compared}", _verdict(result), tone, None,
+                  tuple(section for section in (_answers(result), _figures(result), _residuals(result), _alone(result)) if section))
+
+
+def _verdict(result: Comparison) -> str:
+    a, b = result.names
+    beyond = [one for one in result.figures if one.beyond]
+    told = [f"{one.what} ({one.a} in {a}, {one.b} in {b})" for one in result.answers if one.differs]
+    if not beyond and not told:
+        return f"{a} and {b} agree: none of {len(result.figures)} figures differs beyond its uncertainty."
+    words = []
+    if beyond:
+        named = ", ".join(f"{one.name} by {format_number(abs(one.away), 2)} std" for one in beyond[:3])
+        more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
+        words.append(f"{len(beyond)} of {len(result.figures)} figures differ beyond their uncertainty: {named}{more}")
+    if told:
+        words.append(f"what they say differs: {'; '.join(told[:2])}")
+    return f"{a} and {b} differ. {'; '.join(w[:1].upper() + w[1:] if not i else w for i, w in enumerate(words))}."
+
+
+def _answers(result: Comparison) -> Section | None:
+    if not result.answers:
+        return None
+    rows = tuple((one.what, one.a, one.b) for one in result.answers)
+    tones: tuple[Tone, ...] = tuple("attention" if one.differs else "neutral" for one in result.answers)
+    return Section("What they say", (), (Table(("what", *_heads(result)), rows, tones=tones),))
+
+
+def _heads(result: Comparison) -> tuple[str, str]:
+    """Names as heads of columns; a bracket would be taken for a unit."""
+    a, b = (name.replace(" [", " (").replace("]", ")") for name in result.names)
+    return a, b
+
+
+def _figures(result: Comparison) -> Section | None:
+    if not result.figures:
+        return None
+    shown = result.figures[:_SHOWN]
+    rows = tuple((one.name, f"{format_number(one.a)} ± {format_number(one.a_std, 2)}",
+                  f"{format_number(one.b)} ± {format_number(one.b_std, 2)}", one.unit, _rounded(one.away),
+                  "differs" if one.beyond else "") for one in shown)
+    tones: tuple[Tone, ...] = tuple("attention" if one.beyond else "neutral" for one in shown)
+    more = len(result.figures) - len(shown)
+    text = (f"A figure differs where it moved by more than {format_number(result.limit, 3)} std of the difference. Where nothing "
+            f"has changed, that happens to any of these {len(result.figures)} with a probability of "
+            f"{format_number(100.0 * result.alpha, 2)} % at most; the errors of the two are taken to be independent, and the "
+            "stated standard deviations to be right.", *((f"{more} more, all nearer, stand in result.json.",) if more > 0 else ()))
+    table = Table(("figure", *_heads(result), "unit", "away [std]", "verdict"), rows, "The farthest first.", tones)
+    return Section("Figures", text, (table,), (_picture(result),))
+
+
+def _picture(result: Comparison) -> Picture:
+    shown = [one for one in result.figures if math.isfinite(one.away)][:_SHOWN]
+
+    def draw(drawing: Drawing) -> None:
+        axes = drawing.subplots()
+        places = range(len(shown))
+        axes.axvspan(-result.limit, result.limit, color="0.92", lw=0)
+        axes.axvline(0.0, color="0.6", lw=0.8)
+        colours = ["C1" if one.beyond else "C0" for one in shown]
+        axes.scatter([one.away for one in shown], places, c=colours, s=14, zorder=3)
+        axes.set_yticks(list(places), [one.name for one in shown], fontsize=7)
+        axes.invert_yaxis()
+        axes.margins(y=0.02)
+        axes.set_xlabel("moved by [std of the difference]")
+
+    height = 0.8 + 0.17 * max(1, len(shown))
+    return Picture("moved", "How far every figure moved; grey is what chance explains.", draw, (6.0, height))
+
+
+def _residuals(result: Comparison) -> Section | None:
+    if not result.residuals:
+        return None
+    changed = sorted(result.residuals, key=lambda one: -abs(_change(one) or 0.0))[:_SHOWN]
+    rows = tuple((one.name, _rounded(one.a), _rounded(one.b), one.unit, _rounded(_change(one))) for one in changed)
+    more = len(result.residuals) - len(changed)
+    text = ("No standard deviation is known of these, so that they are not judged.",
+            *((f"{more} more stand in result.json.",) if more > 0 else ()))
+    table = Table(("residual", *_heads(result), "unit", "change [%]"), rows, "The greatest change first.")
+    return Section("Residuals", text, (table,))
+
+
+def _change(one: Residual) -> float | None:
+    return 100.0 * (one.b / one.a - 1.0) if one.a > 0.0 else None
+
+
+def _rounded(x: float | None) -> float | None:
+    return float(f"{x:.3g}") if x is not None and math.isfinite(x) else None
+
+
+def _alone(result: Comparison) -> Section | None:
+    if not (result.only_a or result.only_b):
+        return None
+    rows = tuple((name, ", ".join(names[:_SHOWN]) or "none") for name, names in zip(result.names, (result.only_a, result.only_b),
+                                                                                    strict=True))
+    return Section("Figures that only one has", (), (Table(("result", "figures"), rows),))
