@@ -34,7 +34,7 @@ from pipelines.report.run_report import run_report
 from pipelines.report.run_result import Group, Result, Step
 from pipelines.stage import Inputs, Request, Stage, default_out, read_logs, result_type, slug
 
-__all__ = ["STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report"]
+__all__ = ["STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report", "restored"]
 
 # Modules of the stages, in the order they are run.
 STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing", "frf", "diagnose", "extend")
@@ -154,6 +154,24 @@ def _planned(group: str, inputs: Inputs, settings: Settings) -> Iterator[Planned
             chain.taken_back(stage, key, _step(stage, kept).result, kept.files)
         else:
             chain.passed(stage, key, stage.compute(chain.inputs_of(stage), own) if stage.hands_on == "choice" else None)
+
+
+def restored(folder: Path, result: Mapping[str, Any]) -> Result:
+    """The result of the run that has left `folder`, of what it stored there; `result` is the object of its result.json.
+
+    Raises:
+        InputRejected: F05, what is stored is missing or changed.
+    """
+    store = Store(folder)
+
+    def steps(group: str, stages: Iterable[Mapping[str, Any]]) -> tuple[Step, ...]:
+        by_name = {stage.name: stage for stage, _ in _wanted(Settings())}
+        return tuple(_step(by_name[one["name"]], store.stored(_place(group, one["name"]))) for one in stages)
+
+    groups = tuple(Group(one["name"], steps(one["name"], one["stages"])) for one in result["runs"])
+    whole = tuple(dataclasses.replace(group, diagnosis=_diagnosis(group.stages)) for group in groups)
+    alone = steps("", result["stages"])
+    return Result(alone, whole, _diagnosis(alone))
 
 
 def _place(group: str, stage: str) -> str:

@@ -32,10 +32,11 @@ from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.report.report import Report
 
-__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "read_by_role", "read_logs",
+__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "footer_of", "read_by_role", "read_logs",
            "refuse_foreign", "result_type", "run_stage", "slug", "tilde"]
 
 _NAMED = 6  # rejected files, in one error
+_LISTED = 40  # inputs, at the foot of a report
 
 S = TypeVar("S")
 R = TypeVar("R")
@@ -311,9 +312,13 @@ def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: 
     if not request.no_report:
         from pipelines.report.render import write_report
 
-        footer = {"command": f"rrrid {stage.name}", "version": __version__}
-        footer |= {f"input {path.name}": value[:16] for path, value in list(hashes.items())[:40]}
-        write_report(tilde(report), folder, footer)
+        write_report(tilde(report), folder, footer_of(stage.name, {str(path): value for path, value in hashes.items()}))
+
+
+def footer_of(command: str, inputs: Mapping[str, str]) -> dict[str, str]:
+    """What the foot of a report says of where it comes from; `inputs`: path -> SHA-256."""
+    named = {f"input {os.path.basename(path)}": value[:16] for path, value in sorted(inputs.items())[:_LISTED]}
+    return {"command": f"rrrid {command}", "version": __version__} | named
 
 
 def _text(path: Path, text: str) -> None:

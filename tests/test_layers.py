@@ -25,6 +25,7 @@ LAYERS = {
     "pipelines.stage": 7,
     "pipelines": 8,
     "pipelines.batch.figures": 1,  # reads stored results, and imports nothing
+    "pipelines.stored": 9,
     "pipelines.batch": 9,  # calls stages, and nothing but the command line calls it
     "rrrid_cli": 10,
 }
@@ -37,7 +38,7 @@ DOORS = {
 }
 NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy alone
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.
-BY_NAME = {"pipelines.run", "pipelines.batch.plan", "pipelines.model.effects", "pipelines.bench.faults",
+BY_NAME = {"pipelines.run", "pipelines.stored.redraw", "pipelines.batch.plan", "pipelines.model.effects", "pipelines.bench.faults",
            "rrrid_cli.settings", "rrrid_cli.commands"}
 HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
 

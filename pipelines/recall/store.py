@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from pipelines.errors import EnvironmentFault
+from pipelines.errors import EnvironmentFault, InputRejected
 from pipelines.log.atomic import environment_faults, replace_folder, staging_folder
 from pipelines.log.files import hash_file
 from pipelines.log.places import slug
@@ -95,6 +95,19 @@ class Store:
             else:
                 return Kept(entry, files, about)
         return Missed(why)
+
+    def stored(self, place: str) -> Kept:
+        """What the last complete run has stored at `place`, whatever its key.
+
+        Raises:
+            InputRejected: F05, it is missing or not what it was.
+        """
+        entry, files = self.out / CACHE / place, self.out / place
+        about = _about(entry)
+        if about is None or (damaged := _damage(entry, files, about)):
+            told = "missing, or not as it was written" if about is None else f"not as it was written: {damaged}"
+            raise InputRejected("F05", f"the stored result of {place} is {told}", where=self.out, remedy="run the command again")
+        return Kept(entry, files, about)
 
     def keep(self, place: str, key: Key, about: Mapping[str, Any], result: tuple[Mapping[str, Any], Mapping[str, Any]] | None,
              write: Callable[[Path], None]) -> Kept:

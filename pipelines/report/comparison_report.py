@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.report.report import Figure as Picture
 from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.style import format_number
+from pipelines.report.style import BLUE, VERMILLION, format_number, format_unit, with_std
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -112,9 +112,8 @@ def _figures(result: Comparison) -> Section | None:
     if not result.figures:
         return None
     shown = result.figures[:_SHOWN]
-    rows = tuple((one.name, f"{format_number(one.a)} ± {format_number(one.a_std, 2)}",
-                  f"{format_number(one.b)} ± {format_number(one.b_std, 2)}", one.unit, _rounded(one.away),
-                  "differs" if one.beyond else "") for one in shown)
+    rows = tuple((one.name, with_std(one.a, one.a_std), with_std(one.b, one.b_std), format_unit(one.unit),
+                  round(one.away, 1) if math.isfinite(one.away) else None, "differs" if one.beyond else "") for one in shown)
     tones: tuple[Tone, ...] = tuple("attention" if one.beyond else "neutral" for one in shown)
     more = len(result.figures) - len(shown)
     text = (f"A figure differs where it moved by more than {format_number(result.limit, 3)} std of the difference. Where nothing "
@@ -133,7 +132,7 @@ def _picture(result: Comparison) -> Picture:
         places = range(len(shown))
         axes.axvspan(-result.limit, result.limit, color="0.92", lw=0)
         axes.axvline(0.0, color="0.6", lw=0.8)
-        colours = ["C1" if one.beyond else "C0" for one in shown]
+        colours = [VERMILLION if one.beyond else BLUE for one in shown]
         axes.scatter([one.away for one in shown], places, c=colours, s=14, zorder=3)
         axes.set_yticks(list(places), [one.name for one in shown], fontsize=7)
         axes.invert_yaxis()
@@ -148,7 +147,7 @@ def _residuals(result: Comparison) -> Section | None:
     if not result.residuals:
         return None
     changed = sorted(result.residuals, key=lambda one: -abs(_change(one) or 0.0))[:_SHOWN]
-    rows = tuple((one.name, _rounded(one.a), _rounded(one.b), one.unit, _rounded(_change(one))) for one in changed)
+    rows = tuple((one.name, _rounded(one.a), _rounded(one.b), format_unit(one.unit), _rounded(_change(one))) for one in changed)
     more = len(result.residuals) - len(changed)
     text = ("No standard deviation is known of these, so that they are not judged.",
             *((f"{more} more stand in result.json.",) if more > 0 else ()))

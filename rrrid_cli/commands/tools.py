@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.errors import UsageError, did_you_mean
+from pipelines.errors import UsageError, clean, did_you_mean
 from rrrid_cli.commands.application import STAGES, app, go
 from rrrid_cli.options import Common, StageCommand, with_common
 
-__all__ = ["compare", "schema"]
+__all__ = ["compare", "report", "schema"]
 
 
 @app.command(cls=StageCommand)
@@ -28,6 +28,24 @@ def compare(
     from pipelines.compare import STAGE
 
     go(STAGE, (a, b), common, {"alpha": alpha})
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a command has left.", show_default=False,
+                                           readable=False)],
+    out: Annotated[Path | None, typer.Option(readable=False, help="Folder for the report. [DIR itself]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the report even where it was changed.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
+) -> None:
+    """Draw a report again from its stored result; nothing is computed."""
+    from pipelines.stored.redraw import redraw
+
+    del debug  # `entry` looks for it
+    drawn, _ = redraw(folder.absolute(), None if out is None else out.absolute(), force)
+    if not quiet:
+        print(f"{clean(drawn.verdict, 1000)}\n→ {(out or folder) / 'report.html'}")
 
 
 @app.command()
