@@ -124,13 +124,15 @@ def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
 
 def _anywhere(data: Data, some: Sequence[Effect], arm: Arm) -> tuple[Indices, list[Array]]:
     """Joints that they act on, and of each log (shapes, k, rows of those joints)."""
-    tables = [[_finite(shape.columns(one.motion, arm)) for shape in some] for one in data.logs]
-    k = tables[0][0].shape[2]
-    acting = np.flatnonzero(np.any([table.any(axis=(0, 2)) for per_log in tables for table in per_log], axis=0))
+    tables = [[_finite(table).transpose(2, 1, 0) for table in some[0].several(some, one.motion, arm)] for one in data.logs]
+    k, joints, _ = tables[0][0].shape
+    acting = np.flatnonzero([any(table[:, j].any() for per_log in tables for table in per_log) for j in range(joints)])
     laid = []
     for one, per_log in zip(data.logs, tables, strict=True):
-        flat = np.concatenate([table[:, acting].transpose(2, 1, 0).reshape(-1, len(table)) for table in per_log])
-        laid.append(one.lay_signals(flat).reshape(len(some), k, -1))
+        flat = np.empty((len(some), k, len(acting), len(one.motion.t)))
+        for into, table in zip(flat, per_log, strict=True):
+            into[...] = table[:, acting]
+        laid.append(one.lay_signals(flat.reshape(-1, flat.shape[3])).reshape(len(some), k, -1))
     return acting, laid
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import Self
@@ -12,6 +12,7 @@ import numpy as np
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, friction_at
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart
+from pipelines.model.rigid.gap import Gaps, followed
 from pipelines.model.rigid.perturbation import rate_of, shifted
 
 __all__ = ["Backlash"]
@@ -55,13 +56,28 @@ class Backlash(Effect):
     fixed_amplitudes = (1.0,)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        j, motor, mass = self._index, self.motor_inertia, self._link_inertia(motion, arm)
-        tau = _rigid(arm, motion)
-        x = self._followed(motion.t, mass, motor * self.own(motion.ddq) - tau[:, j])
+        return self.several([self], motion, arm)[0]
+
+    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
+        """All gaps of one motor are followed at once."""
+        tau, felt = _rigid(arm, motion), _felt(arm, motion.q, self._index)
+        found: dict[Self, Array] = {}
+        for motor in dict.fromkeys(one.motor_inertia for one in shapes):
+            some = [one for one in shapes if one.motor_inertia == motor]
+            mass = np.maximum(felt - motor, _LINK * felt)
+            k, d = _flank(float(np.mean(mass)), motor)
+            force = motor * self.own(motion.ddq) - tau[:, self._index]
+            half, film = np.array([[0.5 * one.gap, one.film] for one in some]).T
+            for one, x in zip(some, followed(motion.t, mass, force, Gaps(half, film, k, d)), strict=True):
+                found[one] = one._torque(motion, arm, tau, x)
+        return [found[one] for one in shapes]
+
+    def _torque(self, motion: Motion, arm: ArmModel, tau: Array, x: Array) -> Array:
+        """Column of a link that is x (samples,) ahead of its motor; `tau` is the rigid torque."""
         rate = rate_of(x, motion.t)
         second = rate_of(rate, motion.t)
-        more = _rigid(arm, shifted(motion, j, x, rate, second)) - tau
-        more[:, j] -= motor * second
+        more = _rigid(arm, shifted(motion, self._index, x, rate, second)) - tau
+        more[:, self._index] -= self.motor_inertia * second
         return np.asarray(more[..., None])
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
@@ -88,27 +104,6 @@ class Backlash(Effect):
                            lambda tau: half * np.clip(tau / _NOTHING, -1.0, 1.0) + tau / k)
         return Hooks(actuator=drive.actuator, sensor=drive.sensor, inertia=drive.taken_out(arm.n_joints), states=2,
                      settled=drive.settled, start=drive.start, rate=drive.rate)
-
-    def _link_inertia(self, motion: Motion, arm: ArmModel) -> Array:
-        felt = _felt(arm, motion.q, self._index)
-        return np.asarray(np.maximum(felt - self.motor_inertia, _LINK * felt))
-
-    def _followed(self, t: Array, mass: Array, force: Array) -> Array:
-        """x (samples,) from one flank to the other; over a sample, trapezoids, flank and film implicit."""
-        k, d = _flank(float(np.mean(mass)), self.motor_inertia)
-        half, film = 0.5 * self.gap, self.film
-        x, v = half * float(np.sign(force[0])) + float(force[0]) / k, 0.0
-        found = [x]
-        for h, m, f in zip(np.diff(t).tolist(), (0.5 * (mass[1:] + mass[:-1])).tolist(),
-                           (0.5 * (force[1:] + force[:-1])).tolist(), strict=True):
-            over = x - half if x > half else x + half if x < -half else 0.0
-            closed = (k * over + d * v) * over > 0.0
-            c, spring = (0.5 * h * (film + d), 0.25 * h * h * k) if closed else (0.5 * h * film, 0.0)
-            after = (v * (m - c - spring) + h * (f - (k * over if closed else 0.0))) / (m + c + spring)
-            x += 0.5 * h * (v + after)
-            v = after
-            found.append(x)
-        return np.array(found)
 
 
 def _flank(link: float, motor: float) -> tuple[float, float]:

@@ -51,7 +51,7 @@ class Contact(Effect):
         return self._columns(motion, chain_of(arm.body))
 
     def _columns(self, motion: Motion, chain: SerialChain) -> Array:
-        table = np.zeros((*motion.q.shape, 3))
+        table = np.zeros((3, *motion.q.shape[::-1])).transpose(2, 1, 0)  # samples side by side
         during = np.flatnonzero(self.acting(motion))
         if len(during):
             window = np.sin(math.pi * (motion.t[during] - self.start) / self.duration)

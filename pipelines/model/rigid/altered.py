@@ -44,8 +44,22 @@ def _standard_to_base(body: RigidBody) -> Array:
     return np.asarray(found)
 
 
+_KNOWN: list[tuple[RigidBody, Array]] = []  # bodies asked about last, newest first: a fit asks about the same again and again
+_KEEP = 8
+
+
 def _links_behind(body: RigidBody) -> Array:
     """(10 · joints, parameters): standard parameters that have the torques of p; what is not in the general base set is zero."""
+    known = next((found for other, found in _KNOWN if other is body), None)
+    if known is None:
+        known = _found_behind(body)
+        known.flags.writeable = False
+        _KNOWN.insert(0, (body, known))
+        del _KNOWN[_KEEP:]
+    return known
+
+
+def _found_behind(body: RigidBody) -> Array:
     if isinstance(body, BaseArm):
         return np.eye(10 * body.chain.n_joints)[:, list(body.base.chosen)]
     general = BaseArm(body.robot)
@@ -109,6 +123,8 @@ def _moved(by: Array) -> Array:
 
         h' = h + m r,   P' = P + h rᵀ + r hᵀ + m r rᵀ,   P = ∫ x xᵀ dm
     """
+    if not by.any():
+        return np.eye(10)
     out = np.zeros((10, 10))
     for k in range(10):
         unit = np.zeros(10)
