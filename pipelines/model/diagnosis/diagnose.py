@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.beside import acted
+from pipelines.model.diagnosis.beside import Held, acted
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.compliance import Compliance, untold
@@ -25,13 +25,13 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.inputs import Logs, Prepared, narrowed, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import Settled, settled
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, ResidualRms, Threshold
-from pipelines.model.diagnosis.search import Case, Explored, clean, held_out_left, provisional, search
+from pipelines.model.diagnosis.search import Case, Explored, clean, gap_first, gives_way, held_out_left, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
@@ -41,6 +41,8 @@ from pipelines.model.diagnosis.verdict import Ruling, rule
 __all__ = ["diagnose"]
 
 Tell = Callable[[str], None]
+
+_GAP_HZ = 10.0  # below it a gap's torque is that of the gap; above, that of the tooth on which the link rings
 
 
 def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None) -> Diagnosis:
@@ -65,6 +67,13 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     case, prepared = _nameable(first.held.case, first.stiff), first.held.prepared
     say("looking for the greatest causes")
     rough = provisional(case)
+    if first.stiff is not None and not first.stiff.named and gives_way(rough[0]):
+        say("looking for a gap below the frequencies at which it rings")
+        slow = narrowed(prepared, _GAP_HZ, [0.0] * prepared.data.n_joints)
+        there = _nameable(_case(slow, chosen), first.stiff)
+        seen = provisional(there)
+        if gap_first(seen[0]):
+            case, prepared, rough, first = there, slow, seen, replace(first, held=Held(there, slow, ()))
     say("simulating the twin")
     floored = _floored(prepared, case, rough, chosen)
     say("looking for causes")
@@ -75,8 +84,8 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
 
 
 def _nameable(case: Case, stiff: Compliance | None) -> Case:
-    """Where frequency responses show a rigid arm, what gives way is a gap, which the residual then names."""
-    return replace(case, nameable=(*case.nameable, "reversals")) if stiff is not None and stiff.rigid else case
+    """Where frequency responses show no spring, what gives way may be a gap, which the residual then names."""
+    return replace(case, nameable=(*case.nameable, "reversals")) if stiff is not None and not stiff.named else case
 
 
 def _case(prepared: Prepared, chosen: DiagnosisSettings) -> Case:

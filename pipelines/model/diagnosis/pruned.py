@@ -13,7 +13,7 @@ from pipelines.model.diagnosis.findings import sure
 from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.search import Case, Found, held_out, held_out_left
-from pipelines.model.diagnosis.verdict import Ruling, without_steps
+from pipelines.model.diagnosis.verdict import Ruling, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Settled", "settled"]
@@ -35,7 +35,7 @@ class Settled:
 def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor: Array, known: bool = True) -> Settled:
     """Only causes that keep every rule of acceptance; `floor` and `known` as in `rule`."""
     if ruling.verdict != "cause":
-        return Settled(replace(found, final=found.nominal), replace(ruling, named=()), ())
+        return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     doubts = {k: sure(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1]) for k in ruling.named}
     doubts = {k: why for k, why in doubts.items() if why}
@@ -54,8 +54,17 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     if kept:
         return Settled(replace(found, final=final), replace(ruling, named=tuple(kept), doubts=doubts), simulated)
     alone = without_steps(found, floor, known)
+    alone = _elsewhere(alone, found, case, floor, known)
     reason = f"{alone.reason}: {next(iter(doubts.values()), '')}" if alone.verdict == "unknown" else alone.reason
     return Settled(replace(found, final=found.nominal), replace(alone, reason=reason, doubts=doubts), ())
+
+
+def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:
+    """Nothing wrong in the fitted logs is not enough where the held-out ones show something."""
+    if ruling.verdict != "nothing-wrong" or not known or case.judge is None:
+        return ruling
+    high = held_out_high(case.judge.rms(held_out_left(found.nominal, case.judge, case.blocks)), floor)
+    return Ruling("unknown", (), f"on held-out logs the residual of {high} stands far above the floor") if high else ruling
 
 
 def _simulated(found: Found, case: Case, prepared: Prepared) -> tuple[Simulation, ...]:

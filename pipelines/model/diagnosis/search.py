@@ -28,13 +28,14 @@ from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "held_out", "held_out_left", "provisional",
-           "search"]
+__all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "gap_first", "gives_way",
+           "held_out", "held_out_left", "provisional", "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
 _LEAST = 2e-3  # of the squared residual: no cause is fitted for less
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
+_WORTH = 0.05  # of the squared residual of its joint
 _MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
@@ -123,6 +124,18 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
     return Found(nominal, tuple(steps), now)
 
 
+def gives_way(explored: Explored) -> bool:
+    """Whether what explains most, to first order, is something that gives way, and worth a second look."""
+    most = max(explored.screened, key=lambda one: one.gain[0])
+    return most.family.shapes[0].evidence != "residual" and _share(most, explored.before) > _WORTH
+
+
+def gap_first(explored: Explored) -> bool:
+    """Whether the best of those fitted exactly is a gap."""
+    best = _fewest(explored.tried)
+    return best is not None and best.effect.evidence == "reversals"
+
+
 def _share(one: Screened, now: Refined) -> float:
     """Gain as a share of the squared residual of the cause's own joint, or of all."""
     own = now.residual if one.joint is None else now.residual[now.data.joint == one.joint - 1]
@@ -182,11 +195,27 @@ def _fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     if one.family.event:
         return _happened(case, now, one, error)
     effect = one.shape[0].full()
+    if effect.fixed_amplitudes is not None:
+        effect = _given(case, now, one, np.array(effect.fixed_amplitudes)).full()
     table = _laid(case.data, effect, now.model.arm)
     done = refine(now.model.with_effect(effect, _amplitudes(now.fit, table)), case.data, now.weight)
     left = held_out(done, case) / error
     rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
     return Tried(one, effect, None, done, left, rank, _visibility(now, table))
+
+
+def _given(case: Case, now: Refined, one: Screened, amplitudes: Array) -> Effect:
+    """The shape that leaves least with the amplitudes that physics gives; screening, which fits them, takes half of a gap twice as
+    wide for the same."""
+    best, least = one.shape[0], np.inf
+    for laid in lay_family(case.data, one.family, now.model.arm):
+        for k, table in enumerate(laid.table):
+            column = np.zeros(case.data.rows)
+            column[laid.rows] = amplitudes @ table
+            left = float(np.sum(np.square(now.fit.residual - now.fit.project(column))))
+            if left < least:
+                best, least = one.family.shapes[laid.first + k], left
+    return best
 
 
 def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:

@@ -16,12 +16,14 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["Ruling", "excess", "explained", "rule", "without_steps"]
+__all__ = ["Ruling", "excess", "explained", "held_out_high", "rule", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
+_FAR = 3.0  # times the floor, on held-out logs: other motion, so that some more is usual
 _REST = 0.35  # of a joint's residual that may be left beside a named cause, where it still stands above the floor
 
+_REST_OF_GAP = 0.6  # the same beside a gap: where the link is in it hangs on lubricant and tooth, which no law has to the last
 
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
              "testable without a floor: reference logs, or logs whose controller is known and a twin")
@@ -67,7 +69,8 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
     other = next((step.other for step in found.steps if step.other is not None and (known or _much(step.other, found))), None)
     joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
     high = ", ".join(f"joint {j + 1}" for j in joints.tolist())
-    if other is not None and (not accepted or len(joints)):
+    gap = any(step.best is not None and step.best.effect.evidence == "reversals" for step in accepted)
+    if other is not None and (not accepted or (len(joints) and not gap)):
         where = "the arm or its base" if other.joint is None else f"joint {other.joint} or what carries it"
         return Ruling("unknown", (), f"{where} gives way, of a kind that these logs do not tell: record frequency responses in two "
                       "postures")
@@ -81,10 +84,15 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
     total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
     if whole > 0.1 and total < _HALF:
         return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")
-    left = [j for j in joints.tolist() if found.final.rms[j] > _REST * found.nominal.rms[j]]
+    left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {high} well above the floor")
     return Ruling("cause", tuple(range(len(accepted))), "")
+
+
+def held_out_high(rms: Array, floor: Array) -> str:
+    """Which joints stand far above the floor on held-out logs; empty where none does."""
+    return ", ".join(f"joint {j + 1}" for j in np.flatnonzero(rms > _FAR * floor).tolist())
 
 
 def _much(other: Screened, found: Found) -> bool:

@@ -10,6 +10,7 @@ import pytest
 
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.verdict import excess, explained, rule
+from pipelines.model.effects.cogging import Cogging
 
 FLOOR = np.array([0.01, 0.01, 0.01])
 
@@ -22,7 +23,7 @@ def found(nominal: Any, *after: Any, other: Any = None) -> Any:
     """A search that accepted one cause after the other, with what each left."""
     before, steps = nominal, []
     for one in after:
-        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=one), other=None))
+        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=one, effect=Cogging(2)), other=None))
         before = one
     steps.append(SimpleNamespace(before=before, best=None, other=other))
     return SimpleNamespace(nominal=nominal, steps=steps, final=before)
