@@ -76,6 +76,8 @@ def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) ->
         more: dict[str, Any] = {"without": but("cogging"), "replicas": 0, "most": 1} if module == "diagnose" else {
             "causes": ("cogging:1",)}
         settings = dataclasses.replace(settings, **more)
+    if module == "demo":
+        paths = ()
     if module == "compare":
         paths = (written_result(tmp_path / "a", 1), written_result(tmp_path / "b", 2))
     if module == "design_excitation":

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["STAGES", "app", "asked", "go"]
 
 STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation",
-          "validate-writing", "frf", "diagnose", "extend", "compare")
+          "validate-writing", "frf", "diagnose", "extend", "compare", "demo")
 
 app = typer.Typer(name="rrrid", cls=StageGroup, no_args_is_help=True, add_completion=True,
                   pretty_exceptions_enable=False, rich_markup_mode=None,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -11,7 +13,7 @@ from rrrid_cli.batch import BatchCommand, batch
 from rrrid_cli.commands.application import app, asked, go
 from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, with_common
 
-__all__ = ["batch", "run"]
+__all__ = ["batch", "demo", "run"]
 
 
 @app.command(cls=StageCommand)
@@ -45,3 +47,33 @@ def run(
 
 
 app.command(cls=BatchCommand)(batch)
+
+
+@app.command(cls=StageCommand)
+@with_common
+def demo(
+    common: Common,
+    fault: Annotated[list[str] | None, typer.Option(
+        help="What to hide: CAUSE:JOINT:NAME=VALUE,…, or none. Repeatable. [cogging at joint 2]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of motions and noise. [1]")] = None,
+) -> None:
+    """A first verdict without files of one's own: simulate an arm with a fault, and run everything on its logs."""
+    from pipelines import demo as recording
+    from pipelines import run as workflow
+    from pipelines.stage import run_stage
+
+    out = common.out or Path("demo")
+    given = {"fault": tuple(fault or ()) or None, "seed": seed}
+    request, settings, teller = asked(recording.STAGE, (), replace(common, out=out / "recording", no_report=True), given)
+    teller("simulating the arm")
+    recorded = run_stage(recording.STAGE, request, settings)
+    teller.done()
+    if not common.quiet:
+        where = f"{out / 'recording/logs'}: what rrrid run is given now"
+        print(f"Recorded {len(recorded.result.logs)} logs into {where}.", file=sys.stderr)
+    try:
+        go(workflow.STAGE, (out / "recording",), replace(common, out=out / "run"), {})
+    finally:
+        if not common.quiet:
+            hidden = ", ".join(recorded.result.fault) or "nothing"
+            print(f"Hidden in these logs: {hidden}. Your own: rrrid run FOLDER", file=sys.stderr)
