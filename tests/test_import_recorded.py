@@ -101,5 +101,5 @@ def test_odrive_maps_become_tables_with_units(odrive: Outcome[Result]) -> None:
 def test_only_the_resampling_is_said_of_the_uneven_set(tx40: Outcome[Result], odrive: Outcome[Result]) -> None:
     """Intervals that come late and are resampled across are no lost samples."""
     assert codes(tx40) == {}
-    assert codes(odrive) == {"T05": "warn"}
+    assert codes(odrive) == {"T05": "warn", "T04": "ok"}  # T04: the way back that the recipe leaves out
     assert any("intervals of more than 1.5 times the median bridged" in check.message for check in odrive.checks)

@@ -102,6 +102,12 @@ class Arm:
         """The arm without its further effects: rigid body and friction."""
         return replace(self, effects=()) if self.effects else self
 
+    @cached_property
+    def unrecorded(self) -> Arm:
+        """The arm as it is, without what only changes the record."""
+        kept = tuple(acting for acting in self.effects if not acting.effect.last)
+        return self if len(kept) == len(self.effects) else replace(self, effects=kept)
+
     def with_body(self, body: RigidBody, p: Array) -> Arm:
         """The same arm with another rigid body; its base parameters then are assumed."""
         base = tuple(Parameter(known.name, float(value), None, known.unit, origin="assumed")
@@ -109,7 +115,8 @@ class Arm:
         return replace(self, body=body, base=base, uncertainty=None)
 
     def extended(self, *more: Acting) -> Arm:
-        return replace(self, effects=(*self.effects, *more))
+        """With more effects, each around those before it; what changes the record stays outermost."""
+        return replace(self, effects=tuple(sorted((*self.effects, *more), key=lambda acting: acting.effect.last)))
 
     def torque(self, motion: Motion) -> Array:
         """Torque (samples, joints) [N m] that a log of this motion should show."""

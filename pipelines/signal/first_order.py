@@ -23,17 +23,18 @@ _GAP = 1.5  # sample times
 
 
 def lagging(x: Array, t: Array, time_constant: float) -> Array:
-    """y (samples,) of x (samples,), settled at the start and behind every gap of t [s].
+    """y (…, samples) of x (…, samples), settled at the start and behind every gap of t [s].
 
         y_{k+1} = a y_k + (m - a) x_k + (1 - m) x_{k+1},   a = exp(-h/T),   m = (1 - a) T/h
     """
-    if time_constant <= 0.0 or len(x) < 2:
+    if time_constant <= 0.0 or len(t) < 2:
         return np.array(x, dtype=np.float64)
-    y = np.empty(len(x))
+    y = np.empty(x.shape)
     for part, h in _stretches(t):
-        own = x[part]
+        own = x[..., part].reshape(-1, part.stop - part.start)
         a, m = _decay(h, time_constant)
-        y[part] = _recursion(a, own[0], (m - a) * own[:-1] + (1.0 - m) * own[1:])
+        drive = np.concatenate([own[:, :1], (m - a) * own[:, :-1] + (1.0 - m) * own[:, 1:]], axis=1)
+        y[..., part] = scan(np.full((1, 1, 1), a), drive[:, :, None])[:, :, 0].reshape(x[..., part].shape)
     return y
 
 

@@ -55,6 +55,7 @@ class FileSpec:
     period: float | None = None
     recorded: str | None = None
     posture: tuple[float, ...] | None = None
+    begin: float | None = None  # [s] samples before are left out: an approach, a homing run
     skip: bool = False  # files of this pattern are no logs
 
 
@@ -73,6 +74,7 @@ class LogSpec:
     period: float | None = None  # [s]
     recorded: str | None = None  # ISO 8601 with its offset from UTC, or a date and time of TOML with it
     posture: tuple[float, ...] | None = None  # [rad]
+    begin: float | None = None  # [s] after its first sample, that a log begins at: what comes before is left out
 
 
 @dataclass(frozen=True)

@@ -249,11 +249,23 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
                                     time.column is not None and own_clock,
                                     "row" if table.lines is None else "line", table.breaks,
                                     {s: si_of(units[s], recipe.signals[s]) for s in here}))
-    joined = _joined(recordings, list(source.tables.values()), time.column is not None, checks)
+    begin = recipe.log.begin if source.case is None or source.case.begin is None else source.case.begin
+    joined = tuple(_begun(one, begin, checks) for one in
+                   _joined(recordings, list(source.tables.values()), time.column is not None, checks))
     if len(joined) > 1 and recipe.resample is None:
         raise InputRejected("T06", "the files have different time stamps", where=", ".join(source.tables),
                             remedy="add [resample] rate = … to bring them on one clock")
     return Assembled(joined, units, columns, tuple(checks), tuple(undeclared))
+
+
+def _begun(one: Recording, begin: float | None, checks: list[Check]) -> Recording:
+    """Without what was recorded before `begin` [s], as the recipe asks."""
+    if not begin:
+        return one
+    kept = ~(one.t < float(np.nanmin(one.t)) + begin)
+    checks.append(Check.of("T04", "ok", f"the first {begin:g} s, {int(np.sum(~kept))} samples, left out as the recipe says",
+                           where=one.where))
+    return one.take(kept)
 
 
 def _joined(recordings: list[Recording], tables: list[RawTable], clocked: bool, checks: list[Check]) -> tuple[Recording, ...]:

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, LogData
+from pipelines.model.diagnosis.record import recorded
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -90,18 +91,22 @@ def _shapes(effect: Effect, laws: Sequence[Effect], motion: Motion, arm: Arm) ->
 def whole_motion(data: Data) -> Motion:
     """The motions of all logs one behind the other: for ranges, never for slopes."""
     motions = [one.motion for one in data.logs]
-    return Motion(*(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("t", "q", "dq", "ddq", "tau")))
+    whole = Motion(*(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("t", "q", "dq", "ddq")))
+    asked = [motion.tau for motion in motions if motion.tau is not None]
+    return replace(whole, tau=np.concatenate(asked)) if len(asked) == len(motions) else whole
 
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     """The columns of every shape, a few shapes at a time."""
+    whole, arm = arm, arm.unrecorded
     with np.errstate(all="ignore"):
         width = family.shapes[0].columns(_first_samples(data), arm).shape[2]
     size = max(1, _AT_ONCE // max(width, 1))
     for first in range(0, len(family.shapes), size):
         some = family.shapes[first:first + size]
         with np.errstate(all="ignore"):
-            acting, parts = _own(data, some, arm) if some[0].from_motion and family.joint else _anywhere(data, some, arm)
+            kept = some[0].from_motion and family.joint and whole is arm
+            acting, parts = _own(data, some, arm) if kept else _anywhere(data, some, arm, whole)
         rows = np.flatnonzero(np.isin(data.joint, acting))
         found = np.concatenate(parts, axis=2)
         if not data.counts.all():
@@ -122,9 +127,10 @@ def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
     return one.lay_signals(table.reshape(-1, table.shape[2]))
 
 
-def _anywhere(data: Data, some: Sequence[Effect], arm: Arm) -> tuple[Indices, list[Array]]:
+def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm) -> tuple[Indices, list[Array]]:
     """Joints that they act on, and of each log (shapes, k, rows of those joints)."""
-    tables = [[_finite(table).transpose(2, 1, 0) for table in some[0].several(some, one.motion, arm)] for one in data.logs]
+    tables = [[recorded(whole, _finite(table), one.motion.t).transpose(2, 1, 0)
+               for table in some[0].several(some, one.motion, arm)] for one in data.logs]
     k, joints, _ = tables[0][0].shape
     acting = np.flatnonzero([any(table[:, j].any() for per_log in tables for table in per_log) for j in range(joints)])
     laid = []

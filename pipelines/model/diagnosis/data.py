@@ -243,7 +243,8 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     runs = tuple(_run(equations, run, skip) for run in equations.runs)
     slow = np.concatenate([equations.rows.slow[run][one.chosen * one.every] for run, one in zip(equations.runs, fine, strict=True)])
-    return LogData(log, equations, Motion(t, q, dq, ddq, tau), y, ~slow.T, pieces, runs, kept, place)
+    asked = tau if equations.held else None  # a measured torque was there: nothing of it can have been kept back
+    return LogData(log, equations, Motion(t, q, dq, ddq, asked), y, ~slow.T, pieces, runs, kept, place)
 
 
 def _skipped(equations: LogEquations) -> int:

@@ -21,8 +21,10 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows
+from pipelines.model.diagnosis.record import recorded
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.estimation.regression import Columns
+from pipelines.model.rigid.body import Motion
 
 __all__ = ["Exact", "Named", "Refined", "number_moved", "refine"]
 
@@ -104,6 +106,8 @@ class Exact:
     @property
     def core(self) -> int:
         """How many of the effects the torque has to be worked out with as a whole: all up to the last that does not just add."""
+        if any(one.effect.last for one in self.effects):
+            return len(self.effects)
         return max((k + 1 for k, one in enumerate(self.effects) if not one.effect.adds), default=0)
 
     def torque(self, data: Data) -> Array:
@@ -186,7 +190,7 @@ class Refined:
     @cached_property
     def fit(self) -> Fit:
         """As a linear fit around the solution: what is orthogonal to it, the model cannot imitate by moving a little."""
-        return Fit(self.data, self.slopes, self.left, self.weight, np.zeros(len(self.slopes)))
+        return Fit(self.data, self.slopes, self.left, self.weight, np.zeros(len(self.slopes)), self.data.y - self.left)
 
     @cached_property
     def rss(self) -> float:
@@ -221,7 +225,7 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
     for _ in range(steps):
         better = False
         for ridge in _RIDGES:
-            shift = _solved(slopes * weights, left * weights, ridge)
+            shift = _within(model, names, slopes * weights, left * weights, ridge)
             for share in _SHARES:
                 there = model.moved(share * shift, names)
                 other = y - there.torque(data)
@@ -241,6 +245,8 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
 
 
 def _slopes(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[tuple[int, int, str]]]:
+    if any(one.effect.passing for one in model.effects):
+        return _slopes_through(model, data)
     laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
     bent, which = law_slopes(data, model.columns, model.beta)
     names = [(0, place, name) for place, name in which]
@@ -260,6 +266,36 @@ def _slopes(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[tuple[i
     return np.concatenate([rigid, *laws, *more]), names
 
 
+def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[tuple[int, int, str]]]:
+    """The same where all torque passes through an effect, a lag of the record: what is linear passes as well."""
+    columns, arm, kept = model.columns, model.arm, list(model.columns.kept)
+
+    def linear(motion: Motion) -> Array:
+        rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
+        return recorded(arm, np.concatenate([rigid, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion.t)
+
+    def alone(one: Named) -> Array:
+        return data.lay_each(lambda log, motion: recorded(
+            arm, one.effect.at(one.values).columns(motion, model.nominal) @ np.array(one.amplitudes), motion.t)
+            if one.log in (None, log) else np.zeros_like(motion.q))
+
+    here, more = model.torque(data), []
+    names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
+    for place, _, name in names:
+        step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])
+        more.append((model.moved(step, [(0, place, name)]).torque(data) - here)[None] / _DIFFERENCE)
+    for place, one in enumerate(model.effects):
+        for name, size in _steps(one):
+            names.append((1, place, name))
+            there = number_moved(one, name, size)
+            if one.effect.adds:
+                more.append((alone(there) - alone(one))[None] / size)
+            else:
+                effects = (*model.effects[:place], there, *model.effects[place + 1:])
+                more.append((replace(model, effects=effects).torque(data) - here)[None] / size)
+    return np.concatenate([data.lay(linear), *more]), names
+
+
 def _steps(one: Named) -> list[tuple[str, float]]:
     """Numbers of an effect and how far each is moved for its slope."""
     found = []
@@ -273,6 +309,29 @@ def _steps(one: Named) -> list[tuple[str, float]]:
         top = float(getattr(one.effect, q.name)) >= q.high
         found.append((q.name, -step if top else step))
     return found
+
+
+def _within(model: Exact, names: list[tuple[int, int, str]], table: Array, y: Array, ridge: float) -> Array:
+    """The step for every number; one that would leave its range stays at its end, and the others do without it."""
+    shift = _solved(table, y, ridge)
+    stuck = [len(model.beta) + k for k, which in enumerate(names) if _beyond(model, which, float(shift[len(model.beta) + k]))]
+    if stuck:
+        free = np.ones(len(table), dtype=bool)
+        free[stuck] = False
+        shift = np.zeros(len(table))
+        shift[free] = _solved(table[free], y, ridge)
+    return shift
+
+
+def _beyond(model: Exact, which: tuple[int, int, str], by: float) -> bool:
+    """Whether a shape stands at the end of its range, and `by` points out of it."""
+    kind, place, name = which
+    if name.isdigit():
+        return False
+    effect = model.columns.laws[place] if kind == 0 else model.effects[place].effect
+    quantity = next(q for q in effect.parameters if q.name == name)
+    here = float(getattr(effect, name))
+    return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
 
 
 def _solved(table: Array, y: Array, ridge: float = 0.0) -> Array:

@@ -39,6 +39,12 @@ class Fit:
     y: Array  # (rows,) torque
     weight: Array  # (joints,) [1/(N m)]
     beta: Array  # (k,)
+    torque: Array | None = None  # (rows,) [N m] of the model, where `y` is only what it leaves
+
+    @property
+    def modelled(self) -> Array:
+        """(rows,) [N m] torque of the fitted model."""
+        return self.y - self.left if self.torque is None else self.torque
 
     @cached_property
     def weights(self) -> Array:

@@ -19,6 +19,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, Laid, lay_family
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit
+from pipelines.model.diagnosis.through import passed_through
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Screened", "gains_of", "screen", "screen_event", "screen_family"]
@@ -41,6 +42,7 @@ class Screened:
     reach: float  # what the first of its columns, one unit of it, adds to the residual: √ of the gain, in most shapes or more
     width: int  # columns of one shape
     logs: tuple[int | None, ...] = ()  # of an event: number of the log it happened in
+    amplitude: float | None = None  # of the first residual, where the whole model was fitted through the effect
 
     @property
     def cause(self) -> str:
@@ -93,8 +95,13 @@ def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arr
         reach.append(size)
     gain, eta = np.concatenate(gains), np.concatenate(visible)
     best = np.argmax(gain, axis=0)
-    return Screened(family, gain[best, np.arange(gain.shape[1])], tuple(family.shapes[int(k)] for k in best), eta[best],
-                    float(eta.max()), float(np.quantile(np.concatenate(reach), _USUAL)), width)
+    found = Screened(family, gain[best, np.arange(gain.shape[1])], tuple(family.shapes[int(k)] for k in best), eta[best],
+                     float(eta.max()), float(np.quantile(np.concatenate(reach), _USUAL)), width)
+    whole = passed_through(data, fit, family.shapes[0], wanted)
+    if whole is None:
+        return found
+    more, amplitude = whole
+    return replace(found, gain=np.maximum(found.gain, more), amplitude=float(amplitude[0]) if more[0] > found.gain[0] else None)
 
 
 def gains_of(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array, Array]:

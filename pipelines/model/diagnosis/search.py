@@ -26,6 +26,7 @@ from pipelines.model.diagnosis.nominal import Fit, orthonormal
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
+from pipelines.model.diagnosis.through import beyond_first_order
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "gap_first", "gives_way",
@@ -146,7 +147,8 @@ def _explored(case: Case, now: Refined) -> Explored:
     screened = screen(case.data, now.fit, case.families, now.model.arm)
     taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
     order = sorted((one for one in screened if one.gain[0] >= _LEAST * now.rss
-                    and (one.family.event or (one.cause, one.joint) not in taken)), key=lambda one: -one.gain[0])
+                    and (one.family.event or (one.cause, one.joint) not in taken or one.shape[0].again(case.data.logs[0].motion))),
+                   key=lambda one: -one.gain[0])
     error = held_out(now, case)
     able = [one for one in order if one.family.shapes[0].evidence in case.nameable]
     tried = [_fitted(case, now, one, error) for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
@@ -198,7 +200,9 @@ def _fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     if effect.fixed_amplitudes is not None:
         effect = _given(case, now, one, np.array(effect.fixed_amplitudes)).full()
     table = _laid(case.data, effect, now.model.arm)
-    done = refine(now.model.with_effect(effect, _amplitudes(now.fit, table)), case.data, now.weight)
+    start = (now.model.with_effect(effect, _amplitudes(now.fit, table)) if one.amplitude is None else
+             beyond_first_order(now, effect, one.amplitude))
+    done = refine(start, case.data, now.weight)
     left = held_out(done, case) / error
     rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
     return Tried(one, effect, None, done, left, rank, _visibility(now, table))

@@ -25,6 +25,7 @@ What a search over effects asks, so that it need not know any of them:
     fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
     possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
     per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
+    again                whether one place may have it more than once: waves of several orders along one turn
     acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
     reported             the parameters as causes.md names them
 
@@ -183,6 +184,8 @@ class Effect(ABC):
     evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
     from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
+    last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
+    passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
 
     def __post_init__(self) -> None:
@@ -214,6 +217,10 @@ class Effect(ABC):
         """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
         return self
 
+    def again(self, motion: Motion) -> bool:
+        """Whether it may act more than once at its place, in different shapes that this motion tells apart."""
+        return False
+
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
         """The samples in which it acts, where it acts for a moment only."""
         return None
@@ -230,6 +237,10 @@ class Effect(ABC):
     def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
         """The parameters of a finding, named as in causes.md; whole numbers are integers."""
         return {q.name: int(values[q.name]) if q.discrete else values[q.name] for q in self.parameters}
+
+    def passed(self, amplitude: float, x: Array, t: Array) -> Array:
+        """Any torque `x` (samples,) of its joint as it comes out of it, where `passing` says that all of it goes through."""
+        return x
 
     @classmethod
     def everywhere(cls, n_joints: int) -> tuple[Self, ...]:

@@ -19,6 +19,7 @@ _HIGHEST = 150.0  # order that is searched for
 _MOST = 200  # orders on the grid
 _PEAKS = 24
 _ROUNDED = 1e-11  # difference of orders that is rounding
+_TURN = 0.98 * 2.0 * math.pi  # [rad]
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,10 @@ class Cogging(Effect):
         peaks = np.flatnonzero(wanted)
         for peak in peaks[np.argsort(power[peaks])[::-1][:_PEAKS]]:
             yield replace(self, order=float(order[peak]), harmonics=1)
+
+    def again(self, motion: Motion) -> bool:
+        """Magnets, teeth and poles each have their own order; a full turn tells them apart, on less any curve is a few waves."""
+        return float(np.ptp(self.own(motion.q))) > _TURN
 
     def full(self) -> Self:
         return replace(self, harmonics=3)

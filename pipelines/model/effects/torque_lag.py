@@ -12,6 +12,8 @@ from pipelines.signal.first_order import held_mean, lagging, rate_of_change
 
 __all__ = ["TorqueLag"]
 
+_LONG = 4.0  # samples
+
 
 @dataclass(frozen=True)
 class TorqueLag(Effect):
@@ -25,16 +27,26 @@ class TorqueLag(Effect):
     remedy = "Log the torque unfiltered, or filter position by the same low-pass; the arm itself is in order."
     experiment = "Repeat an experiment at two speeds: a fit at one must hold at the other."
     twins = ("time_delay", "drive_lag", "rotor_inertia")
+    last = True
+    passing = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, -rate_of_change(self.own(self.predicted(motion, arm)), motion.t))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
-        """The whole torque goes through the low-pass H, other effects included: y = H τ = τ - T H dτ/dt."""
+        """The whole torque goes through the low-pass H, other effects included: y = H τ = τ - T H dτ/dt.
+
+        The first form where the lag is longer than some samples, whatever the torque does between them; the second keeps its
+        slope at T = 0 and is exact to the differences' error.
+        """
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
-        time = values["time_constant"]
-        tau[:, self._index] -= time * lagging(rate_of_change(self.own(tau), motion.t), motion.t, time)
+        time, own, t = values["time_constant"], self.own(tau), motion.t
+        long = len(t) > 1 and time > _LONG * float(np.median(np.diff(t)))
+        tau[:, self._index] = lagging(own, t, time) if long else own - time * lagging(rate_of_change(own, t), t, time)
         return tau
+
+    def passed(self, amplitude: float, x: Array, t: Array) -> Array:
+        return lagging(x, t, amplitude)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm moves as without it; only the log differs."""

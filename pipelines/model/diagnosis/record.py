@@ -1,0 +1,37 @@
+"""What the record makes of torque: as it comes out of an effect that all torque of its joint passes through.
+
+    recorded(arm, table, t)                       columns over a motion, by everything in `arm` that changes the record
+    passed_rows(data, effect, amplitude, x)       rows, which are far apart: enough to see what is worth an exact fit
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.effects.base import Effect
+
+__all__ = ["passed_rows", "recorded"]
+
+
+def recorded(arm: Arm, table: Array, t: Array) -> Array:
+    """Torque (samples, joints) or columns (samples, joints, k) as they come out of all in `arm` that changes the record."""
+    for acting in arm.effects:
+        if acting.effect.passing:
+            joint = (acting.effect.joint or 1) - 1
+            amplitude = float(acting.effect.amplitudes(acting.values)[0])
+            table = table.copy()
+            table[:, joint] = acting.effect.passed(amplitude, np.ascontiguousarray(table[:, joint].T), t).T
+    return table
+
+
+def passed_rows(data: Data, effect: Effect, amplitude: float, x: Array) -> Array:
+    """(…, rows) with the rows of the effect's joint as they come out of it."""
+    out, first, joint = x.copy(), 0, (effect.joint or 1) - 1
+    for one in data.logs:
+        own = slice(first + joint * one.rows, first + (joint + 1) * one.rows)
+        out[..., own] = effect.passed(amplitude, x[..., own], one.t)
+        first += one.n_joints * one.rows
+    return out

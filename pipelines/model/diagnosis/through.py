@@ -1,0 +1,58 @@
+"""Screen a cause that all torque of its joint passes through: a lag of the logged torque, fitted whole, not to first order.
+
+    gain, amplitude = passed_through(data, fit, effect, residuals)
+
+A lag slower than the motion hides most of the torque from the nominal model, inertia above all: the model that was fitted without
+it is so wrong that its derivative says nothing. So every column of the model goes through the lag, and amplitudes are solved
+anew, Golub & Pereyra 2003: gain = |r|² - min |y - H(Y β)|². Once for each lag on a grid; an exact refit then moves it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.nominal import Fit, orthonormal
+from pipelines.model.diagnosis.record import passed_rows
+from pipelines.model.effects.base import Effect
+
+__all__ = ["beyond_first_order", "passed_through"]
+
+
+def passed_through(data: Data, fit: Fit, effect: Effect, residuals: Array) -> tuple[Array, Array] | None:
+    """What the best amplitude takes off each squared weighted residual, and which it is.
+
+    Args:
+        residuals: (m, rows) weighted and orthogonal to the fit.
+
+    Returns:
+        Gains (m,) and amplitudes (m,); None where nothing passes through the effect, or the rows have gaps that it would smear.
+    """
+    if effect.joint is None or not effect.passing or not data.counts.all():
+        return None
+    gains = []
+    for amplitude in effect.passing:
+        table = passed_rows(data, effect, amplitude, fit.table)
+        modelled = passed_rows(data, effect, amplitude, fit.modelled)
+        left = (fit.modelled - modelled) * fit.weights + residuals
+        basis = orthonormal(table * fit.weights)
+        left -= (left @ basis.T) @ basis
+        gains.append(np.sum(np.square(residuals), axis=1) - np.sum(np.square(left), axis=1))
+    best = np.argmax(gains, axis=0)
+    return np.max(gains, axis=0), np.array(effect.passing)[best]
+
+
+def beyond_first_order(now: Refined, effect: Effect, amplitude: float) -> Exact:
+    """The model with the effect at `amplitude`, everything linear in it solved anew for what passes through the effect."""
+    count = len(now.model.beta)
+    linear = [*range(count), *(count + k for k, (kind, _, name) in enumerate(now.names) if kind == 1 and name.isdigit())]
+    table = passed_rows(now.data, effect, amplitude, now.slopes[linear]) * now.weights
+    modelled = now.fit.modelled
+    left = (now.left + modelled - passed_rows(now.data, effect, amplitude, modelled)) * now.weights
+    size = np.linalg.norm(table, axis=1)
+    size = np.where(size > 0.0, size, 1.0)
+    shift = np.zeros(len(now.slopes))
+    shift[linear] = np.linalg.lstsq((table / size[:, None]).T, left, rcond=1e-6)[0] / size
+    return now.model.moved(shift, list(now.names)).with_effect(effect, np.array([amplitude]))
