@@ -26,6 +26,7 @@ LAYERS = {
     "pipelines": 8,
     "pipelines.batch.figures": 1,  # reads stored results, and imports nothing
     "pipelines.stored": 9,
+    "pipelines.installation": 9,
     "pipelines.batch": 9,  # calls stages, and nothing but the command line calls it
     "rrrid_cli": 10,
 }

@@ -8,11 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.errors import UsageError, clean, did_you_mean
+from pipelines.errors import EnvironmentFault, UsageError, clean, did_you_mean
 from rrrid_cli.commands.application import STAGES, app, go
 from rrrid_cli.options import Common, StageCommand, with_common
 
-__all__ = ["compare", "report", "schema"]
+__all__ = ["compare", "doctor", "report", "schema"]
+
+_SIGNS = {"ok": "·", "warn": "!", "bad": "x"}
 
 
 @app.command(cls=StageCommand)
@@ -46,6 +48,32 @@ def report(
     drawn, _ = redraw(folder.absolute(), None if out is None else out.absolute(), force)
     if not quiet:
         print(f"{clean(drawn.verdict, 1000)}\n→ {(out or folder) / 'report.html'}")
+
+
+@app.command()
+def doctor(
+    json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Leave the self-test out.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
+) -> None:
+    """Examine the installation: libraries, threads, folders, and a self-test of some seconds; exit 6 where it cannot work."""
+    from pipelines.installation.examine import examine
+
+    del debug  # `entry` looks for it
+    found = []
+    for one in examine(self_test=not quick):
+        found.append(one)
+        if not json:
+            remedy = f" ({one.remedy})" if one.remedy else ""
+            print(f"  {_SIGNS[one.level]} {one.name}: {one.found}{remedy}", flush=True)
+    bad = [one for one in found if one.level == "bad"]
+    if json:
+        from pipelines.log.results import encode, json_text
+
+        sys.stdout.write(json_text({"command": "doctor", "works": not bad, "findings": encode(found)[0]}))
+    else:
+        print("rrrid cannot work here: see x above." if bad else "rrrid can work here.")
+    raise typer.Exit(EnvironmentFault.exit_code if bad else 0)
 
 
 @app.command()

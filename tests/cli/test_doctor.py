@@ -1,0 +1,63 @@
+"""`rrrid doctor`: an installation in order is said to be, and each thing that is missing or too old is named with its remedy."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+from pathlib import Path
+
+import pytest
+
+from pipelines.installation import examine, self_test
+from pipelines.installation.examine import Finding
+from tests.cli.commands import rrrid
+
+
+def named(findings: list[Finding], name: str) -> Finding:
+    return next(one for one in findings if one.name == name)
+
+
+def test_this_installation_works(tmp_path: Path) -> None:
+    """Exit 0, every step of the self-test passed, and nothing is left behind."""
+    done = rrrid("doctor", "--json", cwd=tmp_path, env={"TMPDIR": str(tmp_path)})
+    told = json.loads(done.stdout)
+    assert (done.returncode, told["works"]) == (0, True)
+    assert len([one for one in told["findings"] if one["name"].startswith("self-test") and one["level"] == "ok"]) == 5
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_library_that_is_missing_or_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
+    """numpy 1.9 is not 1.26; h5py is not there; an extra that is not there is no fault."""
+    version = importlib.metadata.version
+
+    def other(name: str) -> str:
+        if name in ("h5py", "mujoco"):
+            raise importlib.metadata.PackageNotFoundError(name)
+        return "1.9.3" if name == "numpy" else version(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", other)
+    found = list(examine.examine(self_test=False))
+    assert (named(found, "numpy").level, named(found, "h5py").level, named(found, "mujoco").level) == ("bad", "bad", "ok")
+    assert named(found, "numpy").found == "1.9.3, 1.26 or later is asked for"
+    assert "rrrid[bench]" in named(found, "mujoco").remedy
+
+
+def test_folders_and_threads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A temporary folder that cannot be written is a fault, HOME is only remarked upon; many threads are slow."""
+    monkeypatch.setattr(examine.tempfile, "gettempdir", lambda: "/proc/nothing")
+    monkeypatch.setenv("HOME", "/proc/nothing")
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    found = list(examine.examine(self_test=False))
+    levels = [named(found, name).level for name in ("temporary folder", "HOME", "BLAS")]
+    assert levels == ["bad", "warn", "warn"]
+
+
+def test_what_breaks_in_the_self_test_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A writer that fails is one bad finding; the other steps go on."""
+    def broken(path: Path, log: object) -> None:
+        raise OSError("HDF5 library version mismatch")
+
+    monkeypatch.setattr(self_test, "write_log", broken)
+    found = list(self_test.run_self_test())
+    assert [one.level for one in found] == ["ok", "bad", "bad", "ok", "ok"]
+    assert "HDF5 library version mismatch" in found[1].found
