@@ -4,8 +4,10 @@ Reads    logs of roles "identify", "validate" and "reference"; the causes; optio
 Writes   model.json where every rule of acceptance is kept, result.json, result.h5, logs/ with the model's torque, report.html
 Source   causes.md for the causes; Kostić et al. 2004, eq. (4), (12)-(15), for the rest
 
-A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its size, and where
-the simulated arm comes nearer to the measured one. What is not accepted is named with the reason; there is no way around it.
+A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its size, where no
+held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the measured one. What gives way takes
+its numbers from frequency responses, a load from how the base parameters moved since the reference logs. What is not accepted is
+named with the reason; there is no way around it.
 """
 
 from __future__ import annotations
@@ -98,7 +100,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     wanted = [*_kept(given.arm), *(Wanted(*wanted_cause(text, robot.revolute)) for text in settings.causes)]
     if isinstance(inputs.material, Diagnosed) and not settings.causes:
         wanted = _found(inputs.material, inputs.label)
-    said = examined((*chosen.identify, *chosen.validate, *chosen.reference), settings.allow_mismatch)
+    said = examined((*chosen.identify, *chosen.validate, *chosen.reference, *chosen.frf), settings.allow_mismatch)
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
                                min_speed=settings.min_speed)
     found = extend(chosen, tuple({one.place: one for one in wanted}.values()), engine, given.arm, given.tell)
@@ -124,9 +126,8 @@ def _kept(arm: Arm | None) -> list[Wanted]:
 
 
 def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
-    """What `diagnose` named out of the residual, within `run`; what frequency responses tell has no place in these equations."""
-    named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings if one.origin == "residual"
-             and not _once(find_effect(one.cause))]
+    """What `diagnose` named, within `run`; what happened once has no place in a model."""
+    named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings if not _once(find_effect(one.cause))]
     if not named:
         raise NothingMatched("C06", f"diagnose found nothing to extend the model by: {diagnosed.verdict}", where=label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")

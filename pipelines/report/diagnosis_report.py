@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 
 from pipelines.model.diagnosis.outcome import Result
+from pipelines.model.diagnosis.responding import BELOW
 from pipelines.model.diagnosis.result import Finding, Gain
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_picture import picture_sections
@@ -35,7 +36,8 @@ def _verdict(result: Result) -> str:
     """One sentence; what to check stands in the first section."""
     if result.verdict == "nothing-wrong":
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
-        return f"Nothing{since}, as far as these logs can tell: what they could have shown stands below."
+        caveat = f" {_sentence(result.reason)}" if result.reason else ""
+        return f"Nothing{since}, as far as these logs can tell: what they could have shown stands below.{caveat}"
     if result.verdict == "unknown":
         return f"Something is wrong that has no name here: {result.reason}."
     first, *more = result.findings
@@ -44,7 +46,8 @@ def _verdict(result: Result) -> str:
     size = f", {_size(first)}" if math.isfinite(first.torque_rms) else ""
     tip = first.gain.tip_error_rms
     moved = f"; for it the simulated tip is {format_number(1e3 * tip.before, 2)} mm off" if tip is not None else ""
-    return f"{changed}{first.title}{_at(first.joint)}{size}{moved}{others}."
+    rest = f" Beside it, {result.reason}." if result.reason else ""
+    return f"{changed}{first.title}{_at(first.joint)}{size}{moved}{others}.{rest}"
 
 
 def _at(joint: int | None) -> str:
@@ -64,7 +67,11 @@ def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
     """What it is, what to check, what it is worth, its proof; `offer` says how to extend the model by it."""
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one)]
-    if offer and one.origin == "residual":
+    if one.origin == "frequency responses":
+        text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
+                    f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
+                    "torque worked out from the encoder is mostly noise")
+    if offer and not _happens_once(one):
         text.append(f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it")
     if one.rivals:
         names = ", ".join(f"{cause_at(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
@@ -73,6 +80,16 @@ def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
               gain_table(one.gain, "Gain on held-out time, root mean square, beside the findings before it.")]
     return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text), tuple(tables),
                    tuple(proof_figures(number, one)))
+
+
+def _frequency(one: Finding) -> float:
+    found = one.parameters["frequency"].value
+    return found if isinstance(found, float) else math.nan
+
+
+def _happens_once(one: Finding) -> bool:
+    kind = find_effect(one.cause)
+    return any(q.shape and q.name in kind.per_log for q in kind.parameters)
 
 
 def _sentence(text: str) -> str:

@@ -50,7 +50,8 @@ def _first_reason(result: Extension) -> str:
 def _basis(result: Extension) -> Section:
     text = [held_out_words(result.held_out),
             "A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its "
-            "size, and where the simulated arm comes nearer to the measured one."]
+            "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the "
+            "measured one."]
     if result.standing:
         text.append(f"The reference logs show as well, and the model has: {', '.join(result.standing)}.")
     if result.model is not None:

@@ -42,6 +42,7 @@ class Part:
     acting: Acting
     before: Refined
     after: Refined
+    left: tuple[Array, Array]  # (rows,) [N m] of held-out rows
     gain: Gain
     doubt: str  # why the model goes without it all the same; empty where it does not
 
@@ -82,7 +83,7 @@ def _judged(acting: Acting, before: Refined, after: Refined, case: Case, there: 
     worse = float(np.linalg.norm(left[1] * weights)) > float(np.linalg.norm(left[0] * weights))
     doubt = ("the held-out torque error is larger with it" if worse and (torque.ci95[:, 0] > 0.0).any()
              else worse_log(data, *left) or farther(*simulated))
-    return Part(acting, before, after, gain_of(torque, *simulated), doubt)
+    return Part(acting, before, after, left, gain_of(torque, *simulated), doubt)
 
 
 def acted(arm: Arm, acting: Sequence[Acting]) -> Arm:

@@ -33,6 +33,8 @@ class Carried:
 
     finding: Finding
     arm: Arm  # the bare arm with every effect, and the load around them
+    bare: Arm  # without the load
+    left: Array  # (rows,) [N m] of held-out rows, without the load
     doubt: str  # why it is not believed; empty where it is
 
 
@@ -66,7 +68,7 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     acting = Acting.of(effect, moved.values, moved.std)
     place = {i: k for k, i in enumerate(done.model.columns.kept)}
     base = tuple(replace(p, value=p.value - float(shift[place[i]])) if i in place else p for i, p in enumerate(whole.base))
-    return Carried(finding, replace(whole, base=base, effects=(*whole.effects, acting)), doubt)
+    return Carried(finding, replace(whole, base=base, effects=(*whole.effects, acting)), arms[0], left[0], doubt)
 
 
 def _size(load: Array, data: Data) -> tuple[float, int, float]:

@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
-from pipelines.model.diagnosis.inputs import Logs, Prepared, narrowed, prepare
+from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import Settled, settled
@@ -41,8 +41,6 @@ from pipelines.model.diagnosis.verdict import Ruling, rule
 __all__ = ["diagnose"]
 
 Tell = Callable[[str], None]
-
-_GAP_HZ = 10.0  # below it a gap's torque is that of the gap; above, that of the tooth on which the link rings
 
 
 def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None) -> Diagnosis:
@@ -69,7 +67,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     rough = provisional(case)
     if first.stiff is not None and not first.stiff.named and gives_way(rough[0]):
         say("looking for a gap below the frequencies at which it rings")
-        slow = narrowed(prepared, _GAP_HZ, [0.0] * prepared.data.n_joints)
+        slow = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
         there = _nameable(_case(slow, chosen), first.stiff)
         seen = provisional(there)
         if gap_first(seen[0]):

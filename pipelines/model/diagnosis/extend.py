@@ -4,7 +4,8 @@
     found.accepted, found.extended, found.gain
 
 No threshold and no twin: the cause was named. It is accepted where its gain on held-out torque is beyond its bootstrap interval,
-where the logs agree on its size, and where the simulated arm comes nearer to the measured one.
+where the logs agree on its size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no
+farther from the measured one.
 """
 
 from __future__ import annotations
@@ -18,13 +19,16 @@ import numpy as np
 from pipelines.errors import UsageError
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.beside import acted
+from pipelines.model.diagnosis.absorbed import Absorbed
+from pipelines.model.diagnosis.beside import Held, acted
 from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
+from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.exact import Exact, Refined
-from pipelines.model.diagnosis.findings import extended_arm, findings, sure
-from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, sure
+from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
+from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.search import Case, Found, held_out_left, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
@@ -82,8 +86,15 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     prepared = prepare(logs, chosen, arm)
-    case, prepared = _case(prepared, chosen)
-    every = tuple(_family(case, one) for one in wanted)
+    if any(one.effect.evidence == "reversals" for one in wanted):
+        prepared = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
+    first = _responding(prepared, wanted, chosen)
+    case, prepared, moved = _case(first, chosen)
+    given = {one.place for one in case.beside} | {place_of(one.acting.effect.name, one.acting.effect.joint)
+                                                  for one in first.held.parts}
+    rest = [one for one in wanted if one.place not in given]
+    moved = moved if moved is not None and any(_is(one, moved) for one in rest) else None
+    every = tuple(_family(case, one) for one in rest if moved is None or not _is(one, moved))
     left, refused = list(every), dict[tuple[str, int | None], str]()
     while True:
         say(f"fitting {', '.join(place_of(f.cause, f.joint) for f in left) or 'the nominal model'}")
@@ -92,29 +103,43 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
         if not why:
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
-    return _told(found, named, refused, case, prepared, chosen)
+    return _told(found, named, refused, replace(first, held=replace(first.held, case=case, prepared=prepared)), moved, chosen)
 
 
-def _case(prepared: Prepared, chosen: DiagnosisSettings) -> tuple[Case, Prepared]:
-    """The nominal model on these logs, beside what the reference logs show as well."""
-    if prepared.reference is not None:
-        since = since_reference(prepared, prepared.reference, chosen)
-        case = replace(since.case, changed=None, nameable=_ALL)
-        return case, replace(prepared, data=case.data, judge=case.judge)
+def _is(one: Wanted, moved: Absorbed) -> bool:
+    return (one.effect.name, one.effect.joint) == (moved.effect.name, moved.effect.joint)
+
+
+def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSettings) -> Responding:
+    """What frequency responses give of the wanted causes; the others are fitted to motion."""
     columns, fit = fit_nominal(prepared.data, prepared.columns)
-    return Case(prepared.data, prepared.judge, Exact.start(columns, fit), fit.weight, (), None, chosen.blocks, _ALL), prepared
+    plain = Case(prepared.data, prepared.judge, Exact.start(columns, fit), fit.weight, (), None, chosen.blocks, _ALL)
+    places = [one.place for one in wanted if one.effect.evidence == "frequency responses"]
+    if not places or not prepared.logs.frf:
+        return Responding(None, Held(plain, prepared, ()))
+    return responding(plain, prepared, only=places)
+
+
+def _case(first: Responding, chosen: DiagnosisSettings) -> tuple[Case, Prepared, Absorbed | None]:
+    """The nominal model on these logs, beside what the reference logs show as well; and what base parameters took in since."""
+    case, prepared = first.held.case, first.held.prepared
+    if prepared.reference is None:
+        return case, prepared, None
+    since = since_reference(prepared, prepared.reference, chosen, case.beside)
+    case = replace(since.case, changed=None, nameable=_ALL)
+    return case, replace(prepared, data=case.data, judge=case.judge), since.absorbed
 
 
 def _family(case: Case, one: Wanted) -> Family:
     laws = case.model.columns.laws
     every = families(laws, whole_motion(case.data), case.model.arm)
     mine = next((f for f in every if (f.cause, f.joint) == (one.effect.name, one.effect.joint)), None)
+    if mine is None and one.effect.name in {law.name for law in laws}:
+        raise UsageError("C02", f"{one.place}: the nominal model has it already", where="--with",
+                         remedy="name a cause that the nominal model lacks")
     if mine is None:
-        law = one.effect.name in {law.name for law in laws}
-        raise UsageError("C02", f"{one.place}: the nominal model has it already" if law else
-                         f"{one.place}: within one session the base parameters take it up", where="--with",
-                         remedy="name a cause that the nominal model lacks" if law else
-                         "estimate-bps on logs with it gives a model that has it")
+        raise UsageError("C02", f"{one.place}: the base parameters take it up, and no reference logs show that they moved as it "
+                         "moves them", where="--with", remedy="name reference logs from before it: --reference PATH")
     if mine.event:
         raise UsageError("C02", f"{one.place} happens once: no model of the arm holds it", where="--with",
                          remedy="leave the moment out of the logs instead")
@@ -144,27 +169,37 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     return found, told, why
 
 
-def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], case: Case,
-          prepared: Prepared, chosen: DiagnosisSettings) -> Extended:
+def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], first: Responding,
+          moved: Absorbed | None, chosen: DiagnosisSettings) -> Extended:
+    """Everything that was accepted, in one model."""
+    case, prepared, parts = first.held.case, first.held.prepared, first.held.parts
     judge, final = prepared.judge, found.final
     floor = white(final.data, final.left)
-    rms = [ResidualRms(one.rms, (one.data if judge is None else judge).rms(held_out_left(one, judge, chosen.blocks)), floor)
-           for one in (found.nominal, final)]
-    rejected = tuple(Rejected(cause, joint, reason) for (cause, joint), reason in refused.items())
+    whole = acted(with_uncertainty(extended_arm(found, Ruling("cause", tuple(range(len(named))), "")), final), case.beside)
+    load = None if moved is None else carried(moved, final, whole, prepared, case.beside, chosen.blocks, chosen.evidence)
+    refused = dict(refused) | {(part.acting.effect.name, part.acting.effect.joint): part.doubt for part in parts if part.doubt}
+    if load is not None and load.doubt:
+        refused[load.finding.cause, load.finding.joint] = load.doubt
+        load = None
+    kept = [part for part in parts if not part.doubt]
+    plain = kept[0].before if kept else found.nominal
+    every = (*(held_finding(part, plain.rms, floor, chosen.evidence) for part in kept), *named,
+             *((load.finding,) if load is not None else ()))
+    rows = final.data if judge is None else judge
+    now = held_out_left(final, judge, chosen.blocks)
+    was = load.left if load is not None else kept[0].left[0] if kept else held_out_left(plain, judge, chosen.blocks)
+    rms = [ResidualRms(plain.rms, rows.rms(was), floor), ResidualRms(final.rms, rows.rms(now), floor)]
+    held = {part.acting for part in kept}
+    standing = tuple(one for one in case.beside if one not in held)
     arm = gain = None
-    if named:
-        arm = with_uncertainty(extended_arm(found, Ruling("cause", tuple(range(len(named))), "")), final)
-        arm = acted(arm, case.beside)
-        gain = named[0].gain if len(named) == 1 else _gain(found, case, prepared, chosen)
-    return Extended(arm, named, rejected, gain, rms[0], rms[1], "blocks" if judge is None else "logs", case.beside,
-                    (*prepared.motions, *prepared.judging), len(prepared.motions))
-
-
-def _gain(found: Found, case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> Gain:
-    """Of everything that was accepted, together."""
-    arms = [acted(one.model.arm, case.beside) for one in (found.nominal, found.final)]
-    simulated = simulation_errors(arms, prepared.judging or prepared.motions)
-    return gain_of(torque_gain(found.nominal, found.final, prepared.judge, chosen.blocks), *simulated)
+    if every:
+        arm = whole if load is None else load.arm
+        before = load.bare if load is not None else acted(plain.model.arm, standing)
+        gain = every[0].gain if len(every) == 1 else gain_of(
+            torque_gain_of(rows, was, now), *simulation_errors([before, arm], prepared.judging or prepared.motions))
+    rejected = tuple(Rejected(cause, joint, reason) for (cause, joint), reason in refused.items())
+    return Extended(arm, tuple(sorted(every, key=lambda one: -one.explained)), rejected, gain, rms[0], rms[1],
+                    "blocks" if judge is None else "logs", standing, (*prepared.motions, *prepared.judging), len(prepared.motions))
 
 
 def with_uncertainty(arm: Arm, done: Refined) -> Arm:

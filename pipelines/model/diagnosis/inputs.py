@@ -23,8 +23,9 @@ from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstruction
 
-__all__ = ["Logs", "Prepared", "narrowed", "prepare"]
+__all__ = ["GAP_HZ", "Logs", "Prepared", "narrowed", "prepare"]
 
+GAP_HZ = 10.0  # below it a gap's torque is that of the gap; above, that of the tooth on which the link rings
 Joints = npt.NDArray[np.bool_]
 
 _HELD = 0.02  # of its largest speed in all logs, below which a joint is held throughout a log

@@ -24,11 +24,11 @@ from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
 from pipelines.model.diagnosis.result import NotTestable, Standing, Value
 from pipelines.model.diagnosis.search import Case
 
-__all__ = ["Responding", "responding"]
+__all__ = ["BELOW", "Responding", "responding"]
 
 # Of the frequency at which the link, or the arm's base, swings while the encoder stands: there a torque out of motion is the noise
 # of the encoder, times a hundred.
-_BELOW = 0.7
+BELOW = 0.7
 # Of the speed at which friction has turned over: the drive's noise lets a motor on a spring rattle by less than the encoder counts,
 # and where it hardly moves that smears its friction.
 _RATTLES = 3.0
@@ -47,10 +47,17 @@ class Responding:
     undecided: tuple[NotTestable, ...] = ()
 
 
-def responding(case: Case, prepared: Prepared, without: Sequence[str] = ()) -> Responding:
-    """What gives way is taken out of all rows: out of those of the reference where it did before as well."""
+def responding(case: Case, prepared: Prepared, without: Sequence[str] = (), only: Sequence[str] | None = None) -> Responding:
+    """What gives way is taken out of all rows: out of those of the reference where it did before as well.
+
+    Args:
+        without: names of causes that it is not.
+        only: places of causes that are wanted; None: all.
+    """
     logs, arm = prepared.logs, case.model.nominal
     stiff = compliance(logs.frf, arm, without)
+    if stiff is not None and only is not None:
+        stiff = replace(stiff, named=tuple(one for one in stiff.named if one.place in only))
     if stiff is None or not stiff.named:
         return Responding(stiff, Held(case, prepared, ()))
     case, prepared = _told_apart(case, prepared, stiff.named)
@@ -74,7 +81,7 @@ def _told_apart(case: Case, prepared: Prepared, named: Sequence[Acting]) -> tupl
         assert joint is not None
         sharp = [w for curve in arm.friction_curves(joint) or () for w in curve.sharpnesses]
         speeds[joint - 1] = _RATTLES / max(sharp) if sharp else 0.0
-    prepared = narrowed(prepared, _BELOW * min(one.values["frequency"] for one in named), speeds)
+    prepared = narrowed(prepared, BELOW * min(one.values["frequency"] for one in named), speeds)
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     return replace(case, data=prepared.data, judge=prepared.judge, model=Exact.start(columns, fit), weight=fit.weight), prepared
 

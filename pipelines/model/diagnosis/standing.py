@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.fit.bootstrap import apart as apart_by_chance
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
@@ -32,6 +33,8 @@ Mask = npt.NDArray[np.bool_]
 
 _MOST = 10
 _WORTH = 0.02  # of the squared residual of a joint, that a standing column takes away at least
+_NEAR = 0.6  # of an amplitude that physics gives
+_BLOCKS, _SEED = 10, 20040509  # of held-out time; of the draws
 _TIMES, _LEAST = 3.0, 0.02  # times what nothing gains; of the squared residual of a joint
 
 
@@ -45,7 +48,8 @@ class Chosen:
 
 
 def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> tuple[Chosen, ...]:
-    """Effects that explain what the reference logs leave, one after the other, each in its best shape of one screening.
+    """Effects that explain what the reference logs leave, one after the other, each in its best shape of one screening, as far as
+    they pay on time that they were not fitted to.
 
     Pati, Rezaiifar & Krishnaprasad 1993: orthogonal matching pursuit. A scale of torque is none of them: at all joints
     together the torque would explain itself.
@@ -71,16 +75,45 @@ def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> 
         chosen.append((best, most))
         basis = np.concatenate([basis, left])
         residual = residual - (left @ residual) @ left
-    if not chosen:
-        return ()
-    stacked = np.concatenate([tables[k] for k, _ in chosen])
-    solved, *_ = np.linalg.lstsq(stacked.T, fit.residual, rcond=1e-8)
-    out, first = [], 0
-    for k, gain in chosen:
-        width = len(tables[k])
-        out.append(Chosen(found[k].shape[0], gain, solved[first:first + width]))
-        first += width
-    return tuple(out)
+    while chosen:
+        solved = _amplitudes(fit, [tables[k] for k, _ in chosen])
+        out = [Chosen(found[k].shape[0], gain, own) for (k, gain), own in zip(chosen, solved, strict=True)]
+        idle = next((place for place in reversed(range(len(out))) if not _plausible(out[place])
+                     or not _pays(data, fit, [tables[k] for k, _ in chosen], place, out[place].effect.joint)), None)
+        if idle is None:
+            return tuple(out)
+        del chosen[idle]
+    return ()
+
+
+def _amplitudes(fit: Fit, tables: Sequence[Array], rows: Mask | slice = slice(None)) -> list[Array]:
+    solved, *_ = np.linalg.lstsq(np.concatenate(tables)[:, rows].T, fit.residual[rows], rcond=1e-8)
+    return list(np.split(solved, np.cumsum([len(table) for table in tables])[:-1]))
+
+
+def _plausible(one: Chosen) -> bool:
+    """Amplitudes that physics gives have to come out near what it gives; all numbers in their ranges."""
+    given = one.effect.fixed_amplitudes
+    near = given is None or bool((np.abs(one.amplitudes / np.array(given) - 1.0) < _NEAR).all())
+    return near and one.effect.possible(one.effect.values(one.amplitudes))
+
+
+def _pays(data: Data, fit: Fit, tables: Sequence[Array], place: int, joint: int | None) -> bool:
+    """Whether it takes something off blocks of time that it was not fitted to, beyond what chance does."""
+    others = [table for k, table in enumerate(tables) if k != place]
+    blocks = data.blocks(_BLOCKS)
+    sums = np.zeros((3, int(blocks.max()) + 1))
+    own = data.counts if joint is None else data.counts & (data.joint == joint - 1)
+    for block in range(sums.shape[1]):
+        held, out = blocks != block, (blocks == block) & own
+        for row, some in enumerate((others, tables)):
+            left = fit.residual[out]
+            if some:
+                left = left - np.concatenate(_amplitudes(fit, some, held)) @ np.concatenate(some)[:, out]
+            sums[row, block] = float(left @ left)
+        sums[2, block] = float(out.sum())
+    _, high = apart_by_chance(sums[0], sums[1], sums[2], np.random.default_rng(_SEED))
+    return high < 0.0
 
 
 def joined(reference: Data, later: Data) -> tuple[Data, Mask]:
