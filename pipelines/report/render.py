@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -20,7 +20,9 @@ from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.style import figure_style, format_decimals, format_number, format_unit, printable
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure as Drawing
+    from matplotlib.text import Text
 
 __all__ = ["render_report", "write_report"]
 
@@ -155,19 +157,35 @@ def _draw(figure: Figure, salt: str) -> tuple[str, bytes]:
         drawing = Drawing(figsize=figure.size, layout="constrained")
         figure.draw(drawing)
         _make_printable(drawing)
+        if (layout := drawing.get_layout_engine()) is not None:
+            layout.execute(drawing)
+        drawing.set_layout_engine(None)  # already laid out: both shall be the same picture, with no trial drawing before them
         svg, png = io.BytesIO(), io.BytesIO()
         drawing.savefig(svg, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-        drawing.set_layout_engine(None)  # already laid out: the PNG shall be the same picture, with no trial drawing before it
         drawing.savefig(png, format="png", dpi=150, metadata={"Software": None})
     return _without_ballast(svg.getvalue().decode()), png.getvalue()
 
 
 def _make_printable(drawing: Drawing) -> None:
-    from matplotlib.text import Text
-
-    for text in drawing.findobj(Text):
-        if isinstance(text, Text) and (words := text.get_text()):
+    for text in _texts(drawing):
+        if words := text.get_text():
             text.set_text("\n".join(printable(line) for line in words.split("\n")))
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """Every text below `artist` but numbers beside ticks, which are made when they are drawn."""
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+    from matplotlib.ticker import FixedFormatter
+
+    for child in artist.get_children():
+        if isinstance(child, Axis):
+            yield child.label
+            if not isinstance(child.get_major_formatter(), FixedFormatter):
+                continue
+        if isinstance(child, Text):
+            yield child
+        yield from _texts(child)
 
 
 def _without_ballast(svg: str) -> str:
