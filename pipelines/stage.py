@@ -23,7 +23,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, InputRejected, RrridError, UsageError, clean
-from pipelines.log.atomic import replace_folder, staging_folder, write_file
+from pipelines.log.atomic import environment_faults, replace_folder, staging_folder, write_file
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, Opened, expanded, find_logs, hash_file, open_log
 from pipelines.log.places import given_names, keep_apart, refuse_foreign, renamed, short_names, slug, tilde, written_by
@@ -230,7 +230,8 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     request = dataclasses.replace(request, paths=expanded(request.paths))
     given, inputs = given_names(request.paths), ", ".join(map(str, request.paths))
     try:
-        return _run(stage, dataclasses.replace(request, paths=tuple(path.absolute() for path in request.paths)), settings)
+        with environment_faults(request.out or Path()):
+            return _run(stage, dataclasses.replace(request, paths=tuple(path.absolute() for path in request.paths)), settings)
     except RrridError as problem:
         # What knows no file, such as a filter of samples, leaves the place to who knows the inputs.
         problem.where = renamed(problem.where, given) or clean(inputs or f"rrrid {stage.name}")
@@ -283,10 +284,11 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
     object_ = tilde({"command": stage.name, **object_})
     staging = staging_folder(out)
     try:
-        _fill(staging, stage, result, report, object_, series, request, hashes)
-        _unchanged(hashes)
-        _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
-        replace_folder(staging, out)
+        with environment_faults(out):
+            _fill(staging, stage, result, report, object_, series, request, hashes)
+            _unchanged(hashes)
+            _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
+            replace_folder(staging, out)
     except EnvironmentFault as problem:
         problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
         raise

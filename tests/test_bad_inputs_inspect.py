@@ -1,4 +1,4 @@
-"""Every S, T and D row of the table of bad inputs that `inspect` can meet, each from one good log."""
+"""Every S, T and D row of the table of bad inputs that `inspect` can meet, each from one good log, through the command."""
 
 from __future__ import annotations
 
@@ -6,45 +6,49 @@ from pathlib import Path
 
 import pytest
 
-from pipelines import inspect
 from pipelines.log.files import write_log
-from pipelines.stage import Request
 from tests.fault_table import FAULTS, Fault
 from tests.healthy import good_log
+from tests.rows.commanded import Command, command
+
+__all__ = ["command"]
+
+_FIRST = {fault.code: fault for fault in reversed(FAULTS)}  # of every row the first case
 
 
-def examine(*paths: Path, **settings: bool) -> inspect.Result:
-    wanted = inspect.Settings(**settings)
-    return inspect.compute(inspect.read(Request(paths), wanted), wanted)
-
-
-@pytest.mark.parametrize("fault", FAULTS, ids=[f.row.replace(" ", "-") for f in FAULTS])
-def test_every_fault_is_named_placed_and_answered(fault: Fault, tmp_path: Path) -> None:
-    """Code, level, place, a number or a word of what is wrong, and a remedy; and nothing else is claimed."""
-    path = tmp_path / "log.h5"
-    write_log(path, fault.make(good_log()))
-    found = [c for c in examine(path).checks if c.level != "ok"]
-    mine = [c for c in found if c.code == fault.code]
+@pytest.mark.parametrize("fault", [pytest.param(f, marks=pytest.mark.row(f.row[:3]), id=f.row.replace(" ", "-")) for f in FAULTS])
+def test_every_fault_is_named_placed_and_answered(fault: Fault, tmp_path: Path, command: Command) -> None:
+    """Code, level, place, a number or a word of what is wrong, a remedy, the exit code; and nothing else is claimed."""
+    write_log(tmp_path / "log.h5", fault.make(good_log()))
+    done = command("inspect", "log.h5", "--no-report", "--out", "out")
+    assert done.exit == (3 if fault.level == "reject" else 0), done.err
+    found = [c for c in done.object["checks"] if c["level"] != "ok"]
+    mine = done.told(fault.code.removeprefix("RRID-"))
     assert mine, f"not found; found were {found}"
-    assert all(c.level == fault.level for c in mine)
-    assert any(part in c.message for c in mine for part in fault.says.split("|")), mine
-    assert all(c.where.startswith(str(path)) and c.remedy for c in mine)
-    assert any(fault.where in c.where for c in mine), mine
+    assert all(c["level"] == fault.level for c in mine)
+    assert any(part in c["message"] for c in mine for part in fault.says.split("|")), mine
+    assert all(c["where"].startswith("log.h5") and c["remedy"] for c in mine)
+    assert any(fault.where in c["where"] for c in mine), mine
     if fault.gate is not None:
-        assert any(c.gate == fault.gate for c in mine), mine
-    assert {c.code for c in found} <= {fault.code, *fault.also}
+        assert any(c["gate"] == fault.gate for c in mine), mine
+    assert {c["code"] for c in found} <= {fault.code, *fault.also}
+    if fault is _FIRST[fault.code] and fault.level == "repair":
+        command("inspect", "log.h5", "--no-report", "--out", "out", "--strict").refused(fault.code[-3:], 3, "log.h5")
+    if fault is _FIRST[fault.code] and fault.level == "warn":
+        done = command("inspect", "log.h5", "--no-report", "--out", "out", "--check")
+        assert done.exit == (1 if any(c["gate"] for c in found) else 0)
 
 
-def test_the_good_log_itself_is_in_order(tmp_path: Path) -> None:
+def test_the_good_log_itself_is_in_order(tmp_path: Path, command: Command) -> None:
     write_log(tmp_path / "log.h5", good_log())
-    result = examine(tmp_path / "log.h5")
-    assert {c.level for c in result.checks} == {"ok"}
+    done = command("inspect", "log.h5", "--no-report", "--out", "out", "--check", "--strict")
+    assert (done.exit, {c["level"] for c in done.object["checks"]}) == (0, {"ok"})
 
 
-def test_trusted_units_are_not_doubted(tmp_path: Path) -> None:
+def test_trusted_units_are_not_doubted(tmp_path: Path, command: Command) -> None:
     """--trust-units: whoever says that 90 is 90 rad is believed; what follows from it is then said."""
     fault = next(f for f in FAULTS if f.row == "S07")
     write_log(tmp_path / "log.h5", fault.make(good_log()))
-    codes = {c.code for c in examine(tmp_path / "log.h5", trust_units=True).checks if c.level != "ok"}
-    assert "RRID-S07" not in codes
-    assert "RRID-D12" in codes
+    done = command("inspect", "log.h5", "--no-report", "--out", "out", "--trust-units")
+    assert not done.told("S07")
+    assert done.told("D12")

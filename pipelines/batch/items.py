@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.errors import Check, EnvironmentFault, NothingMatched, UsageError
+from pipelines.errors import Check, RrridError, NothingMatched, UsageError
 from pipelines.log.atomic import fault_of
 from pipelines.log.files import ENDINGS, PROVENANCE, regular_file
 from pipelines.log.places import slug
@@ -29,7 +29,7 @@ class Item:
     name: str  # the path relative to the root, "." for the root itself
     paths: tuple[Path, ...]  # what the stage is given
     logs: tuple[Path, ...]  # the logs among and below them
-    fault: EnvironmentFault | None = field(default=None, compare=False)  # the folder could not be looked into
+    fault: RrridError | None = field(default=None, compare=False)  # the folder could not be looked into
 
     @property
     def slug(self) -> str:
@@ -55,7 +55,7 @@ def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tu
         regular_file(root)
         raise UsageError("C02", "is a log, not a folder of folders", where=root, remedy="run the stage on it alone")
     folders: dict[Path, list[Path]] = {}
-    faults: dict[Path, EnvironmentFault] = {}
+    faults: dict[Path, RrridError] = {}
     checks: list[Check] = []
     _walk(root, root.resolve(), folders, faults, checks)
     if not folders and not faults:
@@ -74,7 +74,7 @@ def _name(path: Path, root: Path) -> str:
     return path.relative_to(root).as_posix()
 
 
-def _walk(folder: Path, root: Path, folders: dict[Path, list[Path]], faults: dict[Path, EnvironmentFault],
+def _walk(folder: Path, root: Path, folders: dict[Path, list[Path]], faults: dict[Path, RrridError],
           checks: list[Check]) -> None:
     """Gather the logs of `folder` and of the folders below it, each under its own folder."""
     try:

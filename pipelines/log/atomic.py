@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from pipelines.errors import EnvironmentFault
+from pipelines.errors import EnvironmentFault, RrridError, UsageError
 
 __all__ = ["environment_faults", "replace_folder", "staging_folder", "sweep", "write_file"]
 
@@ -27,14 +27,23 @@ def environment_faults(path: Path) -> Iterator[None]:
     """Turn an OSError while writing below `path` into the fault of the environment that it is (exit 6)."""
     try:
         yield
+    except BrokenPipeError:  # who read our words has left: no fault of any file
+        raise
     except OSError as problem:
         raise fault_of(problem, path) from problem
 
 
-def fault_of(problem: OSError, path: Path) -> EnvironmentFault:
-    """The environment fault behind an operating-system error, at the file it names, or at `path` where that is a draft."""
+def fault_of(problem: OSError, path: Path) -> RrridError:
+    """The environment fault behind an operating-system error, at the file it names, or at `path` where that is a draft.
+
+    A path that this system cannot have is wrong usage instead (C07).
+    """
     named = problem.filename
     where = named if named and not os.path.basename(os.fsdecode(named)).startswith(_MARK) else path
+    if problem.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+        return UsageError("C07", "not a path of this system", where=where, remedy="check the path")
+    if problem.errno == errno.EFBIG:
+        return EnvironmentFault("P02", "larger than this process may write", where=where, remedy="raise its limit (ulimit -f)")
     if problem.errno in (errno.ENOSPC, errno.EDQUOT):
         return EnvironmentFault("P02", "no space left on the disk", where=where, remedy="free space and run again")
     if problem.errno in (errno.EACCES, errno.EPERM, errno.EROFS):

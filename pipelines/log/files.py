@@ -24,7 +24,7 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.guard import Answer, guarded
 from pipelines.log.joints import chosen
 from pipelines.log.robot import RobotDescription
-from pipelines.log.structure import conform, refuse_unlike_format
+from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_format
 
 __all__ = ["ENDINGS", "PROVENANCE", "Opened", "expanded", "find_logs", "hash_file", "open_log", "regular_file", "write_log"]
 
@@ -32,6 +32,7 @@ ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _PARQUET_MAGIC = b"PAR1"
+_ARCHIVES = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ")
 PROVENANCE = "provenance.json"
 PLANS = ("trajectory.h5", "trajectory.parquet")  # of design-excitation, beside its logs/
 
@@ -107,6 +108,7 @@ def _open(path: Path, assume_units: bool, only: Collection[str] | None, joints: 
                                remedy="'rrrid convert' writes a copy that has them"))
     log, choice = chosen(log, joints, robot)
     conformed, changes = conform(log, assume_units=assume_units)
+    refuse_bad_urdf(conformed, path)
     return Opened(path, sha256, conformed, (*checks, *choice, *changes), container)
 
 
@@ -187,6 +189,9 @@ def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
             if file.read() != _PARQUET_MAGIC:
                 raise InputRejected("F07", "truncated: no footer", where=path,
                                     remedy="copy the file again from where it was recorded")
+    elif magic.startswith(_ARCHIVES) and path.suffix.lower() not in ENDINGS:
+        raise UsageError("X12", "an archive, which is not opened", where=path,
+                         remedy="unpack it, and give the logs or their folder")
     else:
         raise InputRejected("F06", "neither HDF5 nor Parquet", where=path,
                             remedy="a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe")

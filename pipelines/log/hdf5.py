@@ -129,7 +129,7 @@ def _refuse_links(group: Any, where: str) -> None:
     for name in islice(group, _MANY_ATTRIBUTES + 1):
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
-            raise InputRejected("X01", f"external link '{name}' to another file refused", where=where,
+            raise InputRejected("X01", f"external link '{name}' -> '{link.filename}' refused", where=where,
                                 remedy="store the data in the log itself")
         if isinstance(link, h5py.SoftLink):
             raise InputRejected("X04", f"soft link '{name}' refused", where=where, remedy="store the data in the log itself")

@@ -44,12 +44,12 @@ def _file_of(source: str | Path) -> Path:
     path = Path(source)
     if not str(source):
         raise UsageError("C02", "empty", where="--robot", remedy="name a description, a URDF, or a shipped robot")
-    if os.path.lexists(path) and not path.is_dir():
+    if os.path.lexists(path) and not os.path.isdir(path):
         return path
     try:
         return shipped("robots", str(source))
     except UsageError as problem:
-        if not path.is_dir():
+        if not os.path.isdir(path):  # unlike Path.is_dir, it answers for a path that is none
             raise
         raise UsageError("C04", "a folder, not the description of a robot", where=source, remedy=problem.remedy) from None
 

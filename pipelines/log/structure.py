@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected, did_you_mean
+from pipelines.errors import Check, InputRejected, clean, did_you_mean
 from pipelines.log import schema
 from pipelines.log.canonical import refuse_wrong_kinds
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.units import to_si
 
-__all__ = ["conform", "refuse_unlike_format"]
+__all__ = ["conform", "refuse_bad_urdf", "refuse_unlike_format"]
 
 
 def conform(log: ExperimentLog, *, assume_units: bool = False) -> tuple[ExperimentLog, tuple[Check, ...]]:
@@ -32,6 +32,19 @@ def conform(log: ExperimentLog, *, assume_units: bool = False) -> tuple[Experime
     done = replace(log, signals=signals) if any(signals[name] is not log.signals[name] for name in signals) else log
     refuse_unlike_format(done)
     return done, tuple(checks)
+
+
+def refuse_bad_urdf(log: ExperimentLog, path: object) -> None:
+    """S17, X13: the URDF inside a description is looked at here, where the file is known, not where it is first used."""
+    if "urdf_text" not in log.robot_text or log.robot.urdf_text is None:
+        return
+    from pipelines.log.urdf import chain_from_urdf
+
+    try:
+        chain_from_urdf(log.robot.urdf_text, log.robot.tip_link)
+    except InputRejected as problem:
+        problem.where = clean(f"{path}, /robot, {problem.where}")
+        raise
 
 
 def refuse_unlike_format(log: ExperimentLog) -> None:

@@ -1,0 +1,75 @@
+"""A command as a user gives it, run in this process: its exit code, what it prints, the error or the checks it tells.
+
+A fresh process costs half a second, and there are a few hundred cases; the start of the program has tests of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+__all__ = ["Command", "Done", "command"]
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command ended."""
+
+    exit: int
+    out: str
+    err: str
+    object: dict[str, Any] = field(default_factory=dict)  # what --json printed
+
+    @property
+    def error(self) -> dict[str, str]:
+        found: dict[str, str] = self.object.get("error", {})
+        return found
+
+    def told(self, code: str) -> list[dict[str, Any]]:
+        """The checks of this row that a result holds, those in order left out."""
+        return [c for c in self.object.get("checks", []) if c["code"] == f"RRID-{code}" and c["level"] != "ok"]
+
+    def refused(self, code: str, exit_code: int, where: str = "", says: str = "") -> None:
+        """One line on standard error, its code, exit code, place and remedy; no traceback."""
+        assert (self.exit, self.error.get("code")) == (exit_code, f"RRID-{code}"), self.err
+        assert self.err.startswith(f"rrrid: RRID-{code} ")
+        assert self.err.count("\n") == 1
+        assert where in self.error["where"], self.error
+        assert self.error["where"]
+        assert says in " ".join(self.error.values()), self.error
+        assert self.error["remedy"], self.error
+
+
+Command = Callable[..., Done]
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
+    """`command("inspect", "a.h5")` in tmp_path, with --json."""
+    from rrrid_cli import main
+
+    def run(*words: object, as_json: bool = True) -> Done:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["rrrid", *map(str, words), *(["--json"] if as_json else [])])
+        monkeypatch.setattr(main, "economise", lambda: None)
+        before, hook = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}, sys.unraisablehook
+        capsys.readouterr()
+        try:
+            with pytest.raises(SystemExit) as ended:
+                main.entry()
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+            sys.unraisablehook = hook
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        return Done(int(ended.value.code or 0), said.out, said.err, json.loads(said.out) if as_json and said.out else {})
+
+    return run
