@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.errors import Check, RrridError, NothingMatched, UsageError
+from pipelines.errors import Check, NothingMatched, RrridError, UsageError
 from pipelines.log.atomic import fault_of
 from pipelines.log.files import ENDINGS, PROVENANCE, regular_file
 from pipelines.log.places import slug
