@@ -5,9 +5,9 @@ Writes   model.json where every rule of acceptance is kept, result.json, result.
 Source   causes.md for the causes; Kostić et al. 2004, eq. (4), (12)-(15), for the rest
 
 A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its size, where no
-held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the measured one. What gives way takes
-its numbers from frequency responses, a load from how the base parameters moved since the reference logs. What is not accepted is
-named with the reason; there is no way around it.
+held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the measured one. What gives way
+takes its numbers from frequency responses, a load from how the base parameters moved since the reference logs. What is not accepted
+is named with the reason; there is no way around it.
 """
 
 from __future__ import annotations
