@@ -31,7 +31,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "data"
 
 
-@pytest.mark.parametrize("repair", REPAIRS, ids=[r.row.replace(" ", "-") for r in REPAIRS])
+@pytest.mark.parametrize("repair", [pytest.param(r, marks=pytest.mark.row(r.code), id=r.row.replace(" ", "-")) for r in REPAIRS])
 def test_what_can_be_mended_is_mended_said_and_an_error_when_strict(repair: Repair, folder: Path, checker: ModuleType) -> None:
     repair.spoil(folder)
     outcome = run(folder, repair.recipe)
@@ -126,7 +126,7 @@ def milliseconds(folder: Path) -> None:
 EXITS = {"C06": 5, "X12": 2}
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.row(case[0][:3])) for name, case in REFUSED.items()])
 def test_what_cannot_be_mended_is_refused_with_place_and_remedy(name: str, folder: Path) -> None:
     code, spoil, recipe, words = REFUSED[name]
     spoil(folder)

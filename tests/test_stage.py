@@ -230,6 +230,7 @@ def test_a_failed_stage_leaves_the_earlier_result(logs: Path) -> None:
     assert sorted(p.name for p in logs.parent.iterdir()) == ["logs", "out"]
 
 
+@pytest.mark.row("P01")
 def test_a_killed_stage_leaves_the_old_folder_or_the_new_one(logs: Path) -> None:
     """P01: SIGKILL at 40 points of a run that replaces its own output: a folder whose every file fits its provenance."""
     request, kinds = _request(logs, no_report=True), set()

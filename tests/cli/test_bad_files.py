@@ -99,6 +99,7 @@ def test_a_pipe_as_a_log_is_exit_3_at_once(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["error"]["code"] == "RRID-F12"
 
 
+@pytest.mark.row("D14")
 def test_one_recording_for_fit_and_validation(tmp_path: Path) -> None:
     """D14: the same samples as "identify" and "validate" are a leak, exit 3; --allow-same vouches for it."""
     write_log(tmp_path / "logs/a.h5", good_log())

@@ -18,6 +18,9 @@ from pipelines.log.files import open_log, write_log
 from tests.cli.commands import REPO, rrrid
 from tests.healthy import good_log, with_signal
 from tests.log.logs import small_log
+from tests.rows.commanded import Command, command
+
+__all__ = ["command"]
 
 
 def test_a_command_leaves_a_folder_and_says_where(logs: Path) -> None:
@@ -74,7 +77,8 @@ def test_json_is_alone_on_standard_output(logs: Path) -> None:
     (("import",), "RRID-C02", 2),
     (("import", "no-such-recipe"), "RRID-C04", 2),
 ])
-def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[str, ...], code: str, exit_code: int) -> None:
+def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[str, ...], code: str, exit_code: int,
+                                                      command: Command) -> None:
     """No traceback reaches a user; with --json the same error stands on stdout as an object."""
     (logs / "empty").mkdir()
     (logs / "logs/text.h5").write_text("t,q\n1,2\n")
@@ -83,14 +87,7 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     write_log(logs / "own/logs/a.h5", small_log())
     (logs / "own/provenance.json").write_text('{"tool": "rrrid", "outputs": {"result.json": "0"}}')
     os.mkfifo(logs / "pipe")
-    done = rrrid(*words, "--json", cwd=logs)
-    assert done.returncode == exit_code, done.stderr
-    assert done.stderr.startswith(f"rrrid: {code} ")
-    assert done.stderr.count("\n") == 1
-    error = json.loads(done.stdout)["error"]
-    assert error["code"] == code
-    assert error["where"]
-    assert error["remedy"]
+    command(*words).refused(code.removeprefix("RRID-"), exit_code)
     assert not (logs / "pwned").exists()
     assert open_log(logs / "logs/a.h5").log == open_log(logs / "own/logs/a.h5").log == small_log()
 
@@ -189,9 +186,9 @@ def test_an_estimate_loads_only_what_it_uses(tmp_path: Path) -> None:
 def test_help_is_plain(tmp_path: Path) -> None:
     """Every command explains itself and the shared options."""
     top = rrrid("--help", cwd=tmp_path).stdout
-    for command in ("run", "inspect", "import", "convert"):
-        assert f"  {command} " in top
-        assert "--out" in rrrid(command, "--help", cwd=tmp_path).stdout
+    for name in ("run", "inspect", "import", "convert"):
+        assert f"  {name} " in top
+        assert "--out" in rrrid(name, "--help", cwd=tmp_path).stdout
 
 
 def test_help_names_what_set_takes(tmp_path: Path) -> None:

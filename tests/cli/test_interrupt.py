@@ -50,6 +50,7 @@ def _nobody_left(group: int) -> bool:
     return False
 
 
+@pytest.mark.row("P06")
 def test_ctrl_c_at_any_moment_ends_the_run(tmp_path: Path) -> None:
     """P06: SIGINT to the whole process group, as a terminal sends it, at random times from the first log read on.
 

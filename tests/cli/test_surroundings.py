@@ -31,6 +31,7 @@ def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path) -> None:
     assert not (logs / "runs").exists()
 
 
+@pytest.mark.row("P06")
 @pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_cleanly(tmp_path: Path, number: signal.Signals, exit_code: int) -> None:
     """P06: Ctrl-C and SIGTERM end within 5 s with their code, no half-written folder, no orphan."""
@@ -83,17 +84,7 @@ def test_hostile_names_reach_no_terminal(tmp_path: Path) -> None:
     assert all(p.is_relative_to(tmp_path / "runs") for p in tmp_path.rglob("provenance.json"))
 
 
-def test_archives_are_not_opened(tmp_path: Path) -> None:
-    """X12: a zip of logs is not unpacked; what can be read is said."""
-    import zipfile
-
-    with zipfile.ZipFile(tmp_path / "logs.zip", "w") as archive:
-        archive.writestr("../../evil.h5", "x")
-    done = rrrid("convert", "logs.zip", cwd=tmp_path)
-    assert done.returncode in (2, 3)
-    assert "neither HDF5 nor Parquet" in done.stderr
-
-
+@pytest.mark.row("P13")
 def test_no_home_no_terminal_no_display(logs: Path) -> None:
     """P13: HOME missing and read-only, no DISPLAY, a dumb terminal: the command works and says nothing else."""
     (logs / "home").mkdir(mode=0o555)

@@ -85,6 +85,7 @@ def with_rows(log: ExperimentLog, count: int) -> ExperimentLog:
     return replace(log, signals={k: replace(s, values=s.values[:count]) for k, s in log.signals.items()})
 
 
+@pytest.mark.row("D14")
 def test_one_recording_does_not_judge_itself(good: ExperimentLog, tmp_path: Path) -> None:
     """D14: the same samples in both roles are refused, in whatever container, unless --allow-same."""
     copy = replace(good, name="copy", role="validate")
@@ -138,6 +139,7 @@ def test_a_mismatch_may_be_fitted_on_purpose(tmp_path: Path) -> None:
     assert (allowed.returncode, "RRID-S14" in allowed.stdout + allowed.stderr) == (1, True), allowed.stderr
 
 
+@pytest.mark.row("T07", "D05")
 def test_the_doctor_is_asked(good: ExperimentLog, tmp_path: Path) -> None:
     """T07, less than a period: rejected. D05, a flat top: said, and exit 1 under --check."""
     with pytest.raises(InputRejected) as refused:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from pipelines import estimate_bps, reconstruct
 from pipelines.log.experiment import ExperimentLog
@@ -51,6 +52,7 @@ def test_derived_torques_add_up(good: ExperimentLog, tmp_path: Path) -> None:
     np.testing.assert_allclose(np.median(np.abs(middle), axis=0) / 0.6745, [0.020, 0.010, 0.005], rtol=0.25)
 
 
+@pytest.mark.row("D09")
 def test_a_log_of_one_joint_names_what_it_cannot_show(tmp_path: Path) -> None:
     """D09: only the elbow moves. No number for what is not seen, gate 1, and the same again as null in the JSON."""
     only = np.array([0.0, 0.0, 1.0])
@@ -71,6 +73,7 @@ def test_a_log_of_one_joint_names_what_it_cannot_show(tmp_path: Path) -> None:
     assert out.result.physically_consistent is None
 
 
+@pytest.mark.row("D15")
 def test_an_inconsistent_estimate_names_the_link(good: ExperimentLog, tmp_path: Path) -> None:
     """D15: an elbow torque of the wrong sign asks for an elbow of negative inertia."""
     wrong = with_signal(good, tau=good.tau * np.array([1.0, 1.0, -1.0]))

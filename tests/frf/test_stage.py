@@ -126,6 +126,7 @@ def test_reference_logs_are_not_mixed_in() -> None:
     assert [r.logs for r in computed(before).responses if r.method == "direct"] == [("before",)]
 
 
+@pytest.mark.row("D13")
 def test_low_coherence_everywhere_is_a_gate(tmp_path: Path) -> None:
     """A thousandth of the disturbance: D13, exit 1 under --check, and what to record."""
     write_log(tmp_path / "turned.h5", replace(LINK, strength=0.002, disturbance=4.0).log())

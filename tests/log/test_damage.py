@@ -166,6 +166,7 @@ def _write_for_ever(path: Path, logs: tuple[ExperimentLog, ExperimentLog], delay
     return child
 
 
+@pytest.mark.row("P01")
 @pytest.mark.parametrize("kills", KILLS)
 @pytest.mark.parametrize("ending", [".h5", ".parquet"])
 def test_a_killed_writer_leaves_the_old_log_or_the_new_one(tmp_path: Path, ending: str, kills: int) -> None:
@@ -187,6 +188,7 @@ def test_a_killed_writer_leaves_the_old_log_or_the_new_one(tmp_path: Path, endin
     assert list(tmp_path.iterdir()) == [path], "the next writer sweeps up what the killed ones left"
 
 
+@pytest.mark.row("P02")
 def test_a_failing_write_leaves_no_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """P02: the disk is full in the middle of writing: exit 6, the old log stands, nothing partial lies about."""
     path = tmp_path / "a.h5"

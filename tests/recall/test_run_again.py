@@ -128,6 +128,7 @@ def setting_of_all_logs(folder: Path) -> run.Settings:
     (own_setting, ["inspect"], "trust_units was false, is true"),
     (setting_of_all_logs, ["reconstruct", "frf"], "order was 4, is 3"),
 ])
+@pytest.mark.row("P09")
 def test_exactly_what_is_affected(small: Path, change: Callable[[Path], run.Settings], computed: list[str], why: str) -> None:
     """P09: one thing changes; --dry-run says which stages that concerns and why, writes nothing, and is right."""
     settings = change(small)
@@ -142,6 +143,7 @@ def test_exactly_what_is_affected(small: Path, change: Callable[[Path], run.Sett
     assert go(small, settings, no_report=True)[1] == []
 
 
+@pytest.mark.row("P09")
 def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """P09: a module of one stage alone, and a library of all."""
     code = run.code_of
@@ -155,6 +157,7 @@ def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch
     assert all(one.computed and "numpy" in one.why for one in run.plan(Request((small / "logs",), out=small / "out"), SHORT))
 
 
+@pytest.mark.row("P10")
 @pytest.mark.parametrize("file", [".cache/reconstruct/result.h5", ".cache/reconstruct/entry.json", "reconstruct/logs/1.h5"])
 def test_a_damaged_store_is_computed_again(small: Path, file: str) -> None:
     """P10: one flipped byte is noticed, told, and mended by computing."""
@@ -179,6 +182,7 @@ def test_what_a_person_may_have_edited_is_refused(whole: Path) -> None:
     assert model.read_bytes() == before
 
 
+@pytest.mark.row("P08")
 def test_two_runs_at_once(small: Path) -> None:
     """P08: the second is told; when the first has ended, it may."""
     holder = Store(small / "out")
@@ -190,6 +194,7 @@ def test_two_runs_at_once(small: Path) -> None:
     assert sorted(p.name for p in small.iterdir()) == ["logs", "out"]
 
 
+@pytest.mark.row("P07")
 def test_an_interrupted_run_goes_on(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """P07: what was finished before the interruption is not computed again, and the end is that of an uninterrupted run."""
     before = contents(small / "out")

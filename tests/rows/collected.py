@@ -1,0 +1,24 @@
+"""A pytest plugin that prints which tests bear which row of the table of bad inputs, as one line of JSON.
+
+    pytest --collect-only -p tests.rows.collected FILES
+"""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+__all__ = ["BEGINS"]
+
+BEGINS = "rows: "
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """After slow tests were left out: a row whose only test is a campaign is not tested."""
+    rows: dict[str, list[str]] = {}
+    for item in session.items:
+        for mark in item.iter_markers("row"):
+            for code in mark.args:
+                rows.setdefault(code, []).append(item.nodeid)
+    print(BEGINS + json.dumps(rows))
