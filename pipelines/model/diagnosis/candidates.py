@@ -106,7 +106,7 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
         some = family.shapes[first:first + size]
         with np.errstate(all="ignore"):
             kept = some[0].from_motion and family.joint and whole is arm
-            acting, parts = _own(data, some, arm) if kept else _anywhere(data, some, arm, whole)
+            acting, parts = _own(data, some, arm) if kept else _anywhere(data, some, arm, whole, not family.event)
         rows = np.flatnonzero(np.isin(data.joint, acting))
         found = np.concatenate(parts, axis=2)
         if not data.counts.all():
@@ -127,19 +127,39 @@ def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
     return one.lay_signals(table.reshape(-1, table.shape[2]))
 
 
-def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm) -> tuple[Indices, list[Array]]:
-    """Joints that they act on, and of each log (shapes, k, rows of those joints)."""
-    tables = [[recorded(whole, _finite(table), one.motion.t).transpose(2, 1, 0)
-               for table in some[0].several(some, one.motion, arm)] for one in data.logs]
-    k, joints, _ = tables[0][0].shape
-    acting = np.flatnonzero([any(table[:, j].any() for per_log in tables for table in per_log) for j in range(joints)])
-    laid = []
-    for one, per_log in zip(data.logs, tables, strict=True):
-        flat = np.empty((len(some), k, len(acting), len(one.motion.t)))
-        for into, table in zip(flat, per_log, strict=True):
-            into[...] = table[:, acting]
-        laid.append(one.lay_signals(flat.reshape(-1, flat.shape[3])).reshape(len(some), k, -1))
-    return acting, laid
+@dataclass(frozen=True, eq=False)
+class _Same:
+    """An arm that is the same object."""
+
+    arm: Arm
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.arm is self.arm
+
+    def __hash__(self) -> int:
+        return id(self.arm)
+
+
+def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bool) -> tuple[Indices, list[Array]]:
+    """Joints that they act on, and of each log (shapes, k, rows of those joints); kept for the next time the same arm is asked."""
+    laid = [one.keep((tuple(some), _Same(whole)), partial(_laid_anywhere, one, some, arm, whole)) if keep
+            else _laid_anywhere(one, some, arm, whole) for one in data.logs]
+    acting = np.flatnonzero([any(x[:, :, j].any() for x in laid) for j in range(data.n_joints)])
+    return acting, [x[:, :, acting].reshape(*x.shape[:2], -1) for x in laid]
+
+
+def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -> Array:
+    """(shapes, k, joints, rows)"""
+    tables = [recorded(whole, _finite(table), one.motion.t).transpose(2, 1, 0)
+              for table in some[0].several(some, one.motion, arm)]
+    k, joints, samples = tables[0].shape
+    acting = np.flatnonzero([any(table[:, j].any() for table in tables) for j in range(joints)])
+    flat = np.empty((len(some), k, len(acting), samples))
+    for into, table in zip(flat, tables, strict=True):
+        into[...] = table[:, acting]
+    found = np.zeros((len(some), k, joints, one.rows))
+    found[:, :, acting] = one.lay_signals(flat.reshape(-1, samples)).reshape(len(some), k, len(acting), one.rows)
+    return found
 
 
 def _finite(table: Array) -> Array:

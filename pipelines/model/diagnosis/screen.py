@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.through import passed_through
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Screened", "gains_of", "screen", "screen_event", "screen_family"]
+__all__ = ["Screened", "gains_of", "products_of", "screen", "screen_event", "screen_family"]
 
 _INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
 _USUAL = 0.25  # of the shapes reach less
@@ -67,6 +67,8 @@ def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arra
     for k, residual in enumerate(wanted):
         left = list(data.split(residual / fit.weights))
         for place, one in enumerate(data.logs):
+            if not left[place].any():
+                continue
             full = np.stack([np.interp(one.motion.t, one.t, row) for row in left[place]], axis=1)
             shapes = tuple(family.shapes[0].promising(one.motion, arm, full))
             if not shapes:
@@ -106,19 +108,40 @@ def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arr
 
 def gains_of(laid: Laid, fit: Fit, residuals: Array) -> tuple[Array, Array, Array]:
     """(shapes, residuals) gains; (shapes,) visibility, and size of the first column."""
+    return products_of(laid, fit, residuals).gains()
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Of the columns of some shapes with each other and with residuals."""
+
+    whole: Array  # (shapes, k, k) cᵀc
+    gram: Array  # (shapes, k, k) c⊥ᵀc⊥
+    moment: Array  # (shapes, k, residuals) c⊥ᵀr
+
+    def first(self, k: int) -> Products:
+        """Of the first `k` columns alone."""
+        return Products(self.whole[:, :k, :k], self.gram[:, :k, :k], self.moment[:, :k])
+
+    def gains(self) -> tuple[Array, Array, Array]:
+        """(shapes, residuals) gains; (shapes,) visibility, and size of the first column."""
+        k = self.whole.shape[1]
+        scale = np.sqrt(np.maximum(np.einsum("skk->sk", self.whole), 1e-300))
+        unit = self.gram / scale[:, :, None] / scale[:, None, :]
+        values, vectors = np.linalg.eigh(unit)
+        turned = np.square(np.einsum("skl,skm->slm", vectors, self.moment / scale[:, :, None]))
+        lowest = np.maximum(_INVISIBLE**2, _SPREAD**2 * values[:, -1:])
+        sure = values > lowest
+        gain = np.sum(np.where(sure[:, :, None], turned / np.where(sure, values, 1.0)[:, :, None], 0.0), axis=1)
+        share = np.sqrt(np.clip(np.einsum("skk->s", unit) / k, 0.0, None))
+        return gain, np.asarray(np.minimum(share, 1.0)), np.sqrt(np.maximum(self.gram[:, 0, 0], 0.0))
+
+
+def products_of(laid: Laid, fit: Fit, residuals: Array) -> Products:
     shapes, k, _ = laid.table.shape
     c = laid.table * fit.weights[laid.rows]
     flat = c.reshape(shapes * k, -1)
     seen = (flat @ fit.basis[:, laid.rows].T).reshape(shapes, k, -1)
     whole = c @ c.transpose(0, 2, 1)
-    gram = whole - seen @ seen.transpose(0, 2, 1)
     moment = (flat @ residuals[:, laid.rows].T).reshape(shapes, k, -1)
-    scale = np.sqrt(np.maximum(np.einsum("skk->sk", whole), 1e-300))
-    unit = gram / scale[:, :, None] / scale[:, None, :]
-    values, vectors = np.linalg.eigh(unit)
-    turned = np.square(np.einsum("skl,skm->slm", vectors, moment / scale[:, :, None]))
-    lowest = np.maximum(_INVISIBLE**2, _SPREAD**2 * values[:, -1:])
-    sure = values > lowest
-    gain = np.sum(np.where(sure[:, :, None], turned / np.where(sure, values, 1.0)[:, :, None], 0.0), axis=1)
-    share = np.sqrt(np.clip(np.einsum("skk->s", unit) / k, 0.0, None))
-    return gain, np.asarray(np.minimum(share, 1.0)), np.sqrt(np.maximum(gram[:, 0, 0], 0.0))
+    return Products(whole, whole - seen @ seen.transpose(0, 2, 1), moment)

@@ -23,7 +23,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
-from pipelines.model.diagnosis.screen import Screened, gains_of, screen, screen_event
+from pipelines.model.diagnosis.screen import Screened, products_of, screen, screen_event
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
@@ -186,17 +186,17 @@ def _screened(data: Data, later: Mask, fit: Fit, masks: Sequence[Mask], still: S
         here[laid.rows] = True
         changed = np.where(later[laid.rows], laid.table, 0.0)
         both = replace(laid, table=np.concatenate([laid.table, changed], axis=1))
-        one, _, _ = gains_of(laid, fit, fit.residual[None])
-        two, seen, _ = gains_of(both, fit, fit.residual[None])
+        width = laid.table.shape[1]
+        products = products_of(both, fit, fit.residual[None])
+        one, (two, seen, _) = products.first(width).gains()[0], products.gains()
         gained.append(two[:, 0] - one[:, 0])
         eta.append(seen)
-        width = laid.table.shape[1]
         inside = rows[laid.rows]
         for mask, own in zip(masks, still, strict=True):
             part = replace(laid, table=laid.table[:, :, inside], rows=np.flatnonzero(here[rows]))
             moved = np.where(mask[laid.rows][inside], part.table, 0.0)
-            alone, _, _ = gains_of(part, own, own.residual[None])
-            pair, _, _ = gains_of(replace(part, table=np.concatenate([part.table, moved], axis=1)), own, own.residual[None])
+            products = products_of(replace(part, table=np.concatenate([part.table, moved], axis=1)), own, own.residual[None])
+            alone, pair = products.first(width).gains()[0], products.gains()[0]
             chance = max(chance, float((pair - alone).max()))
     gain, visible = np.concatenate(gained), np.concatenate(eta)
     best = int(np.argmax(gain))
