@@ -119,7 +119,17 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), doctor=(*said, *said_too, *said_of_periods),
                      noise_floor=residuals(floors, fitted, judged, logs, settings.average))
     return result if not settings.compare else replace(
-        result, comparison=compare(fitted, judged, settings.blocks, settings.weighted))
+        result, comparison=compare(fitted, judged, settings.blocks, settings.weighted),
+        rigid_body_alone=_rigid_body_alone(fitted, means, settings))
+
+
+def _rigid_body_alone(fitted: Fitted, means: Motions, settings: Settings) -> tuple[float, ...]:
+    """Held-out error (joints,) of the rigid body fitted without friction and offset, on the same equations."""
+    identify = len(fitted.motions)
+    columns = nominal_columns(means[0][0].robot, friction=False, offset=False, rotor_inertia=settings.rotor_inertia,
+                              symmetric=settings.symmetric)
+    alone = fit_logs(means[:identify], columns, replace(fitted.recipe, known=None), settings.weighted)
+    return tuple(map(float, judge(alone, means[identify:], settings.blocks).errors.rms))
 
 
 def _examined(logs: list[ExperimentLog], settings: Settings) -> tuple[Motions, tuple[Check, ...]]:

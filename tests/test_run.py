@@ -13,6 +13,7 @@ import pytest
 from pipelines import estimate_bps, run
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
+from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 
 WITHOUT = run.Settings(skip=("diagnose", "extend"))  # they are dear, and have tests of their own
@@ -36,6 +37,23 @@ def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result
     assert (whole.folder / "estimate-bps/model.json").is_file()
     assert "The model holds on the held-out log" in whole.report.verdict
     assert stages[4]["result"]["model"].startswith("estimate-bps")
+
+
+def test_the_ledger_begins_with_no_model(whole: Outcome[run.Result]) -> None:
+    """The torque itself, the rigid body alone, then with friction: each line builds on the one before, and every joint gains."""
+    nothing, rigid, friction = ledger_lines(whole.result.groups[0])
+    assert (nothing.before, rigid.before, friction.before) == (None, nothing.rms, rigid.rms)
+    assert all(f < r < n for n, r, f in zip(nothing.rms, rigid.rms, friction.rms, strict=True))
+    tables = next(section for section in whole.report.sections if section.title.startswith("Ledger")).tables
+    assert [row[0] for row in tables[0].rows] == [line.step for line in (nothing, rigid, friction)]
+
+
+def test_what_to_record_is_said(whole: Outcome[run.Result]) -> None:
+    """No frf log is there: the report says what recording would bring it."""
+    lacking = next(section for section in whole.report.sections if section.title == "What these logs lack")
+    (row,) = lacking.tables[0].rows
+    assert row[1] == "frf"
+    assert "let one joint turn" in str(row[3])
 
 
 def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:

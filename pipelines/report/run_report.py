@@ -1,14 +1,17 @@
-"""The report of a run: the verdict, one table of all stages, what diagnosis says, then every other stage's report."""
+"""The report of a run: the verdict, the ledger of all steps, what the logs lack, what diagnosis says, then every other stage."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
 
+from pipelines.errors import NothingMatched
 from pipelines.log.places import slug
+from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.run_result import Group, Result
+from pipelines.report.run_ledger import ledger_lines, ledger_section
+from pipelines.report.run_result import Group, Result, Step
 
 __all__ = ["run_report"]
 
@@ -16,24 +19,47 @@ _WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
 
 
 def run_report(result: Result) -> Report:
-    """The worst verdict first, one table of all stages, what diagnosis says, then every other stage's report."""
+    """The answer before its sources."""
     steps = [(group.name, step) for group in result.groups for step in group.stages]
     tone = max((step.report.tone for _, step in steps), key=_WORST.index)
     verdicts = [text for group in result.groups for text in _verdicts(group)]
-    table = Table(("logs", "stage", "verdict"), tuple((name or "all", step.name, step.report.verdict) for name, step in steps),
-                  caption="Each stage in the order it was run.", tones=tuple(step.report.tone for _, step in steps))
     single = len(steps) == 1
-    sections = [Section("Stages", tables=(table,))] if not single else []
-    for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):  # the answer before its sources
+    sections = [] if single else [section for section in (
+        ledger_section([(group.name, ledger_lines(group)) for group in result.groups]), _stages(steps), _lacking(steps)) if section]
+    for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):
         sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
-    return Report("Run", " ".join(verdicts), tone, steps[0][1].report.key_figures if single else None, tuple(sections))
+    return Report("Run", " ".join(verdicts), tone, _key_figures([step for _, step in steps]), tuple(sections))
 
 
 def _verdicts(group: Group) -> list[str]:
-    """What the last stage that had a result says, after whatever is not in order before it."""
-    last = max((i for i, step in enumerate(group.stages) if step.result is not None), default=-1)
-    shown = [step for i, step in enumerate(group.stages) if i == last or step.report.tone in ("attention", "bad")]
+    """What diagnosis says, then the extended model, then whatever is not in order; without these, what the last stage says."""
+    done = [step for step in group.stages if step.result is not None]
+    answers = [step for kind in (Diagnosis, Extension) for step in done if isinstance(step.result, kind)]
+    others = [step for step in group.stages if step not in answers and step.report.tone in ("attention", "bad")]
+    shown = [*answers, *others] or done[-1:]
     return [f"{group.name}: {step.report.verdict}" if group.name else step.report.verdict for step in shown]
+
+
+def _key_figures(steps: list[Step]) -> Table | None:
+    """Those of the diagnosis, where there is one alone; of a single stage its own."""
+    found = [step for step in steps if isinstance(step.result, Diagnosis)] if len(steps) > 1 else steps
+    return found[0].report.key_figures if len(found) == 1 else None
+
+
+def _stages(steps: Iterable[tuple[str, Step]]) -> Section:
+    steps = list(steps)
+    table = Table(("logs", "stage", "verdict"), tuple((name or "all", step.name, step.report.verdict) for name, step in steps),
+                  caption="Each stage in the order it was run.", tones=tuple(step.report.tone for _, step in steps))
+    return Section("Stages", tables=(table,))
+
+
+def _lacking(steps: Iterable[tuple[str, Step]]) -> Section | None:
+    """What was passed over for want of a recording, and which one would bring it."""
+    rows = tuple((name or "all", step.name, check.message, check.remedy) for name, step in steps
+                 if step.exit == NothingMatched.exit_code for check in step.checks)
+    if not rows:
+        return None
+    return Section("What these logs lack", (), (Table(("logs", "stage", "why it was passed over", "what to record"), rows),))
 
 
 def _titled(sections: Iterable[Section], prefix: str) -> list[Section]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipelines import diagnose, run
 from pipelines.errors import UsageError
 from pipelines.log.model_file import read_model
+from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, session, written
 
@@ -31,6 +33,12 @@ def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
     answer = next(k for k, title in enumerate(titles) if "Cogging at joint 2" in title)
     sources = [k for k, title in enumerate(titles) if title.startswith("inspect")]
     assert "Stages" in titles[:answer]
+    effect, extended = ledger_lines(outcome.result.groups[0])
+    gain = outcome.result.stages[1].result.findings[0].gain.validate_torque_rms
+    assert (effect.stage, extended.stage, effect.sure) == ("diagnose", "extend", True)
+    assert effect.gain == pytest.approx(100.0 * (1.0 - np.linalg.norm(gain.after) / np.linalg.norm(gain.before)))
+    assert effect.gain is not None
+    assert effect.gain > 20.0
     assert all(answer < k for k in sources)  # the answer before its sources
     model = read_model(outcome.folder / "extend/model.json")
     assert [(one.effect, one.joint) for one in model.effects] == [("cogging", 2)]

@@ -1,0 +1,154 @@
+"""The ledger of a run: what every step of the model brings on held-out logs, from no model at all to every effect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.result import Diagnosis, Gain
+from pipelines.model.estimation.result import Result as Estimate
+from pipelines.report import style
+from pipelines.report.diagnosis_words import cause_at, title_of
+from pipelines.report.report import Figure, Section, Table, Tone
+from pipelines.report.run_result import Group
+from pipelines.report.style import format_number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+__all__ = ["Line", "ledger_lines", "ledger_section"]
+
+_COLOURS = (style.BLUE, style.VERMILLION, style.GREEN)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One step of the model: its held-out torque error, joint by joint, and what it was judged beside."""
+
+    step: str
+    stage: str  # that computed it
+    rms: tuple[float, ...]  # [N m] held-out torque error with this step
+    before: tuple[float, ...] | None  # without it, on the same equations; None: there is nothing before it
+    sure: bool | None  # whether the gain is beyond its bootstrap interval; None: nobody has drawn one
+    tip: tuple[float, float] | None = None  # [m] simulated tip error before and after
+
+    @property
+    def gain(self) -> float | None:
+        """[%] of the error of all joints together that it takes away."""
+        if self.before is None:
+            return None
+        before = math.sqrt(sum(x * x for x in self.before))
+        return 100.0 * (1.0 - math.sqrt(sum(x * x for x in self.rms)) / before) if before > 0.0 else None
+
+
+def ledger_lines(group: Group) -> tuple[Line, ...]:
+    """Every step that a group's stages have judged on held-out logs, in the order in which the model grows."""
+    return tuple(line for step in group.stages for line in _of(step.result, step.name))
+
+
+def _of(result: Any, stage: str) -> Iterator[Line]:
+    if isinstance(result, Estimate):
+        yield from _nominal(result, stage)
+    elif isinstance(result, Diagnosis):
+        for one in result.findings:
+            if _whole(one.gain):
+                yield _with(f"+ {title_of(one.cause)} ({cause_at(one.cause, one.joint)})", stage, one.gain)
+    elif isinstance(result, Extension) and result.gain is not None and result.accepted and _whole(result.gain):
+        named = ", ".join(cause_at(one.cause, one.joint) for one in result.findings)
+        yield _with(f"the model with {named}, everything refitted", stage, result.gain)
+
+
+def _nominal(result: Estimate, stage: str) -> Iterator[Line]:
+    """No model, the rigid body alone, with friction."""
+    nothing, whole = result.torque_signal_rms["validate"], result.torque_rms["validate"]
+    yield Line("no model: the torque itself", stage, nothing, None, None)
+    alone = result.rigid_body_alone
+    if alone is not None:
+        yield Line("rigid body", stage, alone, nothing, None)
+    friction = "+ friction, as fit-friction found it" if result.friction == "given" else "+ Coulomb and viscous friction"
+    yield Line(friction, stage, whole, alone if alone is not None else nothing, None)
+
+
+def _with(step: str, stage: str, gain: Gain) -> Line:
+    torque, tip = gain.validate_torque_rms, gain.tip_error_rms
+    sure = bool(np.any(np.asarray(torque.ci95)[:, 1] < 0.0))
+    return Line(step, stage, tuple(map(float, torque.after)), tuple(map(float, torque.before)), sure,
+                None if tip is None else (tip.before, tip.after))
+
+
+def _whole(gain: Gain) -> bool:
+    """Whether the gain is one in torque: what is found by frequency responses alone need not have one."""
+    return bool(np.isfinite(gain.validate_torque_rms.after).all() and np.isfinite(gain.validate_torque_rms.before).all())
+
+
+def ledger_section(groups: Sequence[tuple[str, tuple[Line, ...]]]) -> Section | None:
+    """The table and its picture; None where no step was judged."""
+    told = [(name, lines) for name, lines in groups if lines]
+    if not told:
+        return None
+    joints = max(len(line.rms) for _, lines in told for line in lines)
+    several = len(groups) > 1
+    rows, tones = [], list[Tone]()
+    for name, lines in told:
+        for line in lines:
+            errors = [_rounded(line.rms[j]) if j < len(line.rms) else None for j in range(joints)]
+            rows.append((*((name,) if several else ()), line.step, *errors, _rounded(line.gain, 1), _judged(line), _tip(line)))
+            tones.append("attention" if line.sure is False else "good" if line.sure else "neutral")
+    heads = (*(("logs",) if several else ()), "step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain [%]", "beyond chance",
+             "simulated tip [mm]")
+    text = ("Torque error on what nothing was fitted to, root mean square, with each step of the model. A gain is that of all "
+            "joints together over the line it builds on.", _compared(told))
+    return Section("Ledger: what every step brings on held-out logs", text, (Table(heads, tuple(rows), tones=tuple(tones)),),
+                   tuple(_picture(name, lines, several) for name, lines in told))
+
+
+def _compared(told: Sequence[tuple[str, tuple[Line, ...]]]) -> str:
+    """Which lines may be laid beside each other."""
+    stages = list(dict.fromkeys(line.stage for _, lines in told for line in lines))
+    if len(stages) < 2:
+        return f"All of them are {stages[0]}'s."
+    return (f"The lines are {', '.join(stages[:-1])}'s and {stages[-1]}'s, in this order. Each stage filters and thins out the "
+            "torque in its own way: lines of one stage can be compared with each other, those of two only roughly.")
+
+
+def _rounded(x: float | None, decimals: int | None = None) -> float | None:
+    if x is None or not math.isfinite(x):
+        return None
+    return round(x, decimals) if decimals is not None else float(f"{x:.3g}")
+
+
+def _judged(line: Line) -> str:
+    return "–" if line.sure is None else "yes, 95 %" if line.sure else "no"
+
+
+def _tip(line: Line) -> str:
+    if line.tip is None:
+        return "–"
+    return f"{format_number(1e3 * line.tip[0], 2)} → {format_number(1e3 * line.tip[1], 2)}"
+
+
+def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
+    joints = len(lines[0].rms)
+
+    def draw(drawing: Drawing) -> None:
+        axes = drawing.subplots()
+        places = np.arange(len(lines))
+        for j in range(joints):
+            errors = [line.rms[j] if j < len(line.rms) else math.nan for line in lines]
+            axes.plot(errors, places, marker="o", markersize=4.0, linewidth=1.0, color=_COLOURS[j % len(_COLOURS)],
+                      alpha=1.0 if j < len(_COLOURS) else 0.5, label=f"joint {j + 1}")
+        axes.set_xscale("log")
+        style.log_ticks(axes.xaxis)
+        axes.set_yticks(list(places), [line.step if len(line.step) < 48 else f"{line.step[:47]}…" for line in lines], fontsize=7)
+        axes.invert_yaxis()
+        axes.set_xlabel("held-out torque error [N m]")
+        axes.legend(fontsize=7)
+
+    of = f" of {name}" if several else ""
+    caption = f"Held-out torque error{of} with each step of the model; to the left is better."
+    return Figure(f"ledger-{name}" if several else "ledger", caption, draw, (6.0, 1.2 + 0.28 * len(lines)))
