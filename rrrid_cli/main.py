@@ -13,10 +13,10 @@ from typing import Any, NoReturn
 
 import typer
 
+from pipelines.batch.process import economise
 from pipelines.errors import Interrupted, RrridError
 from rrrid_cli.commands import app
 from rrrid_cli.console import say_error
-from rrrid_cli.process import economise
 from rrrid_cli.usage import WrongUsage, as_error
 
 __all__ = ["entry"]

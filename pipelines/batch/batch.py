@@ -27,7 +27,7 @@ from pipelines.batch.record import Record, fresh, intact
 from pipelines.batch.signals import Listener
 from pipelines.batch.summary import Summary, result_object, summary_report
 from pipelines.batch.work import undone
-from pipelines.errors import Check, EnvironmentFault, RrridError, UsageError
+from pipelines.errors import Check, EnvironmentFault, UsageError
 from pipelines.log.model_file import ModelFile, read_model
 from pipelines.log.places import keep_apart, slug, tilde
 from pipelines.stage import Outcome
@@ -133,7 +133,7 @@ class _Done:
         self.records: dict[str, Record] = {}
         self.notices: list[Check] = []
         self.kept = 0
-        self.fault: RrridError | None = None  # the output cannot be written
+        self.fault: EnvironmentFault | None = None  # no output can be written, or nobody can do the work
         self.aborted = False
 
     def go(self, items: Sequence[Item]) -> None:
@@ -142,12 +142,17 @@ class _Done:
         self.kept = len(self.records)
         if self.kept:
             self.wanted.tell(f"{self.kept} of {len(items)} are done already")
-        if not left:
-            return
+        if left:
+            try:
+                self._through(left, len(items))
+            except EnvironmentFault as problem:  # no workers, or none any more: what is done is done
+                self.fault = problem
+
+    def _through(self, left: Sequence[Item], total: int) -> None:
         with closing(self._results(left)) as results:
             for item, record in results:
                 self._take(item, record)
-                self.wanted.tell(f"{len(self.records)} of {len(items)}: {record.name} {record.status}")
+                self.wanted.tell(f"{len(self.records)} of {total}: {record.name} {record.status}")
                 if self.stopped():
                     break
 

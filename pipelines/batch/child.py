@@ -23,8 +23,9 @@ from typing import Any
 from pipelines.batch.items import Item
 from pipelines.batch.plan import Plan, read_plan
 from pipelines.batch.pool import crashed, timed_out
+from pipelines.batch.process import one_thread
 from pipelines.batch.record import Record, read_record
-from pipelines.batch.work import attempt, begin, one_thread, undone
+from pipelines.batch.work import attempt, begin, undone
 from pipelines.errors import EnvironmentFault
 
 __all__ = ["Child", "item_of", "serve", "words_of"]

@@ -7,6 +7,7 @@ that has been with several dead workers is failed, never lost.
 from __future__ import annotations
 
 import contextlib
+import queue
 import threading
 from collections.abc import Callable, Generator, Sequence
 from typing import Any
@@ -21,6 +22,7 @@ from pipelines.errors import EnvironmentFault, UsageError
 __all__ = ["cluster"]
 
 _SECONDS = 10.0  # to reach the scheduler
+_LOOK = 0.2  # [s] between two looks at whether to stop
 _mine = threading.local()
 
 
@@ -43,9 +45,10 @@ def cluster(address: str, plan: Plan, key: str, items: Sequence[Item],
         try:
             yield from _gathered(client, futures, plan, key, stopped)
         finally:
-            with contextlib.suppress(OSError, RuntimeError):
-                client.cancel(list(futures), force=True)
-                client.run(_release, key, wait=False)
+            if client.status == "running":
+                with contextlib.suppress(OSError, RuntimeError):
+                    client.cancel(list(futures), force=True)
+                    client.run(_release, key, on_error="ignore")
 
 
 def _client(address: str) -> Any:
@@ -68,21 +71,19 @@ def _client(address: str) -> Any:
 def _gathered(client: Any, futures: dict[Any, Item], plan: Plan, key: str,
               stopped: Callable[[], bool]) -> Generator[tuple[Item, Record], None, None]:
     """Futures as they are done; a look at `stopped` and at the scheduler every now and then."""
-    import distributed
-
-    wait: Any = distributed.wait
-    left = set(futures)
+    ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    for future in futures:
+        future.add_done_callback(ended.put)
+    left = len(futures)
     while left and not stopped():
-        if client.status != "running":
+        future = None
+        with contextlib.suppress(queue.Empty):
+            future = ended.get(timeout=_LOOK)
+        if client.status != "running" or (future is not None and future.status == "cancelled"):
             raise EnvironmentFault("P04", "the scheduler went away", where="--backend",
                                    remedy="start it again, and go on with --resume")
-        with contextlib.suppress(distributed.TimeoutError):
-            wait(left, timeout=0.2, return_when="FIRST_COMPLETED")
-        for future in [one for one in left if one.done()]:
-            left.remove(future)
-            if future.status == "cancelled":  # lost with the connection
-                raise EnvironmentFault("P04", "the scheduler went away", where="--backend",
-                                       remedy="start it again, and go on with --resume")
+        if future is not None:
+            left -= 1
             yield futures[future], _outcome(future, futures[future], plan, key)
 
 

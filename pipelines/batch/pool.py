@@ -13,8 +13,9 @@ from typing import Any
 
 from pipelines.batch.items import Item
 from pipelines.batch.plan import Plan, plan_text
+from pipelines.batch.process import one_thread
 from pipelines.batch.record import Record
-from pipelines.batch.work import attempt, begin, one_thread, undone
+from pipelines.batch.work import attempt, begin, undone
 from pipelines.errors import EnvironmentFault
 
 __all__ = ["crashed", "local", "timed_out"]
@@ -55,9 +56,9 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
 
 
 def _main() -> list[str]:
-    """What every worker imports again of the program that runs: a file, or a module by its name."""
-    spec = getattr(sys.modules["__main__"], "__spec__", None)
-    return ["__main__"] if spec is None else [spec.name]
+    """What every worker imports again: the program that runs, where it is a file."""
+    # A module that was started by its name (python -m) would complain of having been imported before.
+    return ["__main__"] if getattr(sys.modules["__main__"], "__spec__", None) is None else []
 
 
 def _begin(text: str, key: str) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 from pipelines.batch.figures import fitted, residuals
 from pipelines.batch.items import Item
 from pipelines.batch.plan import Plan, load_stage, read_plan
+from pipelines.batch.process import economise
 from pipelines.batch.record import Record, Status, relative
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, RrridError, clean
 from pipelines.log.files import PROVENANCE, hash_file
@@ -27,9 +28,9 @@ from pipelines.log.guard import die_with_parent
 from pipelines.log.places import renamed, tilde
 from pipelines.stage import Inputs, Outcome, Request, Stage, run_stage
 
-__all__ = ["attempt", "begin", "one_thread", "undone"]
+__all__ = ["attempt", "begin", "undone"]
 
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_LAZY = 3  # items, until everything that is imported late is there
 
 
 @dataclasses.dataclass
@@ -39,21 +40,16 @@ class _Warm:
     plan: Plan
     stage: Stage[Any, Any]
     key: str
+    done: int = 0
 
 
 _warm: list[_Warm] = []
 
 
-def one_thread() -> None:
-    """One BLAS thread a process, for this one's children: with as many processes as cores, more only stand in each other's way."""
-    for name in _THREADS:
-        os.environ.setdefault(name, "1")
-
-
 def begin(text: str, key: str) -> None:
     """Make this process ready for the items of a plan, whose key is known."""
     die_with_parent()
-    one_thread()
+    economise()
     plan = read_plan(text)
     if plan.folder:
         os.chdir(plan.folder)
@@ -61,8 +57,6 @@ def begin(text: str, key: str) -> None:
     _warm[:] = [_Warm(plan, stage, key)]
     if plan.options.memory is not None:
         _limit_memory(plan.options.memory)
-    # What is imported stays: the search for cycles after each item need not look at it.
-    gc.freeze()
 
 
 def _limit_memory(memory: int) -> None:
@@ -86,7 +80,15 @@ def attempt(item: Item) -> Record:
     except Exception as problem:  # one item's misfortune, told with its trace; nothing may end the worker but a crash
         return dataclasses.replace(undone(item, problem, warm.plan, warm.key), trace=traceback.format_exc())
     finally:
-        gc.collect()
+        _tidy(warm)
+
+
+def _tidy(warm: _Warm) -> None:
+    """Take away what the item left in cycles. What is imported stays, and is not looked at again: that would take 40 ms an item."""
+    gc.collect()
+    warm.done += 1
+    if warm.done <= _LAZY:
+        gc.freeze()
 
 
 def _done(item: Item, warm: _Warm, began: float) -> Record:

@@ -36,7 +36,7 @@ def test_normal_scatter_is_no_drift() -> None:
     assert np.mean([abs(far) > 3.0 for course in courses for far in course.away]) < 0.006
 
 
-def test_a_step_is_dated(lay: Lay) -> None:
+def test_a_step_is_dated() -> None:
     """Six std in one item: that one has moved, by about as much, no other is blamed for it, and χ² says that something did."""
     values = 1.0 + STD * np.random.default_rng(2).normal(size=10)
     values[6] += 6.0 * STD
@@ -70,7 +70,7 @@ def test_a_residual_is_judged_by_the_scatter_of_most() -> None:
     assert course([0.10, 0.11, 0.09, 1.0]) == ()
 
 
-def test_robots_are_not_mixed(lay: Lay) -> None:
+def test_robots_are_not_mixed() -> None:
     """Two arms differ by nature."""
     records = [Record(f"{robot}{i}", f"{robot}{i}", "ok", 0, figures={"p1": (value, STD, "kg m^2")}, robot=robot)
                for robot, value in (("a", 1.0), ("b", 2.0)) for i in range(3)]

@@ -1,4 +1,4 @@
-"""Set up the process of one command: threads, garbage, memory. What a run of half a second would spend on them, a fifth, is saved.
+"""Set up the process of a command, or of a worker: threads, garbage, memory. Of a run of half a second it saves a fifth.
 
     economise()      first of all, before NumPy is loaded
 """
@@ -10,7 +10,7 @@ import ctypes
 import gc
 import os
 
-__all__ = ["economise"]
+__all__ = ["economise", "one_thread"]
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _OBJECTS = 100_000  # made since the last search for cycles, before the next
@@ -21,9 +21,7 @@ _KEPT = 64 << 20  # [B] free memory at most
 
 def economise() -> None:
     """One BLAS thread, few searches for cycles, memory of arrays used again."""
-    # Default threading makes the many small solves 5-10 times slower (design.md).
-    for name in _THREADS:
-        os.environ.setdefault(name, "1")
+    one_thread()
     # Modules stay and arrays go by reference counts: to look for cycles among them at every 700th object costs 30 ms,
     # and again at the very end, when all goes anyway.
     gc.set_threshold(_OBJECTS, 20, 20)
@@ -33,3 +31,10 @@ def economise() -> None:
     if mallopt is not None:
         mallopt(_M_MMAP_THRESHOLD, _ARRAY)
         mallopt(_M_TRIM_THRESHOLD, _KEPT)
+
+
+def one_thread() -> None:
+    """One BLAS thread, here and in every process made from here. Default threading makes the many small solves 5-10 times slower
+    (design.md), and beside as many processes as cores more threads only stand in each other's way."""
+    for name in _THREADS:
+        os.environ.setdefault(name, "1")
