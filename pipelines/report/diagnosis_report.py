@@ -17,7 +17,7 @@ from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
 
-__all__ = ["diagnosis_report", "finding_section", "gain_table"]
+__all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
 _LEDGER = 40  # lines
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
@@ -25,7 +25,8 @@ _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    found = [finding_section(number, one) for number, one in enumerate(result.findings, 1)]
+    found = [section for number, one in enumerate(result.findings, 1)
+             for section in (finding_section(number, one), numbers_section(number, one))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
                 *_limits(result), _basis(result), *_doctor(result)]
     return Report("Diagnosis", _verdict(result), _TONES[result.verdict],
@@ -64,7 +65,7 @@ def _rounded(x: float) -> float | None:
 
 
 def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
-    """What it is, what to check, what it is worth, its proof; `offer` says how to extend the model by it."""
+    """What it is, what to check, what it is worth, and the figure that proves it; `offer` says how to extend the model by it."""
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one)]
     if one.origin == "frequency responses":
@@ -76,10 +77,14 @@ def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
     if one.rivals:
         names = ", ".join(f"{cause_at(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
-    tables = [_numbers(one),
-              gain_table(one.gain, "Gain on held-out time, root mean square, beside the findings before it.")]
-    return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text), tuple(tables),
-                   tuple(proof_figures(number, one)))
+    return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text),
+                   figures=tuple(proof_figures(number, one)))
+
+
+def numbers_section(number: int, one: Finding) -> Section:
+    """What was identified and what it gains, joint by joint: behind the figure that proves it."""
+    return Section(f"{number}. In numbers", (), (_numbers(one), gain_table(
+        one.gain, "Gain on held-out time, root mean square, beside the findings before it.")))
 
 
 def _frequency(one: Finding) -> float:

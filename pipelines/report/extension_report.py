@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipelines.model.diagnosis.outcome import Extension
-from pipelines.report.diagnosis_report import finding_section, gain_table
+from pipelines.report.diagnosis_report import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_words import cause_at, held_out_words, title_of, torque_errors
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
@@ -15,7 +15,8 @@ __all__ = ["extension_report"]
 def extension_report(result: Extension) -> Report:
     """Verdict, key figures, one section a cause, what was refused."""
     tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
-    sections = [finding_section(number, one, offer=False) for number, one in enumerate(result.findings, 1)]
+    sections = [section for number, one in enumerate(result.findings, 1)
+                for section in (finding_section(number, one, offer=False), numbers_section(number, one))]
     if result.rejected:
         rows = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
         sections.insert(0, Section("Not accepted", ("The held-out logs do not bear it out. There is no way around that.",),

@@ -171,13 +171,15 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     pictures = (evidence(plain, floored.rms, floored.twin, None),) if chosen.evidence else ()
     harmful = tuple(Rejected(part.acting.effect.name, part.acting.effect.joint, f"named by frequency responses, but the model goes "
                              f"without it: {part.doubt}") for part in parts if part.doubt)
-    arm = extended_arm(found, ruling)
+    arm, held_ones = extended_arm(found, ruling), {part.acting for part in parts}
+    standing = [one for one in case.beside if one not in held_ones]
     return Diagnosis(
         ruling.verdict, _sentence(ruling, named), named, (), (*harmful, *rejected(found, ruling)), limits,
         (*first.undecided, *hidden, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
-        0 if floored.twin is None else len(floored.twin.fits), floored.noise, plain.model.arm, acted(arm, case.beside))
+        0 if floored.twin is None else len(floored.twin.fits), floored.noise, acted(plain.model.arm, standing),
+        acted(arm, case.beside))
 
 
 def _sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:

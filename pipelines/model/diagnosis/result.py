@@ -253,5 +253,5 @@ class Diagnosis:
     evidence: tuple[Evidence, ...]
     replicas: int  # of the twin; 0 without
     noise: Array  # [N m] of the drives, as the twin has it; NaN without
-    nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding
+    nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding, with what stands
     extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects

@@ -26,7 +26,7 @@ def with_simulation(found: Diagnosis, logs: Sequence[ExperimentLog]) -> Diagnosi
     for log in logs:
         try:
             error = _error(found.nominal, log)
-            more = _error(found.extended, log) if found.extended is not None and found.extended.effects else None
+            more = _error(found.extended, log) if found.extended is not None and found.findings else None
         except InputRejected:  # no controller, or a model that runs away
             continue
         t = log.t[:len(error)] - log.t[0]

@@ -15,6 +15,7 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import effect_names
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import arm, hidden
+from tests.model.estimation.experiments import motion_of
 
 TRIED = ("quadratic_drag", "torque_offset", "payload")
 SETTINGS = DiagnosisSettings(without=tuple(name for name in effect_names() if name not in TRIED), evidence=False, limits=False)
@@ -62,6 +63,34 @@ def test_a_load_at_the_tip_is_named_by_the_base_parameters(loaded: Diagnosis) ->
     assert mass.value == pytest.approx(MASS, rel=0.03)
     assert loaded.verdict == "cause"
     assert loaded.findings[0].origin == "base parameters"
+
+
+def test_the_load_is_worth_what_it_weighs_and_the_model_has_it_apart(loaded: Diagnosis) -> None:
+    """Without it the held-out torque is far off. The model's base parameters are those of the bare arm, the load is an effect."""
+    gain = loaded.findings[0].gain.validate_torque_rms
+    assert (gain.ci95[:, 1] < 0.0).any()
+    assert np.linalg.norm(gain.after) < 0.2 * np.linalg.norm(gain.before)
+    assert loaded.extended is not None
+    assert loaded.extended.effects[-1].place == "payload"
+    motion = hidden_motion()
+    true, bare, whole = (one.body.torque(motion.q, motion.dq, motion.ddq, one.p) for one in
+                         (arm(), loaded.extended, loaded.extended.with_body(loaded.extended.body, loaded_parameters(loaded))))
+    assert np.linalg.norm(bare - true) < 0.02 * np.linalg.norm(true)
+    assert np.linalg.norm(whole - true) > 0.1 * np.linalg.norm(true)
+
+
+def hidden_motion() -> Motion:
+    return motion_of(3)(np.arange(2000) * 4e-3)
+
+
+def loaded_parameters(found: Diagnosis) -> Array:
+    """Base parameters of the bare arm and its load together, by the torque that they make."""
+    assert found.extended is not None
+    motion, body = hidden_motion(), found.extended.body
+    torque = found.extended.nominal.extended(found.extended.effects[-1]).torque(motion) - found.extended.friction_torque(motion)
+    solved, *_ = np.linalg.lstsq(body.regressor(motion.q, motion.dq, motion.ddq).reshape(-1, len(body.parameters)), torque.ravel(),
+                                 rcond=None)
+    return np.asarray(solved)
 
 
 def test_what_was_there_before_stands(loaded: Diagnosis) -> None:
