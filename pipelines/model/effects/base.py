@@ -150,6 +150,7 @@ class Hooks:
     """
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
+    alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based) in plain numbers: `Effect.own_load`
     actuator: Callable[[Array, Motion, Array], Array] | None = None  # command, motion, states -> applied torque [N m]
     sensor: Callable[[Array, Array], Array] | None = None  # true q, states -> measured q [rad]
     inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)

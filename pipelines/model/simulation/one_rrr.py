@@ -120,7 +120,7 @@ def _compiled(plant: Plant, h: float) -> _Step:
     """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, u1, u2, u3) -> the first six after it."""
     numbers = _numbers(plant)
     stages = {name: _ACCELERATION.format(**numbers, **_names(plant, *letters)) for name, letters in _STAGES.items()}
-    loads = tuple(own[1] for own in plant.own_loads if own is not None)
+    loads = tuple(load for _, load in plant.own_loads)
     unpacked = f"    {', '.join(f'load{k}' for k in range(len(loads)))}, = loads" if loads else ""
     text = _STEP.format(**stages, unpacked=unpacked, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))
     scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, "loads": loads}
@@ -144,7 +144,7 @@ def _numbers(plant: Plant) -> dict[str, str]:
 
 def _names(plant: Plant, position: str, speed: str, slope: str) -> dict[str, str]:
     """The variables of one stage, and friction with the loads of single joints as text over them."""
-    loads = [own[0] for own in plant.own_loads if own is not None]
+    loads = [joint for joint, _ in plant.own_loads]
     names = {f"{kind}{k}": f"{letter}{k}" for kind, letter in (("q", position), ("v", speed), ("a", slope)) for k in (1, 2, 3)}
     curves = plant.curves
     for j in range(3):

@@ -10,7 +10,7 @@ Effects enter through their hooks, in the order in which they act; what is frict
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -41,7 +41,6 @@ class Plant:
     hooks: tuple[Hooks, ...]  # of all other effects
     needed: Callable[[Motion], Array]  # torque that a motion at the start needs [N m], for memories that are not empty
     records: tuple[Callable[[Array, Array], Array], ...] = ()  # what comes between a command and the log
-    own_loads: tuple[tuple[int, OwnLoad] | None, ...] = ()  # of the hooks whose load follows from their own joint (0-based) alone
 
     @classmethod
     def of(cls, arm: Arm, p: Array | None = None) -> Plant:
@@ -53,7 +52,7 @@ class Plant:
         if p is not None and (p.ndim != 2 or p.shape[1] != len(arm.p)):
             raise ValueError(f"p has the shape {p.shape}, wanted is (replicas, {len(arm.p)})")
         rigid, acting_on = Arm(arm.name, arm.body, arm.base), cast("ArmModel", arm.nominal)
-        curves, hooks, alone, records, added = [], [], [], [], np.zeros((arm.n_joints, arm.n_joints))
+        curves, hooks, records, added = [], [], [], np.zeros((arm.n_joints, arm.n_joints))
         laws = [(law, True) for law in arm.friction]
         for acting, friction in (*laws, *((effect, False) for effect in arm.effects)):
             curve = acting.effect.speed_curve(acting.values)
@@ -65,12 +64,12 @@ class Plant:
             added = added if own.inertia is None else added + own.inertia
             records += [own.record] if own.record else []
             if any((own.load, own.actuator, own.sensor, own.settled, own.states)):
-                hooks.append(own)
-                load = acting.effect.own_load(acting.values)
-                alone.append(None if load is None or acting.effect.joint is None else (acting.effect.joint - 1, load))
+                load = None if own.actuator or own.states else acting.effect.own_load(acting.values)
+                alone = None if load is None or acting.effect.joint is None else (acting.effect.joint - 1, load)
+                hooks.append(replace(own, alone=alone))
         parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
         return cls(acting_on.body, parameters, added, stacked(curves, arm.n_joints), tuple(hooks), arm.nominal.torque,
-                   tuple(records), tuple(alone))
+                   tuple(records))
 
     @property
     def n_joints(self) -> int:
@@ -85,8 +84,12 @@ class Plant:
     @property
     def plain(self) -> bool:
         """Whether nothing moves it but rigid body, friction, and loads of single joints: no hook has to be asked on the way."""
-        return all(own is not None or not any((hook.load, hook.actuator, hook.states))
-                   for hook, own in zip(self.hooks, self.own_loads, strict=True))
+        return all(hook.alone is not None or not any((hook.load, hook.actuator, hook.states)) for hook in self.hooks)
+
+    @property
+    def own_loads(self) -> tuple[tuple[int, OwnLoad], ...]:
+        """Loads that follow from angle and speed of one joint (0-based) alone."""
+        return tuple(hook.alone for hook in self.hooks if hook.alone is not None)
 
     def refuse_unphysical(self, q: Array) -> None:
         """Look at the inertia matrix in the postures q (postures, joints).
