@@ -31,6 +31,11 @@ def environment_faults(path: Path) -> Iterator[None]:
         raise
     except OSError as problem:
         raise fault_of(problem, path) from problem
+    except RuntimeError as problem:
+        # HDF5 cannot close a file whose last bytes found no room, and h5py says that instead of why.
+        if not isinstance(problem.__context__, OSError):
+            raise
+        raise fault_of(problem.__context__, path) from problem
 
 
 def fault_of(problem: OSError, path: Path) -> RrridError:

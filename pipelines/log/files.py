@@ -19,7 +19,7 @@ from pathlib import Path
 
 from pipelines.errors import Check, EnvironmentFault, InputRejected, NothingMatched, UsageError
 from pipelines.log import canonical
-from pipelines.log.atomic import fault_of, write_file
+from pipelines.log.atomic import environment_faults, fault_of, write_file
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.guard import Answer, guarded
 from pipelines.log.joints import chosen
@@ -89,7 +89,7 @@ def open_log(path: Path | str, *, assume_units: bool = False, only: Collection[s
 def _open(path: Path, assume_units: bool, only: Collection[str] | None, joints: tuple[int, ...],
           robot: RobotDescription | None) -> Opened:
     status = regular_file(path)
-    with _reading(path) as handle:
+    with environment_faults(path), _reading(path) as handle:
         sha256 = hash_file(path)
         container, checks = _container(path, os.pread(handle, 8, 0), status.st_size)
         _against_manifest(path, sha256)

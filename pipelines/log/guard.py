@@ -24,6 +24,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from pipelines.errors import EnvironmentFault, InputRejected, RrridError, UsageError
+from pipelines.log.atomic import fault_of
 from pipelines.log.experiment import Array
 
 __all__ = ["Answer", "die_with_parent", "guarded"]
@@ -120,13 +121,16 @@ def _serve(work: Callable[[], Answer], send: int, store: int, budget: int, reade
             signal.signal(number, signal.SIG_IGN)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPPING)
         lowered = _limit_memory(budget)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # HDF5 prints its error stack there
         faulthandler.disable()  # a crash here is the parent's to tell
         try:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # HDF5 prints its error stack there
             answer = work()
             reply: dict[str, Any] = {"about": answer.about, "arrays": _store(answer.arrays, store)}
         except RrridError as problem:
             reply = {"error": {"exit": problem.exit_code, **problem.as_dict()}}
+        except OSError as problem:  # of the machine: what a file does to its library, `work` has told
+            fault = fault_of(problem, Path())
+            reply = {"error": {"exit": fault.exit_code, **fault.as_dict(), "where": ""}}
         except MemoryError:
             reply = {"error": {"where": "", "remedy": "split the recording", **(
                 {"exit": 6, "code": "RRID-P03", "message": "memory: reading it needs more than this process may use"}
