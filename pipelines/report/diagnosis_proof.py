@@ -23,8 +23,8 @@ def proof_figures(number: int, one: Finding) -> Iterator[Figure]:
     proof = one.proof
     if proof is None:
         return
-    yield Figure(f"proof-{number}", f"Residual of joint {proof.joint} over {proof.against}: without the finding it follows what "
-                 "the finding predicts, with it nothing is left.",
+    yield Figure(f"proof-{number}", f"Residual of joint {proof.joint} over {proof.against}: where the finding holds, what is left "
+                 "without it follows what it predicts, and little is left with it.",
                  lambda drawing: draw_proof(drawing.subplots(), proof), (6.0, 3.2))
     yield Figure(f"proof-{number}-in-time", f"The same residual of joint {proof.joint} where the finding shows most, over time.",
                  lambda drawing: draw_proof_in_time(drawing.subplots(), proof), (6.0, 2.6))

@@ -83,8 +83,9 @@ def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
 
 def numbers_section(number: int, one: Finding) -> Section:
     """What was identified and what it gains, joint by joint: behind the figure that proves it."""
+    beside = "the findings before it" if one.origin in ("residual", "reversals") else "all other findings"
     return Section(f"{number}. In numbers", (), (_numbers(one), gain_table(
-        one.gain, "Gain on held-out time, root mean square, beside the findings before it.")))
+        one.gain, f"Gain on held-out time, root mean square, beside {beside}.")))
 
 
 def _frequency(one: Finding) -> float:

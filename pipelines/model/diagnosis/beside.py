@@ -2,7 +2,7 @@
 
     held = beside(case, prepared, effects)
     held.case, held.prepared       what is left to be explained: their torque is subtracted from every log
-    held.parts                     each effect with the model before and after it
+    done = judged(held, final)     when all else was found: what each effect is worth beside it
 
 What a soft base or a soft joint does to the torque hangs on the rigid arm, which is fitted anew, in turns. Their own numbers are
 refitted together with everything else where motion knows them: where the refit stays within what the responses allow.
@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.result import Gain
 from pipelines.model.diagnosis.search import Case, held_out_left
 from pipelines.model.parameter import Parameter
 
-__all__ = ["Held", "Part", "acted", "beside", "less", "torque_of"]
+__all__ = ["Held", "Judged", "Part", "acted", "beside", "judged", "less", "torque_of"]
 
 _ROUNDS = 2  # of the arm and the effects' torque in turns
 _STDS = 3.0  # of a response's number, that a refit may move it
@@ -37,12 +37,11 @@ _LOOSE = {"damping": 1.0, "damping_ratio": 1.0}  # the same of what both tell ba
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One effect, and the models without and with it."""
+    """One effect, and what it is worth beside everything else that was found."""
 
     acting: Acting
-    before: Refined
+    before: Refined  # without it
     after: Refined
-    left: tuple[Array, Array]  # (rows,) [N m] of held-out rows
     gain: Gain
     doubt: str  # why the model goes without it all the same; empty where it does not
 
@@ -53,37 +52,67 @@ class Held:
 
     case: Case
     prepared: Prepared
-    parts: tuple[Part, ...]
+    acting: tuple[Acting, ...] = ()
+    plain: Refined | None = None  # before anything was taken away; None where nothing was
+    judge: Data | None = None  # the held-out rows of that
 
 
 def beside(case: Case, prepared: Prepared, effects: Sequence[Acting]) -> Held:
     """One effect after the other; each is refitted, if it can be, to what those before it leave."""
-    parts: list[Part] = []
-    now = refine(case.model, case.data, case.weight) if effects else None
+    if not effects:
+        return Held(case, prepared)
+    plain, judge, own = refine(case.model, case.data, case.weight), case.judge, []
+    now = plain
     for acting in effects:
-        assert now is not None
-        own = _refitted(now, case, acting) or acting
-        there, ready = _with(case, prepared, own)
-        after = refine(there.model, there.data, there.weight)
-        part = _judged(own, now, after, case, there, prepared)
-        parts.append(part)
-        if not part.doubt:
-            case, prepared, now = there, ready, after
-    return Held(case, prepared, tuple(parts))
+        own.append(_refitted(now, case, acting) or acting)
+        case, prepared = _with(case, prepared, own[-1])
+        now = refine(case.model, case.data, case.weight)
+    return Held(case, prepared, tuple(own), plain, judge)
 
 
-def _judged(acting: Acting, before: Refined, after: Refined, case: Case, there: Case, prepared: Prepared) -> Part:
-    """What it is worth on held-out logs. Responses have named it: it need not prove itself again, but must do no harm."""
-    left = held_out_left(before, case.judge, case.blocks), held_out_left(after, there.judge, case.blocks)
-    data = after.data if case.judge is None else case.judge
-    torque = torque_gain_of(data, *left)
-    arms = [acted(one.model.arm, two.beside) for one, two in ((before, case), (after, there))]
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Every effect judged, and the model with those that do no harm."""
+
+    parts: tuple[Part, ...]
+    final: Refined
+    acting: tuple[Acting, ...]  # what it has beside its own effects
+    judge: Data | None
+
+
+def judged(held: Held, final: Refined) -> Judged:
+    """What each effect is worth beside all that was found since; `final` is the model with all of it.
+
+    Responses have named it, so that it need not prove itself again; but it must do no harm.
+    """
+    case, prepared = held.case, held.prepared
+    judge, every = prepared.judge, case.beside
+    parts = tuple(_part(one, held, final) for one in held.acting)
+    harmful = [part.acting for part in parts if part.doubt]
+    if not harmful:
+        return Judged(parts, final, every, judge)
+    arm, back = final.model.nominal, [one for one in every if one not in harmful]
+    data = less(final.data, -torque_of(harmful, arm, final.data))
+    rows = None if judge is None else less(judge, -torque_of(harmful, arm, judge))
+    return Judged(parts, refine(final.model, data, final.weight), tuple(back), rows)
+
+
+def _part(acting: Acting, held: Held, final: Refined) -> Part:
+    case, prepared = held.case, held.prepared
+    judge, arm = prepared.judge, final.model.nominal
+    data = less(final.data, -torque_of((acting,), arm, final.data))
+    there = None if judge is None else less(judge, -torque_of((acting,), arm, judge))
+    before = refine(final.model, data, final.weight)
+    left = held_out_left(before, there, case.blocks), held_out_left(final, judge, case.blocks)
+    rows = final.data if judge is None else judge
+    torque = torque_gain_of(rows, *left)
+    arms = [acted(before.model.arm, [one for one in case.beside if one != acting]), acted(final.model.arm, case.beside)]
     simulated = simulation_errors(arms, prepared.judging or prepared.motions)
-    weights = before.weight[data.joint]
+    weights = final.weight[rows.joint]
     worse = float(np.linalg.norm(left[1] * weights)) > float(np.linalg.norm(left[0] * weights))
     doubt = ("the held-out torque error is larger with it" if worse and (torque.ci95[:, 0] > 0.0).any()
-             else worse_log(data, *left) or farther(*simulated))
-    return Part(acting, before, after, left, gain_of(torque, *simulated), doubt)
+             else worse_log(rows, *left) or farther(*simulated))
+    return Part(acting, before, final, gain_of(torque, *simulated), doubt)
 
 
 def acted(arm: Arm, acting: Sequence[Acting]) -> Arm:

@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.beside import Held, acted
+from pipelines.model.diagnosis.beside import Held, acted, judged
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.compliance import Compliance, untold
@@ -71,7 +71,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
         there = _nameable(_case(slow, chosen), first.stiff)
         seen = provisional(there)
         if gap_first(seen[0]):
-            case, prepared, rough, first = there, slow, seen, replace(first, held=Held(there, slow, ()))
+            case, prepared, rough, first = there, slow, seen, replace(first, held=Held(there, slow))
     say("simulating the twin")
     floored = _floored(prepared, case, rough, chosen)
     say("looking for causes")
@@ -149,9 +149,11 @@ def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings) -> Diagnosis:
-    found, ruling, prepared, parts = done.found, done.ruling, first.held.prepared, first.held.parts
+    found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
-    plain = parts[0].before if parts else nominal  # nothing taken out for what responses name
+    plain = first.held.plain or nominal  # nothing taken out for what responses name
+    responded = judged(replace(first.held, case=case), found.final)
+    parts = responded.parts
     held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
     named = _strongest((*held, *findings(found, ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks,
                                          chosen.evidence)))
@@ -163,23 +165,21 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     limits = detectable(last.screened, thresholds, prepared.data.logs[0].log.robot.revolute) if chosen.limits else ()
     hidden = not_testable(prepared.data, nominal.fit, nominal.model.columns, found.steps[0].screened, nominal.model.arm,
                           bool(prepared.referring), chosen.without)
-    judge = prepared.judge
-    rms = [ResidualRms(one.rms, (one.data if judge is None else judge).rms(held_out_left(one, judge, chosen.blocks)), floored.rms)
-           for one in (nominal, found.final)]
-    if parts:
-        rms[0] = ResidualRms(plain.rms, parts[0].gain.validate_torque_rms.before, floored.rms)
+    judge = first.held.judge if parts else prepared.judge
+    rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
+           for one, rows in ((plain, judge), (responded.final, responded.judge))]
     pictures = (evidence(plain, floored.rms, floored.twin, None),) if chosen.evidence else ()
     harmful = tuple(Rejected(part.acting.effect.name, part.acting.effect.joint, f"named by frequency responses, but the model goes "
                              f"without it: {part.doubt}") for part in parts if part.doubt)
-    arm, held_ones = extended_arm(found, ruling), {part.acting for part in parts}
-    standing = [one for one in case.beside if one not in held_ones]
+    arm = extended_arm(replace(found, final=responded.final), ruling)
+    standing = [one for one in case.beside if one not in first.held.acting]
     return Diagnosis(
         ruling.verdict, _sentence(ruling, named), named, (), (*harmful, *rejected(found, ruling)), limits,
         (*first.undecided, *hidden, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
         0 if floored.twin is None else len(floored.twin.fits), floored.noise, acted(plain.model.arm, standing),
-        acted(arm, case.beside))
+        acted(arm, responded.acting))
 
 
 def _sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:

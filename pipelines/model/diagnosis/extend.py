@@ -20,7 +20,7 @@ from pipelines.errors import UsageError
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.absorbed import Absorbed
-from pipelines.model.diagnosis.beside import Held, acted
+from pipelines.model.diagnosis.beside import Held, acted, judged
 from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.exact import Exact, Refined
@@ -90,8 +90,7 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
         prepared = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
     first = _responding(prepared, wanted, chosen)
     case, prepared, moved = _case(first, chosen)
-    given = {one.place for one in case.beside} | {place_of(one.acting.effect.name, one.acting.effect.joint)
-                                                  for one in first.held.parts}
+    given = {one.place for one in case.beside}
     rest = [one for one in wanted if one.place not in given]
     moved = moved if moved is not None and any(_is(one, moved) for one in rest) else None
     every = tuple(_family(case, one) for one in rest if moved is None or not _is(one, moved))
@@ -116,7 +115,7 @@ def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisS
     plain = Case(prepared.data, prepared.judge, Exact.start(columns, fit), fit.weight, (), None, chosen.blocks, _ALL)
     places = [one.place for one in wanted if one.effect.evidence == "frequency responses"]
     if not places or not prepared.logs.frf:
-        return Responding(None, Held(plain, prepared, ()))
+        return Responding(None, Held(plain, prepared))
     return responding(plain, prepared, only=places)
 
 
@@ -172,31 +171,32 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
 def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], first: Responding,
           moved: Absorbed | None, chosen: DiagnosisSettings) -> Extended:
     """Everything that was accepted, in one model."""
-    case, prepared, parts = first.held.case, first.held.prepared, first.held.parts
-    judge, final = prepared.judge, found.final
+    prepared, done = first.held.prepared, judged(first.held, found.final)
+    judge, final = done.judge, done.final
     floor = white(final.data, final.left)
-    whole = acted(with_uncertainty(extended_arm(found, Ruling("cause", tuple(range(len(named))), "")), final), case.beside)
-    load = None if moved is None else carried(moved, final, whole, prepared, case.beside, chosen.blocks, chosen.evidence)
-    refused = dict(refused) | {(part.acting.effect.name, part.acting.effect.joint): part.doubt for part in parts if part.doubt}
+    whole = acted(with_uncertainty(extended_arm(replace(found, final=final), Ruling("cause", tuple(range(len(named))), "")), final),
+                  done.acting)
+    ready = replace(prepared, data=final.data, judge=judge)
+    load = None if moved is None else carried(moved, final, whole, ready, done.acting, chosen.blocks, chosen.evidence)
+    refused = dict(refused) | {(part.acting.effect.name, part.acting.effect.joint): part.doubt for part in done.parts if part.doubt}
     if load is not None and load.doubt:
         refused[load.finding.cause, load.finding.joint] = load.doubt
         load = None
-    kept = [part for part in parts if not part.doubt]
-    plain = kept[0].before if kept else found.nominal
+    kept = [part for part in done.parts if not part.doubt]
+    plain, before = (first.held.plain, first.held.judge) if first.held.plain is not None else (found.nominal, judge)
     every = (*(held_finding(part, plain.rms, floor, chosen.evidence) for part in kept), *named,
              *((load.finding,) if load is not None else ()))
     rows = final.data if judge is None else judge
     now = held_out_left(final, judge, chosen.blocks)
-    was = load.left if load is not None else kept[0].left[0] if kept else held_out_left(plain, judge, chosen.blocks)
+    was = held_out_left(plain, before, chosen.blocks) if load is None else load.left
     rms = [ResidualRms(plain.rms, rows.rms(was), floor), ResidualRms(final.rms, rows.rms(now), floor)]
-    held = {part.acting for part in kept}
-    standing = tuple(one for one in case.beside if one not in held)
+    standing = tuple(one for one in done.acting if one not in first.held.acting)
     arm = gain = None
     if every:
         arm = whole if load is None else load.arm
-        before = load.bare if load is not None else acted(plain.model.arm, standing)
+        bare = acted(plain.model.arm, standing) if load is None else load.bare
         gain = every[0].gain if len(every) == 1 else gain_of(
-            torque_gain_of(rows, was, now), *simulation_errors([before, arm], prepared.judging or prepared.motions))
+            torque_gain_of(rows, was, now), *simulation_errors([bare, arm], prepared.judging or prepared.motions))
     rejected = tuple(Rejected(cause, joint, reason) for (cause, joint), reason in refused.items())
     return Extended(arm, tuple(sorted(every, key=lambda one: -one.explained)), rejected, gain, rms[0], rms[1],
                     "blocks" if judge is None else "logs", standing, (*prepared.motions, *prepared.judging), len(prepared.motions))

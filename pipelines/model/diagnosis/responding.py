@@ -59,7 +59,7 @@ def responding(case: Case, prepared: Prepared, without: Sequence[str] = (), only
     if stiff is not None and only is not None:
         stiff = replace(stiff, named=tuple(one for one in stiff.named if one.place in only))
     if stiff is None or not stiff.named:
-        return Responding(stiff, Held(case, prepared, ()))
+        return Responding(stiff, Held(case, prepared))
     case, prepared = _told_apart(case, prepared, stiff.named)
     if prepared.reference is None:
         return Responding(stiff, beside(case, prepared, stiff.named))
