@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from contextlib import suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -15,6 +16,7 @@ import typer
 
 from pipelines.batch.process import economise
 from pipelines.errors import Interrupted, RrridError
+from pipelines.log.atomic import fault_of
 from rrrid_cli.commands import app
 from rrrid_cli.console import say_error
 from rrrid_cli.usage import WrongUsage, as_error
@@ -36,10 +38,7 @@ def entry() -> NoReturn:
     try:
         if "_RRRID_COMPLETE" in os.environ:  # a shell asks how the line could go on
             app(prog_name="rrrid", complete_var="_RRRID_COMPLETE")
-        _call(sys.argv[1:])
-    except typer.Exit as ended:
-        _deaf()
-        sys.exit(ended.exit_code)
+        code = _ended(sys.argv[1:])
     except (RrridError, Interrupted) as problem:
         _deaf()
         if debug:
@@ -51,14 +50,38 @@ def entry() -> NoReturn:
         sys.exit(error.exit_code)
     except BrokenPipeError:
         # The reader of a pipe has left; what is still buffered goes nowhere, without a second complaint at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _mute()
         sys.exit(0)
+    except OSError as problem:
+        if debug:
+            raise
+        fault = fault_of(problem, Path("standard output"))
+        say_error(fault, as_json=False)
+        _mute()
+        sys.exit(fault.exit_code)
     except Exception as problem:
         if debug:
             raise
         say_error(_internal(problem), as_json=as_json)
         sys.exit(70)
-    sys.exit(0)
+    _deaf()
+    sys.exit(code)
+
+
+def _ended(words: list[str]) -> int:
+    """The exit code of a command, when all that it prints has been taken."""
+    try:
+        _call(words)
+        code = 0
+    except typer.Exit as ended:
+        code = ended.exit_code
+    sys.stdout.flush()
+    return code
+
+
+def _mute() -> None:
+    """Nobody takes what is still to be printed: it goes nowhere, without another complaint at the end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _call(words: list[str]) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import resource
+import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,6 +22,7 @@ from pipelines.errors import RrridError
 from pipelines.log.files import hash_file, open_log, write_log
 from pipelines.stage import Inputs, Request, Stage, run_stage
 from tests import test_every_stage
+from tests.cli.commands import REPO, RRRID
 from tests.log.logs import small_log
 from tests.rows.commanded import Command
 
@@ -153,3 +155,15 @@ def test_a_disk_that_fails_while_reading_is_no_damaged_log(command: Command, tmp
     write_log(tmp_path / "a.h5", small_log())
     with failing("pread", errno.EIO, 1):
         command("convert", "a.h5", "--out", "out").refused("P02", 6, "a.h5", "Input/output error")
+
+
+def test_a_full_standard_output_is_the_environment(tmp_path: Path) -> None:
+    """/dev/full refuses every byte: one line, exit 6; the output folder is complete all the same."""
+    write_log(tmp_path / "a.h5", small_log())
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([*RRRID, "convert", "a.h5", "--out", "out", "--json"], stdout=full, stderr=subprocess.PIPE, text=True,
+                              cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(REPO)}, check=False)
+    assert done.returncode == 6
+    assert done.stderr.splitlines()[-1].startswith("rrrid: RRID-P02 standard output: no space left")
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "out/provenance.json").is_file()
