@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -10,6 +12,7 @@ import pytest
 
 from pipelines.batch.plan import Options
 from pipelines.errors import EnvironmentFault, NothingMatched
+from pipelines.log.places import slug
 from tests.batch.conftest import Lay, contents, obey, statuses
 
 GOOD = {f"good-{i}": f"value {i} std 0.1" for i in range(6)}
@@ -95,3 +98,19 @@ def test_nothing_below_the_root_is_exit_5(tmp_path: Path) -> None:
     with pytest.raises(NothingMatched):
         obey(tmp_path / "root")
     assert not (tmp_path / "out").exists()
+
+
+def test_hostile_names_are_inert(lay: Lay) -> None:
+    """X08, X09, X11: markup, escape sequences, bytes that are no text in a folder's name; every file of the summary is whole."""
+    good = ["<script>alert(1)</script>", "\x1b]0;owned\x07", "[bold]$a_{", os.fsdecode(b"\xff\xfe")]
+    bad = ["=1+1", "a\nb", os.fsdecode(b"\xfd"), "]]>", "&amp;"]
+    outcome = obey(lay(dict.fromkeys(good, "fine") | dict.fromkeys(bad, "reject")), no_report=False)
+    names = [item["name"] for item in json.loads((outcome.folder / "result.json").read_text(encoding="utf-8"))["items"]]
+    assert len(set(names)) == 9
+    assert not re.search(r"[\x00-\x08\x0b-\x1f]", "".join(names))
+    cases = {case.get("name") for case in ElementTree.parse(outcome.folder / "junit.xml").iter("testcase")}
+    assert cases == set(names)
+    page = (outcome.folder / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    assert "\x1b" not in page
+    assert {p.parent.name for p in outcome.folder.glob("items/*/result.json")} == {slug(name) for name in good}
