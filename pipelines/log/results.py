@@ -43,8 +43,8 @@ def encode(result: Any) -> tuple[dict[str, Any], dict[str, Array]]:
 
 
 def json_text(value: Any) -> str:
-    """JSON as every file of rrrid has it: sorted keys, two blanks, null for infinite and undefined. Bytes of a path that are no text
-    (C07) become question marks."""
+    """JSON as every file of rrrid has it: sorted keys, two blanks, null for infinite and undefined. Bytes of a path that are no
+    text (C07) become question marks."""
     text = json.dumps(value, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return text.encode("utf-8", "replace").decode("utf-8")
 
