@@ -24,12 +24,14 @@ from pipelines.batch.items import Item, find_items, shard
 from pipelines.batch.lock import locked
 from pipelines.batch.plan import Plan, plan_key
 from pipelines.batch.record import Record, fresh, intact
+from pipelines.batch.result import result_of
 from pipelines.batch.signals import Listener
-from pipelines.batch.summary import Summary, result_object, summary_report
+from pipelines.batch.summary import Summary, summary_report
 from pipelines.batch.work import undone
 from pipelines.errors import Check, EnvironmentFault, UsageError
 from pipelines.log.model_file import ModelFile, read_model
 from pipelines.log.places import keep_apart, slug, tilde
+from pipelines.log.results import encode
 from pipelines.stage import Outcome
 
 __all__ = ["Wanted", "run_batch"]
@@ -81,7 +83,8 @@ def run_batch(plan: Plan, wanted: Wanted) -> Outcome[Summary]:
         records = _judged([done.records.get(item.slug) or done.missing(item) for item in items], baseline)
         summary = Summary(plan.stage, records, drift_of(records), tuple(_short(check, root) for check in checks), baseline,
                           bool(listener.number))
-        json_ = tilde(result_object(summary))
+        named = None if baseline is None else baseline.name
+        json_ = tilde({"command": "batch", **encode(result_of(plan.stage, records, summary.drifts, named, summary.checks))[0]})
         report = tilde(summary_report(summary, figures=not (wanted.no_report or listener.number or done.fault)))
         try:
             folder.finish(summary, json_, None if wanted.no_report else report, wanted.check,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
 
-__all__ = ["Summary", "result_object", "rows_of", "summary_report"]
+__all__ = ["KINDS", "Summary", "rows_of", "summary_report"]
 
 _TONES: Final[dict[Status, Tone]] = {"ok": "good", "found": "attention", "rejected": "bad", "failed": "bad"}
 _ROWS = 2000  # items in one table of the page
@@ -42,25 +42,6 @@ class Summary:
 
     def count(self, *statuses: Status) -> int:
         return sum(record.status in statuses for record in self.records)
-
-
-def result_object(summary: Summary) -> dict[str, Any]:
-    """What result.json holds. Nothing of it hangs on how, where and how fast the items were done."""
-    items = [{"name": r.name, "status": r.status, "error": r.error, "verdict": r.verdict, "exit": r.exit, "robot": r.robot,
-              "recorded": r.recorded or None, "folder": f"items/{r.slug}" if r.provenance else None} for r in summary.records]
-    counts = {status: summary.count(status) for status in _TONES}
-    drift = [{"robot": d.robot, "figures": list(map(_course_object, d.figures)),
-              "residuals": list(map(_course_object, d.residuals))} for d in summary.drifts]
-    return {"command": "batch", "stage": summary.stage, "items": items, "counts": counts, "drift": drift,
-            "baseline": None if summary.baseline is None else summary.baseline.name,
-            "checks": [check.as_dict() for check in summary.checks]}
-
-
-def _course_object(course: Course) -> dict[str, Any]:
-    return {"name": course.name, "unit": course.unit, "items": list(course.items), "value": course.value.tolist(),
-            "std": None if course.std is None else course.std.tolist(), "away": course.away.tolist(),
-            "chi_square": course.chi_square, "freedom": course.freedom,
-            "probability": course.probability, "trend": course.trend, "moved": list(course.moved)}
 
 
 def rows_of(summary: Summary) -> list[Mapping[str, str | float | int | None]]:

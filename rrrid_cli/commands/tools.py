@@ -95,8 +95,12 @@ def _schema(what: str) -> dict[str, Any]:
 
     if what in ("model", "log"):
         return model_schema() if what == "model" else log_schema()
+    if what == "batch":
+        from pipelines.batch.result import Result
+
+        return result_schema(Result, what)
     if what not in STAGES:
-        known = ("model", "log", *STAGES)
+        known = ("model", "log", "batch", *STAGES)
         raise UsageError("C02", f"no schema of '{what}'{did_you_mean(what, known)}", where="schema",
                          remedy=f"one of: {', '.join(known)}")
     return result_schema(result_type(stage_of(what)), what)

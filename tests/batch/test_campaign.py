@@ -45,6 +45,7 @@ def _complete(folder: Path) -> None:
             assert hash_file(folder / name) == sha256
 
 
+@pytest.mark.row("P01")
 @pytest.mark.slow
 def test_killed_at_200_random_points(lay: Lay, tmp_path: Path) -> None:
     """P01, P07: what is there is old or complete new, no process stays; gone on with, it ends with the bytes of a clean run."""
@@ -81,6 +82,7 @@ def test_killed_at_200_random_points(lay: Lay, tmp_path: Path) -> None:
     print(f"{killed} killed, {ended} came to their end meanwhile, {redone} items replaced before their record")
 
 
+@pytest.mark.row("P11")
 @pytest.mark.slow
 @pytest.mark.parametrize("bad", ["crash", "reject", "sleep 60", "bug"])
 def test_one_bad_among_1000(lay: Lay, tmp_path: Path, bad: str) -> None:

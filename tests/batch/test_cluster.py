@@ -56,6 +56,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 ITEMS = {f"{i:02d}": f"value {i} std 0.1" for i in range(8)}
 
 
+@pytest.mark.row("P12", "P03", "P04", "P05")
 def test_a_cluster_gives_the_same_bytes_and_bears_the_same_misfortunes(lay: Lay, tmp_path: Path, cluster: Cluster) -> None:
     """P12, P03-P05: what each item is, is what it is in local processes; crash, hang and memory cost their own items."""
     root = lay(ITEMS | {"big": "memory", "bug": "bug", "hung": "sleep 60", "rejected": "reject", "segfault": "crash"})

@@ -49,6 +49,7 @@ def _text(path: Path) -> str:
 
 
 @pytest.mark.row("P06", "P07")
+@pytest.mark.row("P06", "P07")
 @pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_with_a_summary_and_resume_ends_the_same(many: Path, tmp_path: Path, number: signal.Signals,
                                                                exit_code: int) -> None:
@@ -84,6 +85,7 @@ def test_a_signal_ends_with_a_summary_and_resume_ends_the_same(many: Path, tmp_p
         assert contents(resumed.folder) == contents(whole.folder)
 
 
+@pytest.mark.row("P13")
 def test_json_is_the_result_and_nothing_else(tmp_path: Path) -> None:
     """One object on standard output; each log an item; a bad one is exit 4 in the words of its stage."""
     write_log(tmp_path / "root/a.h5", small_log(samples=100))

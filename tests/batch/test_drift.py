@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -12,7 +13,9 @@ from pipelines.batch.baseline import against
 from pipelines.batch.drift import drift_of, from_others
 from pipelines.batch.figures import fitted, residuals
 from pipelines.batch.record import Record
+from pipelines.batch.result import Result
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
+from pipelines.log.result_schema import result_schema
 from tests.batch.conftest import Lay, obey
 
 STD = 0.02
@@ -138,4 +141,6 @@ def test_the_summary_table_holds_every_figure(lay: Lay) -> None:
         ("b", "ok", "p1", 2.0, 0.1, "kg m^2"), ("b", "ok", "torque rms joint 1", 0.3, None, "N m"),
         ("c", "rejected", None, None, None, None)]
     assert rows[0]["away"] == pytest.approx(-1.0 / np.sqrt(0.02))
-    assert json.loads((outcome.folder / "result.json").read_text())["counts"] == {"ok": 2, "found": 0, "rejected": 1, "failed": 0}
+    stored = json.loads((outcome.folder / "result.json").read_text())
+    assert stored["counts"] == {"ok": 2, "found": 0, "rejected": 1, "failed": 0}
+    jsonschema.validate(stored, result_schema(Result, "batch"))

@@ -19,6 +19,7 @@ GOOD = {f"good-{i}": f"value {i} std 0.1" for i in range(6)}
 
 
 @pytest.mark.row("P03", "P04", "P05", "P11")
+@pytest.mark.row("P03", "P04", "P05", "P11")
 def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
     """P03, P04, P05 and a bug of ours beside good items: each failed with its code and cause, the others as if alone."""
     alone = obey(lay(GOOD))
@@ -40,6 +41,7 @@ def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
     assert len(cases) == 11
 
 
+@pytest.mark.row("P11")
 @pytest.mark.row("P11")
 def test_all_bad_is_exit_4_with_a_table(lay: Lay) -> None:
     """P11: nothing that could be used, and still every form of the summary."""
@@ -64,6 +66,7 @@ def test_an_item_that_failed_leaves_no_older_result(lay: Lay) -> None:
     assert [p.name for p in (outcome.folder / "items").iterdir()] == ["a"]
 
 
+@pytest.mark.row("P02")
 @pytest.mark.row("P02")
 @pytest.mark.parametrize("fault", ["full", "unreadable"])
 def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, fault: str) -> None:
@@ -92,6 +95,7 @@ def test_abort_stops_at_the_first_error(lay: Lay) -> None:
     assert codes.count("RRID-P06") > 30
 
 
+@pytest.mark.row("C06")
 def test_nothing_below_the_root_is_exit_5(tmp_path: Path) -> None:
     """C06."""
     (tmp_path / "root/empty").mkdir(parents=True)
@@ -100,6 +104,7 @@ def test_nothing_below_the_root_is_exit_5(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.row("X08", "X09", "X11")
 def test_hostile_names_are_inert(lay: Lay) -> None:
     """X08, X09, X11: markup, escape sequences, bytes that are no text in a folder's name; every file of the summary is whole."""
     good = ["<script>alert(1)</script>", "\x1b]0;owned\x07", "[bold]$a_{", os.fsdecode(b"\xff\xfe")]

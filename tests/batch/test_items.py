@@ -44,6 +44,7 @@ def test_names_become_folders_that_stay_in_the_output(tmp_path: Path) -> None:
     assert all(len(slug) <= 80 and slug.isascii() and "/" not in slug and not slug.startswith(".") for slug in slugs)
 
 
+@pytest.mark.row("X11")
 def test_links_are_passed_over_and_own_output_too(tmp_path: Path) -> None:
     """X11: a loop and a link that leads out are told and not followed; what rrrid wrote is no input."""
     _touch(tmp_path, "root/a/1.h5", "root/done/provenance.json", "root/done/logs/1.h5", "elsewhere/1.h5")

@@ -27,6 +27,7 @@ with locked(Path(sys.argv[1])):
 
 
 @pytest.mark.row("P08")
+@pytest.mark.row("P08")
 def test_the_second_batch_is_told_who_has_the_folder(lay: Lay, tmp_path: Path) -> None:
     """P08: exit 6 with process and host; when that process is killed, the next batch goes on at once."""
     root = lay({"a": "fine"})
@@ -55,6 +56,7 @@ def test_a_lock_that_was_left_behind_locks_nobody_out(tmp_path: Path) -> None:
     assert not (tmp_path / LOCK).exists()
 
 
+@pytest.mark.row("C05")
 @pytest.mark.parametrize("what", ["foreign", "other", "added", "file", "link", "inside"])
 def test_a_folder_that_is_not_a_batchs_is_refused(lay: Lay, tmp_path: Path, what: str) -> None:
     """C05: somebody's files, another command's result, a batch's with a foreign file, a file, a link, a place in the input."""
