@@ -1,0 +1,73 @@
+"""Rules of acceptance, on numbers that are made up: what is farther than chance explains, what is worse on one held-out log; and
+rows of a joint that is held do not count."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.bench import experiments
+from pipelines.bench.machine import draw_machine
+from pipelines.bench.session import record
+from pipelines.model.diagnosis.gains import Simulation, farther, gain_of, worse_log
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.result import TorqueGain
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from tests.diagnose.sessions import session
+
+RNG = np.random.default_rng(5)
+NOISE = RNG.uniform(0.5, 1.5, 20)
+
+
+def simulated(power: Any, how: Any = "closed-loop") -> Simulation:
+    return Simulation(how, np.full(3, 1e-4), 1e-4, np.asarray(power), np.full(20, 100.0))
+
+
+@pytest.mark.parametrize(("after", "words"), [
+    (0.5 * NOISE, ""),  # nearer
+    (NOISE * RNG.uniform(0.8, 1.25, 20), ""),  # as near, give or take
+    (2.0 * NOISE, "farther")])
+def test_a_simulated_arm_that_is_farther_than_chance_explains_is_refused(after: Any, words: str) -> None:
+    said = farther(simulated(NOISE), simulated(after))
+    assert (words in said) if words else not said
+
+
+def test_a_model_that_runs_away_is_refused_and_has_no_simulated_gain() -> None:
+    gone = Simulation.none(3)
+    assert "runs away" in farther(simulated(NOISE), gone)
+    assert not farther(gone, gone)  # nobody can be simulated: no argument against anyone
+    gain = gain_of(TorqueGain(np.ones(3), np.ones(3), np.zeros((3, 2))), simulated(NOISE), gone)
+    assert (gain.simulated_position_rms, gain.tip_error_rms, gain.simulation) == (None, None, "none")
+
+
+def two_logs() -> Any:
+    """Two logs of 100 rows of each of two joints."""
+    joint = np.tile(np.repeat([0, 1], 100), 2)
+    return SimpleNamespace(
+        logs=[SimpleNamespace(log=SimpleNamespace(name=name)) for name in ("first", "second")], log_of=np.repeat([0, 1], 200),
+        counts=np.ones(400, dtype=bool), joint=joint,
+        rms=lambda x: np.sqrt(np.bincount(joint, x**2) / np.bincount(joint)))
+
+
+def test_no_held_out_log_may_get_worse_by_more_than_a_tenth() -> None:
+    """Better on the whole, and yet worse on the second; a joint of small torque counts as well as one of large."""
+    data, large = two_logs(), np.tile(np.repeat([1.0, 0.01], 100), 2)
+    first = data.log_of == 0
+    assert not worse_log(data, large, 0.9 * large)
+    assert not worse_log(data, large, np.where(first, 0.2, 1.09) * large)
+    assert "second" in worse_log(data, large, np.where(first, 0.2, 1.12) * large)
+    assert "second" in worse_log(data, large, np.where(first | (data.joint == 0), 1.0, 2.0) * large)
+
+
+def test_rows_of_a_joint_that_is_held_do_not_count() -> None:
+    """Joint 1 to and fro, the others at rest: they stick, and no law tells their torque. In the other log all three count."""
+    machine = draw_machine(7, "fault")
+    (fro,) = record(machine, (), [experiments.reversal(machine, 1, 2.0)], 3)
+    data = prepare(Logs((session()[0], replace(fro, role="identify"))), DiagnosisSettings()).data
+    counted = {(log, joint): bool(data.counts[(data.log_of == log) & (data.joint == joint)].all())
+               for log in (0, 1) for joint in (0, 1, 2)}
+    assert counted == {(0, 0): True, (0, 1): True, (0, 2): True, (1, 0): True, (1, 1): False, (1, 2): False}
