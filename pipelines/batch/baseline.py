@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -21,8 +22,11 @@ __all__ = ["against", "known_figures"]
 
 
 def against(record: Record, baseline: ModelFile) -> Record:
-    """`record` as it stands with the baseline in mind: "ok" where it holds nothing new, "found" with the changes where it does."""
-    if record.status not in ("ok", "found"):
+    """`record` as it stands with the baseline in mind: "ok" where it holds nothing new, "found" with the changes where it does.
+
+    An item of another robot than the baseline's is not judged by it.
+    """
+    if record.status not in ("ok", "found") or _robot(baseline) not in ("", record.robot):
         return record
     changes = [*_moved(record, baseline), *_new_causes(record, baseline)]
     accepted = record.status == "ok" or record.accepts
@@ -31,6 +35,11 @@ def against(record: Record, baseline: ModelFile) -> Record:
     if accepted and record.status == "found":
         return dataclasses.replace(record, status="ok", verdict=f"Nothing beyond the baseline. {record.verdict}")
     return record
+
+
+def _robot(baseline: ModelFile) -> str:
+    """The name of the robot that the baseline is of; empty where it says none."""
+    return str(tomllib.loads(baseline.robot).get("name", ""))
 
 
 def known_figures(baseline: ModelFile) -> dict[str, tuple[float, float]]:

@@ -179,7 +179,8 @@ class _Done:
         if record is None or not fresh(record, item, Path(self.plan.root), self.key):
             return False
         if not intact(record, self.folder.items / item.slug):
-            self.notices.append(Check.of("P10", "warn", "its stored result is not what was written; done again", where=record.name))
+            self.notices.append(Check.of("P10", "warn", "its stored result is not what was written; done again", where=record.name,
+                                         remedy="look after the disk, if nobody changed it"))
             return False
         self.records[item.slug] = record
         return True

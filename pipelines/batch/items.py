@@ -1,0 +1,116 @@
+"""Find the items of a batch: the folders below a root that hold logs, or every single log.
+
+    items, checks = find_items(root, each_log=False)
+    mine = shard(items, 1, 4)
+
+What is a log, and what is passed over, is what `log.files.find_logs` says: hidden files, folders that rrrid itself wrote,
+links out of the folder.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipelines.errors import Check, NothingMatched, RrridError, UsageError
+from pipelines.log.atomic import fault_of
+from pipelines.log.files import ENDINGS, PROVENANCE, regular_file
+from pipelines.log.places import slug
+
+__all__ = ["Item", "find_items", "read_shard", "shard"]
+
+
+@dataclass(frozen=True)
+class Item:
+    """One folder of logs, or one log."""
+
+    name: str  # the path relative to the root, "." for the root itself
+    paths: tuple[Path, ...]  # what the stage is given
+    logs: tuple[Path, ...]  # the logs among and below them
+    fault: RrridError | None = field(default=None, compare=False)  # the folder could not be looked into
+
+    @property
+    def slug(self) -> str:
+        """The name as that of one folder; two names never share one."""
+        return slug(self.name)
+
+
+def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tuple[Check, ...]]:
+    """Every item below `root`, sorted by name, and what was passed over.
+
+    A folder that holds logs itself is an item. Where folders below it hold logs too, they are items of their own, and it has
+    its own logs alone.
+
+    Args:
+        each_log: every log is an item.
+
+    Raises:
+        UsageError: C04, `root` does not exist; C02, it is no folder.
+        NothingMatched: C06, there is no log below it.
+    """
+    root = root.absolute()
+    if not os.path.isdir(root):
+        regular_file(root)
+        raise UsageError("C02", "is a log, not a folder of folders", where=root, remedy="run the stage on it alone")
+    folders: dict[Path, list[Path]] = {}
+    faults: dict[Path, RrridError] = {}
+    checks: list[Check] = []
+    _walk(root, root.resolve(), folders, faults, checks)
+    if not folders and not faults:
+        raise NothingMatched("C06", "no log there", where=root, remedy="logs end in .h5 or .parquet")
+    items = [Item(_name(folder, root), (folder,), (), fault) for folder, fault in faults.items()]
+    for folder, logs in folders.items():
+        if each_log:
+            items += [Item(_name(log, root), (log,), (log,)) for log in logs]
+        else:
+            nested = any(other.is_relative_to(folder) for other in folders if other != folder)
+            items.append(Item(_name(folder, root), tuple(logs) if nested else (folder,), tuple(logs)))
+    return tuple(sorted(items, key=lambda item: item.name)), tuple(checks)
+
+
+def _name(path: Path, root: Path) -> str:
+    return path.relative_to(root).as_posix()
+
+
+def _walk(folder: Path, root: Path, folders: dict[Path, list[Path]], faults: dict[Path, RrridError],
+          checks: list[Check]) -> None:
+    """Gather the logs of `folder` and of the folders below it, each under its own folder."""
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError as problem:
+        faults[folder] = fault_of(problem, folder)
+        return
+    for entry in entries:
+        if entry.name.startswith("."):
+            continue
+        linked = entry.is_symlink()
+        if linked and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
+            checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry,
+                                   remedy="give what it leads to by its own path, if that is meant"))
+        elif entry.is_dir():
+            if not (entry / PROVENANCE).is_file():
+                _walk(entry, root, folders, faults, checks)
+        elif entry.suffix.lower() in ENDINGS and entry.exists():
+            folders.setdefault(folder, []).append(entry)
+
+
+def shard(items: Sequence[Item], number: int, of: int) -> tuple[Item, ...]:
+    """Every `of`-th item, from the `number`-th on, counted from 1: all shards together are all items, none twice."""
+    return tuple(items[number - 1::of])
+
+
+def read_shard(text: str | None) -> tuple[int, int]:
+    """"2/4" as (2, 4); (1, 1) where nothing was said.
+
+    Raises:
+        UsageError: C02, it is no such fraction.
+    """
+    if text is None:
+        return 1, 1
+    first, slash, last = text.partition("/")
+    if not (slash and first.isascii() and first.isdigit() and last.isascii() and last.isdigit() and len(text) < 12
+            and 1 <= int(first) <= int(last)):
+        raise UsageError("C02", f"'{text}' is no shard", where="--shard", remedy="write I/N, from 1/N to N/N")
+    return int(first), int(last)

@@ -51,7 +51,7 @@ def begin(text: str, key: str) -> None:
     die_with_parent()
     economise()
     plan = read_plan(text)
-    if plan.folder:
+    if os.path.isdir(plan.folder):  # else on another machine, where relative paths lead nowhere
         os.chdir(plan.folder)
     stage = load_stage(plan.module)
     _warm[:] = [_Warm(plan, stage, key)]
@@ -114,7 +114,7 @@ def _record(item: Item, warm: _Warm, outcome: Outcome[Any], inputs: Inputs, root
     hashes = {relative(path, root): inputs.hashes.get(path) or hash_file(path) for path in inputs.sources if path.is_file()}
     return Record(
         clean(item.name), item.slug, status, outcome.exit_code, error, clean(outcome.report.verdict, 1000),
-        inputs.robot_name, min((opened.log.recorded or "" for opened in inputs.logs), default=""),
+        inputs.robot_name, min((opened.log.recorded for opened in inputs.logs if opened.log.recorded), default=""),
         fitted(outcome.json), residuals(outcome.json), _findings(outcome.json), _only_causes(outcome.json), hashes,
         tuple(relative(log, root) for log in item.logs), hash_file(outcome.folder / PROVENANCE), warm.key, seconds)
 

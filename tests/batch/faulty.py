@@ -53,7 +53,7 @@ def read(request: Request, settings: object) -> Inputs:
     words = " ".join(log.read_text() for log in logs)
     if "reject" in words:
         raise InputRejected("F02", "truncated", where=logs[0], remedy="copy it again")
-    return Inputs(sources=tuple(logs), material=words, robot_name="arm")
+    return Inputs(sources=tuple(logs), material=words, robot_name="rrr-tue")
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:

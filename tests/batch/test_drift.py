@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -114,6 +115,8 @@ def test_a_baseline_accepts_what_is_known() -> None:
     assert against(_found(0.5, accepts=False), baseline).status == "found"
     rejected = Record("a", "a", "rejected", 3)
     assert against(rejected, baseline) is rejected
+    other = dataclasses.replace(baseline, robot='name = "another"')
+    assert against(_found(0.5, joint=3), other) == _found(0.5, joint=3)
 
 
 def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Path) -> None:
