@@ -63,7 +63,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     checks: list[Check] = []
     for opened in inputs.logs:
         if opened.log.origin == "planned":
-            checks.append(Check.of("S01", "warn", "is a plan: nothing moved, nothing to reconstruct", where=opened.path))
+            checks.append(Check.of("S01", "warn", "is a plan: nothing moved, nothing to reconstruct", where=opened.path,
+                                   remedy="give the log of the motion itself"))
             continue
         stem = slug(opened.path.stem)
         while stem in taken:

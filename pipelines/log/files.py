@@ -283,7 +283,8 @@ def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
             continue
         linked = entry.is_symlink()
         if linked and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
-            checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry))
+            checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry,
+                                   remedy="give what it leads to by its own path, if that is meant"))
         elif entry.is_dir():
             if not (entry / PROVENANCE).is_file():
                 found += _below(entry, root, checks)

@@ -22,7 +22,7 @@ def chosen(log: ExperimentLog, joints: tuple[int, ...], robot: RobotDescription 
     if joints:
         names = ", ".join(map(str, joints))
         checks = (Check.of("S02", "warn", f"joints {names} of {_columns(log)} are used, as --joints says",
-                           where=log.source or log.name),)
+                           where=log.source or log.name, remedy="leave --joints out to use all"),)
         log = select_joints(log, joints, robot)
     return (log if robot is None else with_robot(log, robot)), checks
 

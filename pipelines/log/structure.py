@@ -119,7 +119,8 @@ def _orient(log: ExperimentLog, name: str, signal: Signal, checks: list[Check]) 
     values, n, samples = signal.values, log.n_joints, log.signals["t"].values.size
     where = f"{log.source or log.name}, signal {name}"
     if name == "t" and values.ndim == 2 and 1 in values.shape:
-        checks.append(Check.of("S11", "warn", f"t was stored as {values.shape}, read as a vector", where=where))
+        checks.append(Check.of("S11", "warn", f"t was stored as {values.shape}, read as a vector", where=where,
+                               remedy="store t as a vector"))
         return replace(signal, values=values.reshape(-1))
     if name != "t" and values.ndim == 1 and n == 1 and values.shape == (samples,):
         return replace(signal, values=values[:, None])
@@ -137,7 +138,8 @@ def _in_si(log: ExperimentLog, name: str, signal: Signal, law: str | None, assum
         if not assume:
             raise InputRejected("S04", f"no units; {wanted} is what the format wants", where=where,
                                 remedy="declare them, or pass --assume-units if they are SI")
-        checks.append(Check.of("S04", "warn", f"no units; taken as {wanted}, as --assume-units says", where=where))
+        checks.append(Check.of("S04", "warn", f"no units; taken as {wanted}, as --assume-units says", where=where,
+                               remedy="write the attribute units"))
         return replace(signal, units=wanted)
     if signal.units == wanted:
         return signal
@@ -146,7 +148,8 @@ def _in_si(log: ExperimentLog, name: str, signal: Signal, law: str | None, assum
         quantity = "torque" if wanted == "N m" else "acceleration"
     unit = to_si(signal.units, quantity, where=where)
     if not unit.is_si:
-        checks.append(Check.of("S06", "warn", f"declared in {signal.units}, converted to {wanted}", where=where))
+        checks.append(Check.of("S06", "warn", f"declared in {signal.units}, converted to {wanted}", where=where,
+                               remedy="store SI units, if the conversion should not stand in every result"))
     return replace(signal, values=unit.factor * signal.values + unit.offset, units=wanted)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -16,3 +17,18 @@ def test_every_code_in_the_source_has_a_title_and_every_title_a_code() -> None:
     used = {code for path in sources for code in re.findall(r'"(?:RRID-)?([FSTDCPXZ]\d\d)"', path.read_text(encoding="utf-8"))}
     assert used == set(CODES)
     assert title_of("RRID-T05") == "uneven sampling"
+
+
+def test_every_error_and_every_finding_says_what_to_do() -> None:
+    """Code, place and remedy: no error is made without a remedy, no check other than "ok" without place and remedy."""
+    errors, silent = {"RrridError", "UsageError", "InputRejected", "NothingMatched", "EnvironmentFault"}, []
+    for path in (path for folder in ("pipelines", "rrrid_cli") for path in (REPO / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call) or len(node.args) < 2:
+                continue
+            said, called = {keyword.arg for keyword in node.keywords}, ast.unparse(node.func)
+            level = node.args[1].value if isinstance(node.args[1], ast.Constant) else None
+            wanted = {"remedy"} if called in errors else {"where", "remedy"} if called == "Check.of" and level != "ok" else set()
+            if wanted - said:
+                silent.append(f"{path.relative_to(REPO)}:{node.lineno}")
+    assert silent == []

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.io
 
 from pipelines import import_log, inspect, reconstruct, simulate
 from pipelines.log.files import open_log, write_log
@@ -26,7 +25,6 @@ from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Request, Stage
 from rrrid_cli.commands import STAGES
 from rrrid_cli.settings import make_settings
-from tests.controlled import controlled_log
 from tests.healthy import fourier, make_log
 from tests.log.logs import small_log
 from tests.log.recording.good import RECIPE, good, text
@@ -140,6 +138,8 @@ def _npy(folder: Path) -> list[bytes]:
 
 
 def _mat(folder: Path) -> list[bytes]:
+    import scipy.io
+
     brief = {name: values[:40] for name, values in signals().items()}
     found = []
     for version in ("5", "5z", "4"):
@@ -211,6 +211,8 @@ def _model(path: Path) -> None:
     if _deep(path):
         log = path.parent / "waving.h5"
         if not log.exists():
+            from tests.controlled import controlled_log  # and with it MuJoCo: every fork of this process would be dearer
+
             write_log(log, controlled_log(60))
         _through(simulate.STAGE, Request((log,)), replace(simulate.Settings(), model=str(path)))
 

@@ -98,7 +98,8 @@ def _detected(median: float, step: float | None, where: str, assume: bool, check
                                    where=where, remedy=f'add unit = "{fits[0]}" to [time]'))
             return fits[0]
     elif assume:
-        checks.append(Check.of("S04", "warn", "unit of time not declared; taken as s, as --assume-units says", where=where))
+        checks.append(Check.of("S04", "warn", "unit of time not declared; taken as s, as --assume-units says", where=where,
+                               remedy="write the unit in the recipe"))
         return "s"
     options = ", ".join(f"{unit} ({1 / (median * _UNITS[unit]):.4g} Hz)" for unit in plausible_units(median)) or "none plausible"
     raise InputRejected("S08", f"unit of time not declared; its step of {median:.6g} could be: {options}", where=where,

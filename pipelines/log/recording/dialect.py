@@ -53,13 +53,15 @@ def decode(data: bytes, source: str, encoding: str | None = None) -> tuple[str, 
         encoding = _encoding_of(data)
         if encoding != "utf-8":
             mark = " (byte order mark)" if data.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else ""
-            checks.append(Check.of("F16", "warn", f"read as {encoding}{mark}", where=source))
+            checks.append(Check.of("F16", "warn", f"read as {encoding}{mark}", where=source,
+                                   remedy="give encoding under [format] if that is wrong"))
     if not encoding.lower().replace("_", "-").startswith("utf-16"):
         whole = len(data)
         data = data.rstrip(b"\0")
         if len(data) < whole:
             checks.append(Check.of("F09", "repair",
-                                   f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its power", where=source))
+                                   f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its power", where=source,
+                                   remedy="let the recorder close its file"))
         if (at := data.find(b"\0")) >= 0:
             line = data[:at].count(b"\n") + 1
             raise InputRejected("F16", f"a NUL byte in line {line}", where=source,

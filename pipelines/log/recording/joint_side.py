@@ -89,7 +89,8 @@ def unit_declared(name: str, spec: SignalSpec, table: RawTable, columns: tuple[s
         raise InputRejected("S04", f"no unit; say what the numbers of {name} are in", where=where,
                             remedy=f'add unit = "{wanted}" (or what it is) to signals.{name}, '
                             "or pass --assume-units if they are SI")
-    checks.append(Check.of("S04", "warn", f"no unit; taken as {wanted}, as --assume-units says", where=where))
+    checks.append(Check.of("S04", "warn", f"no unit; taken as {wanted}, as --assume-units says", where=where,
+                           remedy="write the unit in the recipe"))
     return wanted
 
 

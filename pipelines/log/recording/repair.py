@@ -93,7 +93,7 @@ def _mark_missing(recording: Recording, missing: tuple[float, ...], checks: list
             if (count := int(hit.sum())) > 0:
                 values[hit] = np.nan
                 checks.append(Check.of("D03", "repair", f"{count} numbers of {name} are declared missing values",
-                                       where=recording.where))
+                                       where=recording.where, remedy="correct [missing] if these are samples"))
         for joint in range(values.shape[1]):
             _refuse_absurd(recording, name, joint, values[:, joint])
         signals[name] = values
@@ -134,7 +134,7 @@ def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
                             remedy="record again")
     checks.append(Check.of("D01", "repair",
                            f"{which.size} of {lost.size} samples with a missing value left out ({recording.listed(which)})",
-                           where=recording.where))
+                           where=recording.where, remedy="look for what loses samples"))
     return recording.take(~lost)
 
 
@@ -152,7 +152,7 @@ def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
                             f"({recording.listed(which[differ])})",
                             where=recording.where, remedy="record time with more digits, or import by rate instead of the column")
     checks.append(Check.of("T02", "repair", f"{which.size} samples that stand twice dropped ({recording.listed(which)})",
-                           where=recording.where))
+                           where=recording.where, remedy="let each sample be recorded once"))
     return recording.take(~again)
 
 
@@ -167,7 +167,8 @@ def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recordin
         return (_long_enough(recording),)
     kept, into = _cut(recording, cuts)
     code, why = ("T01", "time steps back") if back.size else ("F09", "lines are lost and no clock says how many")
-    checks.append(Check.of(code, "repair", f"{why} at {recording.listed(np.array(cuts))}: {into}", where=recording.where))
+    checks.append(Check.of(code, "repair", f"{why} at {recording.listed(np.array(cuts))}: {into}", where=recording.where,
+                           remedy="record without interruption, by one clock"))
     if not kept:
         _long_enough(recording.take(slice(0, cuts[0])))
     return kept

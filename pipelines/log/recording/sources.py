@@ -54,7 +54,8 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
     checks = table.checks
     named = {ending: what for what, endings in _ENDINGS.items() for ending in endings}.get(path.suffix.lower(), "text")
     if path.suffix.lower() not in _ENDINGS[kind] and named != kind:
-        checks = (Check.of("F06", "warn", f"named '{path.suffix}', but its content is {kind}; read as that", where=source), *checks)
+        checks = (Check.of("F06", "warn", f"named '{path.suffix}', but its content is {kind}; read as that", where=source,
+                           remedy="rename it"), *checks)
     return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
 
 

@@ -69,7 +69,8 @@ def _header(lines: list[Line], text: str, dialect: Dialect, source: str, given: 
     cells = cells_of(lines[at][1], dialect.delimiter)
     is_data = given.header is False or all(is_number(cell, dialect.decimal) or cell in MISSING for cell in cells)
     if at > 0:
-        checks.append(Check.of("F16", "warn", f"{at} lines before the table left out", where=f"{source}, line {lines[0][0]}"))
+        checks.append(Check.of("F16", "warn", f"{at} lines before the table left out", where=f"{source}, line {lines[0][0]}",
+                               remedy="give header or comment under [format] if these are data"))
     if is_data:
         names = _comment_header(text, lines[at][0], dialect) or tuple(f"column_{j + 1}" for j in range(dialect.width))
         return *_named(names, source, lines[at][0]), lines[at:]
@@ -130,7 +131,7 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
         torn.add(len(body) - 1)
         checks.append(Check.of("F09", "warn",
                                "the last line has no line end: whether its last number is whole cannot be told, it is left out",
-                               where=f"{source}, line {body[-1][0]}"))
+                               where=f"{source}, line {body[-1][0]}", remedy="end the recording before the file is copied"))
     good = [i for i in range(len(body)) if i not in torn]
     if not good:
         raise InputRejected("T08", "no whole line of numbers", where=source, remedy="record again, or copy the file again")
