@@ -139,7 +139,8 @@ def _with(case: Case, prepared: Prepared, acting: Acting) -> tuple[Case, Prepare
         model = Exact.start(columns, fit)
         arm = model.nominal
     judge = None if raw.judge is None else less(raw.judge, torque_of((acting,), arm, raw.judge))
-    there = replace(case, data=data, judge=judge, model=model, weight=fit.weight, beside=(*case.beside, acting))
+    others = tuple(f for f in case.families if (f.cause, f.joint) != (acting.effect.name, acting.effect.joint))
+    there = replace(case, data=data, judge=judge, model=model, weight=fit.weight, families=others, beside=(*case.beside, acting))
     return there, replace(prepared, data=data, judge=judge)
 
 
