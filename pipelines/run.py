@@ -19,13 +19,12 @@ from typing import Any
 
 from pipelines.errors import Check, InputRejected, Level, NothingMatched, UsageError, did_you_mean
 from pipelines.log.files import expanded
-from pipelines.log.places import renamed, short_names
+from pipelines.log.places import renamed, short_names, tilde
 from pipelines.log.results import decode, encode
 from pipelines.log.robot import format_robot
-from pipelines.log.schema import FORMAT_VERSION
 from pipelines.log.sessions import sessions
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.recall.code import code_of, libraries
+from pipelines.recall.chain import Chain
 from pipelines.recall.key import Key, digest_of_json
 from pipelines.recall.pictures import Pictures, pictures_of, with_pictures, write_drawing
 from pipelines.recall.store import CACHE, Kept, Missed, Store
@@ -126,7 +125,7 @@ def _wanted(settings: Settings) -> Iterator[tuple[Stage[Any, Any], Any]]:
 def _stages(group: str, inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
     """Every stage in turn, each on what those before it leave; one that finds nothing to read is passed over."""
     given: Material = inputs.material
-    chain, steps = _Chain(inputs), []
+    chain, steps = Chain(inputs, given.names, given.options), []
     for stage, own in _wanted(settings):
         key, place = chain.key(stage, own), _place(group, stage.name)
         kept = given.store.recall(place, key)
@@ -145,7 +144,7 @@ def _stages(group: str, inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
 
 def _planned(group: str, inputs: Inputs, settings: Settings) -> Iterator[Planned]:
     given: Material = inputs.material
-    chain = _Chain(inputs)
+    chain = Chain(inputs, given.names, given.options)
     for stage, own in _wanted(settings):
         key, place = chain.key(stage, own), _place(group, stage.name)
         kept = given.store.recall(place, key, dry=True)
@@ -183,12 +182,12 @@ def _computed(stage: Stage[Any, Any], settings: Any, inputs: Inputs, place: str,
     try:
         result = renamed(stage.compute(inputs, settings), given.names)
     except (NothingMatched, InputRejected) as problem:
-        told = renamed(problem.as_dict(), given.names) | {"exit": problem.exit_code}
+        told = tilde(renamed(problem.as_dict(), given.names)) | {"exit": problem.exit_code}
         return given.store.keep(place, key, {"problem": told}, None, lambda folder: None), None
     about = {"exit": stage.exit_code(result, True), "problem": None,
-             "checks": [renamed(check.as_dict(), given.names) for check in stage.checks(result)]}
+             "checks": [tilde(renamed(check.as_dict(), given.names)) for check in stage.checks(result)]}
     write = stage.write or (lambda result, folder, request: None)
-    return given.store.keep(place, key, about, encode(result), lambda folder: write(result, folder, given.request)), result
+    return given.store.keep(place, key, about, tilde(encode(result)), lambda folder: write(result, folder, given.request)), result
 
 
 def _step(stage: Stage[Any, Any], kept: Kept) -> Step:
@@ -209,64 +208,6 @@ def _without(stage: Stage[Any, Any], problem: Mapping[str, Any]) -> tuple[Report
     level: Level = "warn" if passed_over else "reject"
     check = Check(problem["code"], level, problem["message"], problem["where"], remedy, not passed_over)
     return Report(stage.title, words, "neutral" if passed_over else "bad"), check
-
-
-class _Chain:
-    """The inputs on their way through the stages, and where they come from.
-
-    What a stage that was taken back would hand on is read out of its files only when a stage after it is computed.
-    """
-
-    def __init__(self, inputs: Inputs) -> None:
-        self.given: Material = inputs.material
-        self.inputs = dataclasses.replace(inputs, material=None)
-        self.waiting: list[tuple[Stage[Any, Any], Any, Path]] = []
-        self.through: dict[str, str] = {}
-        self.upon: dict[str, str] = {}
-
-    def key(self, stage: Stage[Any, Any], settings: Any) -> Key:
-        """All that the outcome of `stage` depends on."""
-        logs = [opened for opened in self.inputs.logs if stage.uses.logs(opened.log, settings)]
-        others = {f"{o.log.experiment} ({o.log.role}, {o.log.origin})" for o in self.inputs.logs} if len(
-            logs) < len(self.inputs.logs) else set()
-        unusable = {self._name(one.path): digest_of_json(renamed(one.error.as_dict(), self.given.names))
-                    for one in self.inputs.rejected} if stage.uses.rejected else {}
-        return Key(stage.name, encode(settings)[0], {self._name(o.path): o.sha256 for o in logs}, tuple(sorted(others)), unusable,
-                   self.given.options, code_of(stage.compute.__module__, ("pipelines.report",)), libraries(),
-                   f"log {FORMAT_VERSION}", self.through, self.upon if stage.uses.before else {})
-
-    def _name(self, path: Path) -> str:
-        return str(renamed(str(path), self.given.names))
-
-    def inputs_of(self, stage: Stage[Any, Any]) -> Inputs:
-        """What `stage` gets: of what came before, no more than it says that it uses."""
-        for earlier, result, files in self.waiting:
-            self.inputs = earlier.onward(earlier.restored(result, files) if earlier.restored else result, self.inputs)
-        self.waiting = []
-        uses = stage.uses
-        return dataclasses.replace(self.inputs, material=self.inputs.material if uses.before else None,
-                                   rejected=self.inputs.rejected if uses.rejected else ())
-
-    def passed(self, stage: Stage[Any, Any], key: Key, result: Any) -> None:
-        """`stage` was computed; None where it had no result."""
-        if result is not None:
-            self.inputs = stage.onward(result, self.inputs)
-        self._handed(stage, key)
-
-    def taken_back(self, stage: Stage[Any, Any], key: Key, result: Any, files: Path) -> None:
-        """`stage` was not computed; its files lie in `files`."""
-        if result is not None and stage.hands_on:
-            if stage.hands_on == "choice" and not self.waiting:
-                self.inputs = stage.onward(result, self.inputs)
-            else:
-                self.waiting.append((stage, result, files))
-        self._handed(stage, key)
-
-    def _handed(self, stage: Stage[Any, Any], key: Key) -> None:
-        if stage.hands_on == "logs":
-            self.through = self.through | {stage.name: key.treatment}
-        if stage.hands_on == "material":
-            self.upon = {stage.name: key.digest}
 
 
 def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:

@@ -16,6 +16,7 @@ from pipelines import estimate_bps, inspect, reconstruct, run, validate_writing
 from pipelines.errors import EnvironmentFault, UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log, write_log
+from pipelines.recall import chain
 from pipelines.recall.store import CACHE, Store
 from pipelines.report import render
 from pipelines.stage import Outcome, Request, run_stage
@@ -154,14 +155,14 @@ def test_exactly_what_is_affected(small: Path, change: Callable[[Path], run.Sett
 @pytest.mark.row("P09")
 def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """P09: a module of one stage alone, and a library of all."""
-    code = run.code_of
-    monkeypatch.setattr(run, "code_of", lambda module, without: code(module, without) | (
+    code = chain.code_of
+    monkeypatch.setattr(chain, "code_of", lambda module, without: code(module, without) | (
         {"pipelines.signal.smoother": "other"} if module == "pipelines.reconstruct" else {}))
     planned = run.plan(Request((small / "logs",), out=small / "out"), SHORT)
     assert [(one.stage, one.why) for one in planned if one.computed] == [
         ("reconstruct", "code of signal.smoother"), ("frf", "reconstruct before it changed")]
-    monkeypatch.setattr(run, "code_of", code)
-    monkeypatch.setattr(run, "libraries", lambda: {"numpy": "0.1"})
+    monkeypatch.setattr(chain, "code_of", code)
+    monkeypatch.setattr(chain, "libraries", lambda: {"numpy": "0.1"})
     assert all(one.computed and "numpy" in one.why for one in run.plan(Request((small / "logs",), out=small / "out"), SHORT))
 
 
@@ -188,6 +189,20 @@ def test_what_a_person_may_have_edited_is_refused(whole: Path) -> None:
         go(whole, LONG, no_report=True)
     assert go(whole, LONG, no_report=True, force=True)[1] == ["estimate-bps"]
     assert model.read_bytes() == before
+
+
+@pytest.mark.row("X14")
+def test_no_output_names_the_user(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """X14: of a setting that holds a path below the home folder, key and results keep ~ alone, and fit under another home too."""
+    monkeypatch.setenv("HOME", str(small))
+    settings = replace(SHORT, stages={"frf": import_module("pipelines.frf").Settings(model=str(small / "model.json"))})
+    assert go(small, settings, no_report=True)[1] == ["frf"]
+    written = [p.read_text() for p in (small / "out").rglob("*.json") if p.name != "provenance.json"]
+    assert any("~/model.json" in text for text in written)
+    assert not any(str(small) in text for text in written)
+    moved = replace(SHORT, stages={"frf": import_module("pipelines.frf").Settings(model="/elsewhere/model.json")})
+    monkeypatch.setenv("HOME", "/elsewhere")
+    assert go(small, moved, no_report=True)[1] == []
 
 
 @pytest.mark.row("P08")
