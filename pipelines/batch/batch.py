@@ -83,18 +83,24 @@ def run_batch(plan: Plan, wanted: Wanted) -> Outcome[Summary]:
         records = _judged([done.records.get(item.slug) or done.missing(item) for item in items], baseline)
         summary = Summary(plan.stage, records, drift_of(records), tuple(_short(check, root) for check in checks), baseline,
                           bool(listener.number))
-        named = None if baseline is None else baseline.name
-        json_ = tilde({"command": "batch", **encode(result_of(plan.stage, records, summary.drifts, named, summary.checks))[0]})
-        report = tilde(summary_report(summary, figures=not (wanted.no_report or listener.number or done.fault)))
-        try:
-            folder.finish(summary, json_, None if wanted.no_report else report, wanted.check,
-                          _about(plan, wanted, done, started))
-        except EnvironmentFault:
-            if done.fault is None:
-                raise
+        outcome = _written(folder, summary, done, started)
     if done.fault is not None:
         raise done.fault
-    return Outcome(summary, json_, report, wanted.out or out.relative_to(Path.cwd()), _exit_code(summary, wanted, listener),
+    return outcome
+
+
+def _written(folder: BatchFolder, summary: Summary, done: _Done, started: float) -> Outcome[Summary]:
+    """Write the summary. Where the disk was full before, it may be full still: the first fault is told then."""
+    wanted, named = done.wanted, None if summary.baseline is None else summary.baseline.name
+    result = result_of(summary.stage, summary.records, summary.drifts, named, summary.checks)
+    json_ = tilde({"command": "batch", **encode(result)[0]})
+    report = tilde(summary_report(summary, figures=not (wanted.no_report or summary.interrupted or done.fault)))
+    try:
+        folder.finish(summary, json_, None if wanted.no_report else report, wanted.check, _about(done, started))
+    except EnvironmentFault:
+        if done.fault is None:
+            raise
+    return Outcome(summary, json_, report, wanted.out or folder.out.relative_to(Path.cwd()), _exit_code(summary, done),
                    (*summary.checks, *done.notices))
 
 
@@ -106,19 +112,20 @@ def _judged(records: Sequence[Record], baseline: ModelFile | None) -> tuple[Reco
     return tuple(records if baseline is None else (against(record, baseline) for record in records))
 
 
-def _exit_code(summary: Summary, wanted: Wanted, listener: Listener) -> int:
-    if listener.number:
-        return 128 + listener.number
+def _exit_code(summary: Summary, done: _Done) -> int:
+    if done.listener.number:
+        return 128 + done.listener.number
     errors = {(r.exit, (r.error or {}).get("code"), (r.error or {}).get("message")) for r in summary.records}
     if len(errors) == 1 and next(iter(errors))[0] == UsageError.exit_code:
         return UsageError.exit_code  # no item is to blame: what was asked of them all cannot be
     if summary.count("rejected", "failed"):
         return 4
-    return 1 if wanted.check and summary.count("found") else 0
+    return 1 if done.wanted.check and summary.count("found") else 0
 
 
-def _about(plan: Plan, wanted: Wanted, done: _Done, started: float) -> dict[str, object]:
+def _about(done: _Done, started: float) -> dict[str, object]:
     """What provenance.json says beside the outputs: all that may differ from one run to the next."""
+    plan, wanted = done.plan, done.wanted
     return {
         "command": "batch", "stage": plan.stage, "key": done.key, "seconds": {r.name: r.seconds for r in done.records.values()},
         "options": {"jobs": wanted.jobs, "backend": wanted.backend, "shard": list(wanted.shard), "resume": wanted.resume,
