@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.log.atomic import write_file
 from pipelines.log.experiment import Array
 from pipelines.log.results import json_text
@@ -32,7 +33,17 @@ def _put(path: Path, text: str) -> None:
 
 
 def read_covariance(path: Path) -> tuple[tuple[str, ...], Array]:
-    """What `write_covariance` wrote; NaN where a number is not determined."""
-    told = json.loads(read_small_text(path, what="a covariance (JSON)"))
-    rows = [[math.nan if value is None else float(value) for value in row] for row in told["covariance"]]
-    return tuple(map(str, told["names"])), np.array(rows).reshape(len(rows), len(rows))
+    """What `write_covariance` wrote; NaN where a number is not determined.
+
+    Raises:
+        InputRejected: S18, it is not of that form.
+    """
+    text = read_small_text(path, what="a covariance (JSON)")
+    try:
+        told = json.loads(text)
+        rows = [[math.nan if value is None else float(value) for value in row] for row in told["covariance"]]
+        names = tuple(map(str, told["names"]))
+        return names, np.array(rows, dtype=np.float64).reshape(len(names), len(names))
+    except (ValueError, TypeError, KeyError, RecursionError, OverflowError) as problem:
+        raise InputRejected("S18", f"not the covariance of a model's parameters: {type(problem).__name__}: {problem}", where=path,
+                            remedy="run estimate-bps again, or take the file away") from None

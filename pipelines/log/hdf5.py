@@ -15,7 +15,7 @@ from pipelines.log import canonical, schema
 from pipelines.log.chunks import store
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 
-__all__ = ["as_reals", "read_parts", "refuse_oversize", "write"]
+__all__ = ["as_reals", "explain", "foreign_storage", "read_parts", "refuse_oversize", "write"]
 
 _GROUPS = ("controller", "derived")
 _MANY_ATTRIBUTES = 64
@@ -81,7 +81,7 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[Experim
     except InputRejected:
         raise
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, UnicodeError, MemoryError) as problem:
-        raise _explain(problem, path) from None
+        raise explain(problem, path) from None
 
 
 def _read_file(file: Any, where: str, only: Collection[str] | None) -> tuple[ExperimentLog, str | None]:
@@ -196,12 +196,12 @@ def _robot_text(file: Any, where: str) -> str:
         raise InputRejected("S01", "the robot description /robot is missing", where=where,
                             remedy="a log explains itself: write /robot")
     dataset = file["robot"]
-    if dataset.shape != () or h5py.check_string_dtype(dataset.dtype) is None or _foreign_storage(dataset):
+    if dataset.shape != () or h5py.check_string_dtype(dataset.dtype) is None or foreign_storage(dataset):
         raise InputRejected("S20", "/robot is not a scalar text", where=where, remedy="write the robot's TOML as one text")
     return str(dataset.asstr()[()])
 
 
-def _foreign_storage(dataset: Any) -> str | None:
+def foreign_storage(dataset: Any) -> str | None:
     """X02, X03: external raw storage and virtual data sets read other files, or zeros where those are missing."""
     properties = dataset.id.get_create_plist()
     if properties.get_external_count() > 0:
@@ -219,7 +219,7 @@ def _within_budget(signals: Any, file_size: int, where: str) -> None:
         if signals.get(name, getclass=True) is not h5py.Dataset:
             raise InputRejected("S19", "not a data set", where=place, remedy="a signal is one data set")
         dataset = signals[name]
-        if foreign := _foreign_storage(dataset):
+        if foreign := foreign_storage(dataset):
             raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=place,
                                 remedy="store the data in the log itself")
         if dataset.dtype.kind not in "fiu" or dataset.dtype.itemsize > 8 or dataset.ndim not in (1, 2):
@@ -271,7 +271,7 @@ def as_reals(stored: Any, where: str) -> Array:
     return np.asarray(stored, dtype=np.float64)
 
 
-def _explain(problem: BaseException, path: Path) -> InputRejected:
+def explain(problem: BaseException, path: Path) -> InputRejected:
     """The library's message in the words of the table of bad inputs."""
     import re
 

@@ -22,10 +22,12 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.log.chunks import store
 from pipelines.log.experiment import Array
 
-__all__ = ["FLAT", "NOT_STORED", "decode", "encode", "json_text", "read_series", "write_series"]
+__all__ = ["FLAT", "NOT_STORED", "decode", "encode", "json_text", "read_foreign_series", "read_series",
+           "write_series"]
 
 NOT_STORED: Final[Mapping[str, object]] = {"stored": False}
 FLAT: Final[Mapping[str, object]] = {"flat": True}
@@ -115,10 +117,50 @@ def write_series(path: Path, series: Mapping[str, Array]) -> None:
 
 
 def read_series(path: Path) -> dict[str, Array]:
-    """What `write_series` wrote."""
+    """What `write_series` wrote, of a file whose bytes are known to be those."""
     import h5py
 
     found: dict[str, Array] = {}
     with h5py.File(path, "r") as file:
         file.visititems(lambda name, item: found.update({f"/{name}": item[()]}) if isinstance(item, h5py.Dataset) else None)
     return found
+
+
+def read_foreign_series(path: Path) -> dict[str, Array]:
+    """The same of a file that may come from anywhere: in a guarded child, and only numbers that lie in the file itself.
+
+    Raises:
+        InputRejected: F02-F04, damaged; X02, X03, X05, S12, it leads elsewhere or holds something else.
+    """
+    import h5py
+
+    from pipelines.log.guard import Answer, guarded
+    from pipelines.log.hdf5 import explain
+
+    def work() -> Answer:
+        try:
+            with h5py.File(path, "r", locking=False) as file:
+                _refuse_what_leads_elsewhere(file, path)
+            return Answer({}, read_series(path))
+        except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as problem:
+            raise explain(problem, path) from None
+
+    return dict(guarded(work, path).arrays)
+
+
+def _refuse_what_leads_elsewhere(file: Any, path: Path) -> None:
+    """Every data set, before one byte of it is read."""
+    import h5py
+
+    from pipelines.log.hdf5 import foreign_storage, refuse_oversize
+
+    found: list[Any] = []
+    file.visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)
+    for dataset in found:
+        where = f"{path}, {dataset.name}"
+        if foreign := foreign_storage(dataset):
+            raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=where,
+                                remedy="run the command again")
+        if dataset.dtype != np.float64:
+            raise InputRejected("S12", f"type {dataset.dtype}, no series of a result", where=where, remedy="run the command again")
+    refuse_oversize(8 * sum(math.prod(dataset.shape) for dataset in found), path.stat().st_size, "X05", str(path))

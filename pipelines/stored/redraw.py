@@ -15,7 +15,7 @@ from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.log.atomic import environment_faults, replace_folder, staging_folder
 from pipelines.log.files import PROVENANCE, hash_file
 from pipelines.log.places import keep_apart, refuse_foreign, tilde
-from pipelines.log.results import decode, json_text, read_series
+from pipelines.log.results import decode, json_text, read_foreign_series
 from pipelines.log.stored_result import StoredResult, listed_outputs, read_result
 from pipelines.report.render import write_report
 from pipelines.report.report import Report
@@ -95,7 +95,7 @@ def _series(stored: StoredResult) -> dict[str, Any]:
     if expected is not None and expected != hash_file(stored.series):
         raise InputRejected("F05", "sha256 differs from provenance.json: it was changed since it was written", where=stored.series,
                             remedy=_AGAIN)
-    return read_series(stored.series)
+    return read_foreign_series(stored.series)
 
 
 def _refers(value: Any) -> bool:

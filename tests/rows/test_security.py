@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.log.files import write_log
+from pipelines.log.files import hash_file, write_log
 from tests.healthy import good_log
 from tests.log.logs import small_log
 from tests.log.recording.good import RECIPE
@@ -81,6 +81,25 @@ def test_hdf5_that_misleads(name: str, command: Command, tmp_path: Path) -> None
     command("convert", "a.h5", "--out", "out").refused(code, 3, "a.h5", says)
     assert time.monotonic() - began < 3.0
     assert not (tmp_path / "out").exists()
+
+
+@row("X02")
+def test_a_result_of_somebody_else_is_drawn_without_opening_what_it_points_at(command: Command, tmp_path: Path) -> None:
+    """A folder sent along, its provenance true of its bytes: a series that lies in a pipe is refused, not waited for."""
+    write_log(tmp_path / "a.h5", small_log())
+    command("inspect", "a.h5", "--no-report", "--out", "out")
+    assert command("report", "out", as_json=False).exit == 0
+    series, provenance = tmp_path / "out/result.h5", tmp_path / "out/provenance.json"
+    os.mkfifo(tmp_path / "pipe")
+    before = hash_file(series)
+    with h5py.File(series, "a") as file:
+        names: list[str] = []
+        file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+        del file[names[0]]
+        file.create_dataset(names[0], (2000,), "f8", external=[(str(tmp_path / "pipe"), 0, 16000)])
+    provenance.write_text(provenance.read_text().replace(before, hash_file(series)))
+    done = command("report", "out", as_json=False)
+    assert (done.exit, done.err.split(":")[1].split()[0]) == (3, "RRID-X02"), done.err
 
 
 @row("X04")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.errors import InputRejected, UsageError
+from pipelines.errors import InputRejected
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.tabular import read_text
 from tests.log.recording.good import good, lines, text
@@ -179,17 +179,3 @@ def test_f01_nothing_in_it() -> None:
 def test_t08_a_header_alone() -> None:
     with pytest.raises(InputRejected, match="RRID-T08"):
         parse("t,q_1\n")
-
-
-@given(data=st.data())
-@settings(max_examples=150, deadline=None)
-def test_no_mutation_escapes_as_another_error(data: st.DataObject) -> None:
-    """Whatever happens to its bytes, a text file is read or refused in words."""
-    content = bytearray("\n".join(lines()[:40]).encode())
-    for _ in range(data.draw(st.integers(1, 12))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    try:
-        table = parse(bytes(content[: data.draw(st.integers(0, len(content)))]))
-    except (InputRejected, UsageError):
-        return
-    assert all(values.size == table.rows.size for values in table.columns.values())
