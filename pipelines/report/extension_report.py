@@ -11,6 +11,8 @@ from pipelines.report.style import format_number
 
 __all__ = ["extension_report"]
 
+_FLOOR = "The floor is the noise in the residual itself, which no model can be below."
+
 
 def extension_report(result: Extension) -> Report:
     """Verdict, key figures, one section a cause, what was refused."""
@@ -24,7 +26,7 @@ def extension_report(result: Extension) -> Report:
     sections.append(_basis(result))
     if result.doctor:
         sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
-    return Report("Extension", _verdict(result), tone, torque_errors(result.residual_rms, result.after_rms, result.rated),
+    return Report("Extension", _verdict(result), tone, torque_errors(result.residual_rms, result.after_rms, result.rated, _FLOOR),
                   tuple(sections))
 
 
