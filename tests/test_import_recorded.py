@@ -103,3 +103,14 @@ def test_only_the_resampling_is_said_of_the_uneven_set(tx40: Outcome[Result], od
     assert codes(tx40) == {}
     assert codes(odrive) == {"T05": "warn", "T04": "ok"}  # T04: the way back that the recipe leaves out
     assert any("intervals of more than 1.5 times the median bridged" in check.message for check in odrive.checks)
+
+
+def test_the_way_back_over_a_whole_turn_is_left_out(odrive: Outcome[Result]) -> None:
+    """Three runs begin with it, at up to 12 rev/s; what is left turns as slowly as it was told to, give or take its ripple."""
+    for name in ("nocomp_1", "nocomp_2", "slower_comp_0"):
+        log = open_log(odrive.folder / "logs" / f"{name}.h5").log
+        assert log.t[0] >= 0.5
+        assert np.abs(np.gradient(log.q[:, 0], log.t)).max() < 10.0
+    said = [check.message for check in odrive.checks if check.code == "T04"]
+    assert len(said) == 3
+    assert all("the first 0.5 s" in message for message in said)

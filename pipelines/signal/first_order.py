@@ -22,8 +22,8 @@ Array = npt.NDArray[np.float64]
 _GAP = 1.5  # sample times
 
 
-def lagging(x: Array, t: Array, time_constant: float) -> Array:
-    """y (…, samples) of x (…, samples), settled at the start and behind every gap of t [s].
+def lagging(x: Array, t: Array, time_constant: float, start: Array | float | None = None, since: int = 0) -> Array:
+    """y (…, samples) of x (…, samples), settled at the start and behind every gap of t [s]; or `start` up to sample `since`.
 
         y_{k+1} = a y_k + (m - a) x_k + (1 - m) x_{k+1},   a = exp(-h/T),   m = (1 - a) T/h
     """
@@ -31,10 +31,14 @@ def lagging(x: Array, t: Array, time_constant: float) -> Array:
         return np.array(x, dtype=np.float64)
     y = np.empty(x.shape)
     for part, h in _stretches(t):
-        own = x[..., part].reshape(-1, part.stop - part.start)
+        own = np.array(x[..., part].reshape(-1, part.stop - part.start), dtype=np.float64)
         a, m = _decay(h, time_constant)
         drive = np.concatenate([own[:, :1], (m - a) * own[:, :-1] + (1.0 - m) * own[:, 1:]], axis=1)
-        y[..., part] = scan(np.full((1, 1, 1), a), drive[:, :, None])[:, :, 0].reshape(x[..., part].shape)
+        first = since if start is not None and part.start == 0 and since < own.shape[1] else 0
+        if start is not None and part.start == 0:
+            drive[:, first], own[:, :first] = start, start
+        own[:, first:] = scan(np.full((1, 1, 1), a), drive[:, first:, None].copy())[:, :, 0]
+        y[..., part] = own.reshape(x[..., part].shape)
     return y
 
 

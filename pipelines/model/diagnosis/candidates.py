@@ -150,7 +150,7 @@ def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bo
 
 def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -> Array:
     """(shapes, k, joints, rows)"""
-    tables = [recorded(whole, _finite(table), one.motion.t).transpose(2, 1, 0)
+    tables = [recorded(whole, _finite(table), one.motion).transpose(2, 1, 0)
               for table in some[0].several(some, one.motion, arm)]
     k, joints, samples = tables[0].shape
     acting = np.flatnonzero([any(table[:, j].any() for table in tables) for j in range(joints)])

@@ -244,7 +244,17 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     runs = tuple(_run(equations, run, skip) for run in equations.runs)
     slow = np.concatenate([equations.rows.slow[run][one.chosen * one.every] for run, one in zip(equations.runs, fine, strict=True)])
     asked = tau if equations.held else None  # a measured torque was there: nothing of it can have been kept back
-    return LogData(log, equations, Motion(t, q, dq, ddq, asked), y, ~slow.T, pieces, runs, kept, place)
+    since = _first_known(runs[0], pieces[0])
+    logged = None if equations.held else tau[since]
+    return LogData(log, equations, Motion(t, q, dq, ddq, asked, logged, since), y, ~slow.T, pieces, runs, kept, place)
+
+
+def _first_known(run: _Run, piece: slice) -> int:
+    """The sample from which on the motion is good, by a period of the low-pass before the first row."""
+    if not len(run.chosen):
+        return 0
+    first = int(run.chosen[0]) * run.every
+    return max(0, min(first - run.pad // int(_PAD), piece.stop - 1))
 
 
 def _skipped(equations: LogEquations) -> int:
@@ -252,7 +262,9 @@ def _skipped(equations: LogEquations) -> int:
     how = equations.conditioning
     if how.cutoff_hz is None:
         return 1
-    most = int(1.0 / (_AMPLE * how.cutoff_hz * equations.found.good.log.sample_time))
+    step = equations.found.good.log.sample_time
+    highest = min(how.cutoff_hz, 0.5 / (step * how.decimation))  # rows further apart than the low-pass asks for show less
+    most = int(1.0 / (_AMPLE * highest * step))
     return max((k for k in range(1, max(most, 1) + 1) if how.decimation % k == 0), default=1)
 
 

@@ -272,11 +272,11 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[tuple[int, in
 
     def linear(motion: Motion) -> Array:
         rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
-        return recorded(arm, np.concatenate([rigid, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion.t)
+        return recorded(arm, np.concatenate([rigid, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion)
 
     def alone(one: Named) -> Array:
         return data.lay_each(lambda log, motion: recorded(
-            arm, one.effect.at(one.values).columns(motion, model.nominal) @ np.array(one.amplitudes), motion.t)
+            arm, one.effect.at(one.values).columns(motion, model.nominal) @ np.array(one.amplitudes), motion)
             if one.log in (None, log) else np.zeros_like(motion.q))
 
     here, more = model.torque(data), []

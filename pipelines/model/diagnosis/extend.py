@@ -151,7 +151,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     """Fitted one after the other, the strongest first; and why some of them are not accepted."""
     none = np.zeros(len(case.families))
     free = Thresholds(none, none, "none: the cause was named", case.weight, tuple(f.joint for f in case.families))
-    found = search(replace(case, thresholds=free), len(case.families))
+    found = search(replace(case, thresholds=free, again=False), len(case.families))
     steps = [step for step in found.steps if step.best is not None]
     ruling = Ruling("cause", tuple(range(len(steps))), "")
     arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in steps if step.best is not None)]

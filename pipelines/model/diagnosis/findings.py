@@ -15,6 +15,7 @@ from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.exact import Refined
 from pipelines.model.diagnosis.gains import Simulation, gain_of, torque_gain, worse_log
 from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.joined import once_each
 from pipelines.model.diagnosis.numbers import acting, parameters
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Value
 from pipelines.model.diagnosis.search import Found, Step, Tried, held_out_left
@@ -44,7 +45,7 @@ def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prep
             continue
         gain = gain_of(torque_gain(step.before, step.best.done, prepared.judge, blocks), simulated[k], simulated[k + 1])
         out.append(_finding(found, step, step.best, place, covariance, nominal, floor, gain, draw))
-    return tuple(sorted(out, key=lambda one: -one.explained))
+    return once_each(sorted(out, key=lambda one: -one.explained))
 
 
 def held_finding(part: Part, nominal: Array, floor: Array, draw: bool) -> Finding:

@@ -1,6 +1,6 @@
 """What the record makes of torque: as it comes out of an effect that all torque of its joint passes through.
 
-    recorded(arm, table, t)                       columns over a motion, by everything in `arm` that changes the record
+    recorded(arm, table, motion)                  columns over a motion, by everything in `arm` that changes the record
     passed_rows(data, effect, amplitude, x)       rows, which are far apart: enough to see what is worth an exact fit
 """
 
@@ -12,26 +12,32 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.body import Motion
 
 __all__ = ["passed_rows", "recorded"]
 
 
-def recorded(arm: Arm, table: Array, t: Array) -> Array:
-    """Torque (samples, joints) or columns (samples, joints, k) as they come out of all in `arm` that changes the record."""
+def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
+    """Torque (samples, joints) or columns (samples, joints, k) as they come out of all in `arm` that changes the record.
+
+    Where the log tells the torque at its start, that is no column's: each begins with nothing.
+    """
+    start = None if motion.logged is None else 0.0
     for acting in arm.effects:
         if acting.effect.passing:
             joint = (acting.effect.joint or 1) - 1
             amplitude = float(acting.effect.amplitudes(acting.values)[0])
-            table = table.copy()
-            table[:, joint] = acting.effect.passed(amplitude, np.ascontiguousarray(table[:, joint].T), t).T
+            own, table = np.ascontiguousarray(table[:, joint].T), table.copy()
+            table[:, joint] = acting.effect.passed(amplitude, own, motion.t, start, motion.since).T
     return table
 
 
-def passed_rows(data: Data, effect: Effect, amplitude: float, x: Array) -> Array:
-    """(…, rows) with the rows of the effect's joint as they come out of it."""
+def passed_rows(data: Data, effect: Effect, amplitude: float, x: Array, whole: bool = False) -> Array:
+    """(…, rows) with the rows of the effect's joint as they come out of it; `whole` torque begins where the log does."""
     out, first, joint = x.copy(), 0, (effect.joint or 1) - 1
     for one in data.logs:
         own = slice(first + joint * one.rows, first + (joint + 1) * one.rows)
-        out[..., own] = effect.passed(amplitude, x[..., own], one.t)
+        start = None if one.motion.logged is None else float(one.y[joint, 0]) if whole else 0.0
+        out[..., own] = effect.passed(amplitude, x[..., own], one.t, start)
         first += one.n_joints * one.rows
     return out

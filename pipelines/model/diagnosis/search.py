@@ -41,6 +41,7 @@ _MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
+_FALLS = 0.02  # of the held-out error, that a cause takes off at least where no floor says what is left to explain
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
 
@@ -61,6 +62,7 @@ class Case:
     blocks: int = 10
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Changed | None = None  # what has changed since the reference logs
+    again: bool = True  # a cause that may act more than once at its place may be found more than once
     beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
 
 
@@ -146,9 +148,9 @@ def _share(one: Screened, now: Refined) -> float:
 def _explored(case: Case, now: Refined) -> Explored:
     screened = screen(case.data, now.fit, case.families, now.model.arm)
     taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
-    order = sorted((one for one in screened if one.gain[0] >= _LEAST * now.rss
-                    and (one.family.event or (one.cause, one.joint) not in taken or one.shape[0].again(case.data.logs[0].motion))),
-                   key=lambda one: -one.gain[0])
+    able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
+            or (case.again and one.shape[0].again(case.data.logs[0].motion))]
+    order = sorted((one for one in able if one.gain[0] >= _LEAST * now.rss), key=lambda one: -one.gain[0])
     error = held_out(now, case)
     able = [one for one in order if one.family.shapes[0].evidence in case.nameable]
     tried = [_fitted(case, now, one, error) for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
@@ -165,6 +167,8 @@ def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
         thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
     passes = {id(one) for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True) if seen.gain[0] > bound}
     tried = [one for one in explored.tried if id(one.screened) in passes]
+    if case.thresholds is None and case.changed is None:
+        tried = [one for one in tried if one.error <= 1.0 - _FALLS]
     best = _fewest(tried) if more else None
     other = _other([one for one in screened if id(one) in passes], best, now, case.nameable)
     best = None if other is not None else best

@@ -35,7 +35,7 @@ def passed_through(data: Data, fit: Fit, effect: Effect, residuals: Array) -> tu
     gains = []
     for amplitude in effect.passing:
         table = passed_rows(data, effect, amplitude, fit.table)
-        modelled = passed_rows(data, effect, amplitude, fit.modelled)
+        modelled = passed_rows(data, effect, amplitude, fit.modelled, whole=True)
         left = (fit.modelled - modelled) * fit.weights + residuals
         basis = orthonormal(table * fit.weights)
         left -= (left @ basis.T) @ basis
@@ -50,7 +50,7 @@ def beyond_first_order(now: Refined, effect: Effect, amplitude: float) -> Exact:
     linear = [*range(count), *(count + k for k, (kind, _, name) in enumerate(now.names) if kind == 1 and name.isdigit())]
     table = passed_rows(now.data, effect, amplitude, now.slopes[linear]) * now.weights
     modelled = now.fit.modelled
-    left = (now.left + modelled - passed_rows(now.data, effect, amplitude, modelled)) * now.weights
+    left = (now.left + modelled - passed_rows(now.data, effect, amplitude, modelled, whole=True)) * now.weights
     size = np.linalg.norm(table, axis=1)
     size = np.where(size > 0.0, size, 1.0)
     shift = np.zeros(len(now.slopes))

@@ -239,8 +239,12 @@ class Effect(ABC):
         """The parameters of a finding, named as in causes.md; whole numbers are integers."""
         return {q.name: int(values[q.name]) if q.discrete else values[q.name] for q in self.parameters}
 
-    def passed(self, amplitude: float, x: Array, t: Array) -> Array:
-        """Any torque `x` (samples,) of its joint as it comes out of it, where `passing` says that all of it goes through."""
+    def passed(self, amplitude: float, x: Array, t: Array, start: Array | float | None = None, since: int = 0) -> Array:
+        """Any torque `x` (…, samples) of its joint as it comes out of it, where `passing` says that all of it goes through.
+
+        Args:
+            start: what comes out up to sample `since`; None: as if `x` had been so before.
+        """
         return x
 
     @classmethod

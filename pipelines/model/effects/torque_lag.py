@@ -36,17 +36,19 @@ class TorqueLag(Effect):
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque goes through the low-pass H, other effects included: y = H τ = τ - T H dτ/dt.
 
-        The first form where the lag is longer than some samples, whatever the torque does between them; the second keeps its
-        slope at T = 0 and is exact to the differences' error.
+        The first form where the lag is longer than some samples, whatever the torque does between them, from the torque that the
+        log shows first, where it was measured; the second keeps its slope at T = 0 and is exact to the differences' error.
         """
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
         time, own, t = values["time_constant"], self.own(tau), motion.t
         long = len(t) > 1 and time > _LONG * float(np.median(np.diff(t)))
-        tau[:, self._index] = lagging(own, t, time) if long else own - time * lagging(rate_of_change(own, t), t, time)
+        start = None if motion.logged is None else float(self.own(motion.logged))
+        late = lagging(own, t, time, start, motion.since) if long else own - time * lagging(rate_of_change(own, t), t, time)
+        tau[:, self._index] = late
         return tau
 
-    def passed(self, amplitude: float, x: Array, t: Array) -> Array:
-        return lagging(x, t, amplitude)
+    def passed(self, amplitude: float, x: Array, t: Array, start: Array | float | None = None, since: int = 0) -> Array:
+        return lagging(x, t, amplitude, start, since)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm moves as without it; only the log differs."""

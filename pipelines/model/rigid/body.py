@@ -24,6 +24,8 @@ class Motion:
     dq: Array  # [rad/s] (samples, joints)
     ddq: Array  # [rad/s^2] (samples, joints)
     tau: Array | None = None  # [N m] (samples, joints) as logged, held from each sample to the next; None: not known
+    logged: Array | None = None  # [N m] (joints,) measured torque at sample `since`, before which the motion is vague
+    since: int = 0
 
 
 @dataclass(frozen=True)

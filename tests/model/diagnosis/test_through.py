@@ -1,0 +1,103 @@
+"""A torque that is logged late hides a rotor's inertia; the lag is named, and the inertia comes out. SciPy makes the logs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from pipelines.log.experiment import Array, ExperimentLog, Signal
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.exact import Exact, refine
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.search import Case, Found, search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects.cogging import Cogging
+from pipelines.model.effects.torque_lag import TorqueLag
+from pipelines.model.rigid.body import Motion
+from pipelines.signal.first_order import lagging
+from tests.diagnose.sessions import but
+
+_ROBOT = """
+name = "motor"
+gravity = [0.0, 0.0, -9.81]
+[kinematics]
+convention = "dh"
+[[joint]]
+name = "rotor"
+type = "revolute"
+a = 0.0
+alpha = 0.0
+d = 0.0
+offset = 0.0
+"""
+_INERTIA, _LAG, _ORDER = 2.5e-4, 0.1, 7.0
+_FINE, _RATE, _SECONDS = 8000, 400, 10.0
+_LIBRARY = but("cogging", "torque_lag", "drive_lag", "time_delay", "torque_offset", "asymmetric_friction")
+
+
+def turned(seed: int) -> ExperimentLog:
+    """A rotor that turns once in ten seconds, unevenly: its torque, and what a low-pass of 0.1 s leaves of it in the log."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(_FINE * _SECONDS)) / _FINE
+    rates, phases = 2.0 * np.pi * np.array([0.7, 1.6, 3.1, 5.3]), rng.uniform(0.0, 2.0 * np.pi, 4)
+    size = np.array([0.4, 0.4, 0.5, 0.5]) * 0.4  # [rad/s]
+    q = 0.65 * t + sum(a / w * np.sin(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
+    dq = 0.65 + sum(a * np.cos(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
+    ddq = sum(-a * w * np.sin(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
+    tau = _INERTIA * ddq + 0.01 * np.tanh(30.0 * dq) + 0.004 * dq + 0.04 * np.sin(_ORDER * q + 0.4)
+    late = lsim(([1.0], [_LAG, 1.0]), tau, t, X0=[tau[0] * _LAG])[1]
+    every = _FINE // _RATE
+    seen = (t[::every], (q[::every] + rng.normal(0.0, 1e-6, len(t[::every])))[:, None],
+            (late[::every] + rng.normal(0.0, 2e-5, len(t[::every])))[:, None])
+    signals = {name: Signal(x, unit, name) for name, x, unit in zip(("t", "q", "tau"), seen, ("s", "rad", "N m"), strict=True)}
+    return ExperimentLog(f"turn-{seed}", "free", "identify", "measured", "motor", 1.0 / _RATE, _ROBOT, signals, torque="measured")
+
+
+@pytest.fixture(scope="module")
+def found() -> Found:
+    settings = DiagnosisSettings(replicas=0, cutoff_hz=40.0)
+    prepared = prepare(Logs((turned(1), turned(2))), settings)
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    every = families(columns.laws, whole_motion(prepared.data), model.arm, _LIBRARY)
+    return search(Case(prepared.data, None, model, fit.weight, every, None), 2)
+
+
+def test_lag_and_ripple_are_named_and_the_inertia_comes_out(found: Found) -> None:
+    assert abs(found.nominal.model.beta[0] / _INERTIA - 1.0) > 0.5  # the nominal model knows nothing of it
+    named = {one.effect.name: one for one in found.final.model.effects}
+    assert set(named) == {"cogging", "torque_lag"}
+    assert named["torque_lag"].values["time_constant"] == pytest.approx(_LAG, rel=0.005)
+    assert named["cogging"].values["order"] == pytest.approx(_ORDER, rel=1e-3)
+    assert found.final.model.beta[0] == pytest.approx(_INERTIA, rel=0.01)
+
+
+def test_slopes_of_a_model_behind_a_lag_are_those_of_its_torque(found: Found) -> None:
+    """Every number moved by a little and the whole torque worked out again."""
+    model, data = found.final.model, found.final.data
+    done = refine(model, data, found.final.weight, steps=0)
+    for k in range(len(model.beta)):
+        shift = np.zeros(len(done.slopes))
+        shift[k] = step = 1e-3 * (abs(model.beta[k]) or 1.0)
+        moved = (model.moved(shift, list(done.names)).torque(data) - model.torque(data)) / step
+        assert np.linalg.norm(moved - done.slopes[k]) < 1e-6 * np.linalg.norm(moved)
+
+
+def test_what_changes_the_record_stays_outermost() -> None:
+    """Cogging that was found after the lag is logged late like everything else."""
+    log = turned(1)
+    prepared = prepare(Logs((log,)), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    arm: Arm = Exact.start(columns, fit).arm
+    lag = Acting.of(TorqueLag(joint=1), {"time_constant": 0.1})
+    wave = Acting.of(Cogging(joint=1, order=7.0, harmonics=1), Cogging(joint=1, order=7.0, harmonics=1).values([0.04, 0.0]))
+    motion: Motion = prepared.data.logs[0].motion
+    either, other = arm.extended(lag, wave).torque(motion), arm.extended(wave, lag).torque(motion)
+    whole: Array = arm.extended(wave).torque(motion)
+    assert np.allclose(either, other, rtol=0.0, atol=1e-15)
+    assert motion.logged is not None
+    late = lagging(whole[:, 0], motion.t, 0.1, float(motion.logged[0]), motion.since)
+    assert np.allclose(either[:, 0], late, rtol=0.0, atol=1e-12)
