@@ -254,7 +254,7 @@ def _first_known(run: _Run, piece: slice) -> int:
     if not len(run.chosen):
         return 0
     first = int(run.chosen[0]) * run.every
-    return max(0, min(first - run.pad // int(_PAD), piece.stop - 1))
+    return int(max(0, min(first - run.pad // int(_PAD), piece.stop - 1)))
 
 
 def _skipped(equations: LogEquations) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -25,7 +25,7 @@ class Motion:
     ddq: Array  # [rad/s^2] (samples, joints)
     tau: Array | None = None  # [N m] (samples, joints) as logged, held from each sample to the next; None: not known
     logged: Array | None = None  # [N m] (joints,) measured torque at sample `since`, before which the motion is vague
-    since: int = 0
+    since: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True)
