@@ -23,6 +23,8 @@ _LONG_ATTRIBUTE = 1 << 20  # [B] a model.json in /controller is the longest a lo
 # A chunk of gzip cannot unpack to more than 1032 times its size, and `t` never repeats: no honest log comes near this.
 _LARGEST_RATIO = 1100
 _ALWAYS_ALLOWED = 64 << 20  # [B]
+# Only a log in which nothing moves is packed to a three-hundredth, and nobody records a quarter of a gigabyte of that.
+_LONG, _LONG_RATIO = 256 << 20, 300  # [B], and how many times the file
 _CHUNK = 65536  # samples
 
 
@@ -232,7 +234,7 @@ def _within_budget(signals: Any, file_size: int, where: str) -> None:
 
 def refuse_oversize(declared: int, file_size: int, code: str, where: str) -> None:
     """Raise unless a file of `file_size` bytes may honestly hold `declared` bytes of samples."""
-    if declared > max(_ALWAYS_ALLOWED, _LARGEST_RATIO * file_size):
+    if declared > max(_ALWAYS_ALLOWED, _LARGEST_RATIO * file_size) or declared > max(_LONG, _LONG_RATIO * file_size):
         raise InputRejected(code, f"declares {declared / 1e6:.0f} MB in a file of {file_size / 1e6:.3f} MB", where=where,
                             remedy="this is not a recording; if it is, store it uncompressed")
 

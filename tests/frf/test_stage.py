@@ -126,6 +126,19 @@ def test_reference_logs_are_not_mixed_in() -> None:
     assert [r.logs for r in computed(before).responses if r.method == "direct"] == [("before",)]
 
 
+@pytest.mark.row("T05")
+def test_an_uneven_clock_has_no_spectrum(tmp_path: Path) -> None:
+    """Elsewhere a warning; here exit 3, with the signal and what to do."""
+    log = replace(LINK, seconds=4.0).log()
+    uneven = log.t + np.random.default_rng(1).uniform(-0.2, 0.2, log.n_samples) * log.sample_time
+    log = replace(log, signals={**log.signals, "t": replace(log.signals["t"], values=uneven)})
+    write_log(tmp_path / "turned.h5", log)
+    with pytest.raises(InputRejected, match="RRID-T05 .*turned.*varies by 1[0-9]") as refused:
+        run_stage(frf.STAGE, Request((tmp_path / "turned.h5",), out=tmp_path / "out"), QUICK)
+    assert refused.value.exit_code == 3
+    assert refused.value.remedy
+
+
 @pytest.mark.row("D13")
 def test_low_coherence_everywhere_is_a_gate(tmp_path: Path) -> None:
     """A thousandth of the disturbance: D13, exit 1 under --check, and what to record."""
