@@ -20,6 +20,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.linear import covariance, solved, visibility
 from pipelines.model.diagnosis.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows
 from pipelines.model.diagnosis.record import recorded
 from pipelines.model.effects.base import Effect, Quantity
@@ -34,6 +35,7 @@ _RIDGES = (0.0, 1e-4, 1e-2)  # of unit columns: two numbers that do nearly the s
 _GAIN = 1e-5  # of the squared residual: less is no progress
 _DIFFERENCE = 1e-3  # of a number, for slopes
 _FARTHEST = 0.5  # of ln shape, a step
+_INVISIBLE = 1e-3  # η below which a number is one that the others are as well
 
 
 @dataclass(frozen=True)
@@ -207,7 +209,7 @@ class Refined:
 
     def covariance(self) -> Array:
         """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for."""
-        return _covariance(self)
+        return covariance(self.slopes * self.weights, self.residual)
 
 
 def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target: Array | None = None) -> Refined:
@@ -312,14 +314,21 @@ def _steps(one: Named) -> list[tuple[str, float]]:
 
 
 def _within(model: Exact, names: list[tuple[int, int, str]], table: Array, y: Array, ridge: float) -> Array:
-    """The step for every number; one that would leave its range stays at its end, and the others do without it."""
-    shift = _solved(table, y, ridge)
-    stuck = [len(model.beta) + k for k, which in enumerate(names) if _beyond(model, which, float(shift[len(model.beta) + k]))]
-    if stuck:
-        free = np.ones(len(table), dtype=bool)
-        free[stuck] = False
-        shift = np.zeros(len(table))
-        shift[free] = _solved(table[free], y, ridge)
+    """The step for every number; the others do without one that would leave its range, and stays at its end, and without one of
+    an effect that the rest of the model does as well: rounding would move it anywhere."""
+    first = len(model.beta)
+    own = [first + k for k, (kind, _, _) in enumerate(names) if kind == 1]
+    stuck = [k for k, eta in zip(own, visibility(table, own), strict=True) if eta < _INVISIBLE]
+    shift = _without(table, y, ridge, stuck)
+    beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
+    return _without(table, y, ridge, [*stuck, *beyond]) if beyond else shift
+
+
+def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
+    free = np.ones(len(table), dtype=bool)
+    free[stuck] = False
+    shift = np.zeros(len(table))
+    shift[free] = solved(table[free], y, ridge)
     return shift
 
 
@@ -332,30 +341,3 @@ def _beyond(model: Exact, which: tuple[int, int, str], by: float) -> bool:
     quantity = next(q for q in effect.parameters if q.name == name)
     here = float(getattr(effect, name))
     return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
-
-
-def _solved(table: Array, y: Array, ridge: float = 0.0) -> Array:
-    size = np.linalg.norm(table, axis=1)
-    size = np.where(size > 0.0, size, 1.0)
-    unit = table / size[:, None]
-    values, vectors = np.linalg.eigh(unit @ unit.T)
-    keep = values > 1e-11 * values[-1]
-    return np.asarray((vectors[:, keep] / (values[keep] + ridge)) @ (vectors[:, keep].T @ (unit @ y)) / size)
-
-
-def _covariance(done: Refined) -> Array:
-    """Newey & West 1987 over the rows of each joint, 20 lags: neighbouring rows share the noise of the low-pass."""
-    table = done.slopes * done.weights
-    size = np.linalg.norm(table, axis=1)
-    size = np.where(size > 0.0, size, 1.0)
-    unit = table / size[:, None]
-    values, vectors = np.linalg.eigh(unit @ unit.T)
-    keep = values > 1e-11 * values[-1]
-    bread = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
-    scores = unit * done.residual
-    meat = scores @ scores.T
-    for lag in range(1, 21):
-        cross = scores[:, lag:] @ scores[:, :-lag].T
-        meat += (1.0 - lag / 21.0) * (cross + cross.T)
-    return np.asarray(bread @ meat @ bread / size / size[:, None])
-

@@ -1,26 +1,69 @@
-"""How sure the numbers of a linear fit are whose rows depend on one another."""
+"""Least squares around a solution: the step, what a number adds to the others, and how sure numbers of dependent rows are.
+
+Columns are brought to unit length first, so that units do not matter; directions that rounding makes are left alone.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 
-__all__ = ["deviations"]
+__all__ = ["covariance", "deviations", "solved", "visibility"]
 
 _LAGS = 20  # rows next to each other that share the noise of the low-pass
+_ROUNDING = 1e-11  # of the largest eigenvalue
 
 
-def deviations(table: Array, residual: Array) -> Array:
-    """Standard deviations (k,) of the coefficients of `table` (k, rows), weighted: Newey & West 1987, 20 lags."""
-    size = np.linalg.norm(table, axis=1)
-    unit = table / np.where(size > 0.0, size, 1.0)[:, None]
-    values, vectors = np.linalg.eigh(unit @ unit.T)
-    keep = values > 1e-11 * values[-1]
-    bread = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
+def solved(table: Array, y: Array, ridge: float = 0.0) -> Array:
+    """(k,) coefficients of `table` (k, rows), smallest where rows do not tell; `ridge` of unit columns."""
+    unit, size = _unit(table)
+    values, vectors = _seen(unit @ unit.T)
+    return np.asarray((vectors / (values + ridge)) @ (vectors.T @ (unit @ y)) / size)
+
+
+def visibility(table: Array, wanted: Sequence[int]) -> Array:
+    """(wanted,) part of each wanted column of `table` (k, rows) that no combination of the other columns is."""
+    unit, _ = _unit(table)
+    gram, found = unit @ unit.T, []
+    for place in wanted:
+        others = np.arange(len(table)) != place
+        values, vectors = _seen(gram[np.ix_(others, others)])
+        along = vectors.T @ gram[others, place]
+        found.append(gram[place, place] - float(along @ (along / values)))
+    return np.asarray(np.sqrt(np.clip(found, 0.0, 1.0)))
+
+
+def covariance(table: Array, residual: Array) -> Array:
+    """(k, k) of the coefficients of `table` (k, rows), weighted.
+
+    Newey & West 1987 over the rows of each joint, 20 lags: neighbouring rows share the noise of the low-pass.
+    """
+    unit, size = _unit(table)
+    values, vectors = _seen(unit @ unit.T)
+    bread = (vectors / values) @ vectors.T
     scores = unit * residual
     meat = scores @ scores.T
     for lag in range(1, _LAGS + 1):
         cross = scores[:, lag:] @ scores[:, :-lag].T
         meat += (1.0 - lag / (_LAGS + 1.0)) * (cross + cross.T)
-    return np.asarray(np.sqrt(np.maximum(np.diag(bread @ meat @ bread), 0.0)) / np.where(size > 0.0, size, 1.0))
+    return np.asarray(bread @ meat @ bread / size / size[:, None])
+
+
+def deviations(table: Array, residual: Array) -> Array:
+    """Standard deviations (k,) of the coefficients of `table` (k, rows), weighted: those of `covariance`."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance(table, residual)), 0.0)))
+
+
+def _unit(table: Array) -> tuple[Array, Array]:
+    size = np.linalg.norm(table, axis=1)
+    size = np.where(size > 0.0, size, 1.0)
+    return table / size[:, None], size
+
+
+def _seen(gram: Array) -> tuple[Array, Array]:
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > _ROUNDING * values[-1]
+    return values[keep], vectors[:, keep]

@@ -22,9 +22,9 @@ from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.through import passed_through
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Screened", "gains_of", "products_of", "screen", "screen_event", "screen_family"]
+__all__ = ["INVISIBLE", "Screened", "gains_of", "products_of", "screen", "screen_event", "screen_family"]
 
-_INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
+INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
 _USUAL = 0.25  # of the shapes reach less
 _EVENTS = 3  # residuals that an event is looked for in
 _SPREAD = 1e-4  # of the largest: directions of c⊥ that are left alone
@@ -130,7 +130,7 @@ class Products:
         unit = self.gram / scale[:, :, None] / scale[:, None, :]
         values, vectors = np.linalg.eigh(unit)
         turned = np.square(np.einsum("skl,skm->slm", vectors, self.moment / scale[:, :, None]))
-        lowest = np.maximum(_INVISIBLE**2, _SPREAD**2 * values[:, -1:])
+        lowest = np.maximum(INVISIBLE**2, _SPREAD**2 * values[:, -1:])
         sure = values > lowest
         gain = np.sum(np.where(sure[:, :, None], turned / np.where(sure, values, 1.0)[:, :, None], 0.0), axis=1)
         share = np.sqrt(np.clip(np.einsum("skk->s", unit) / k, 0.0, None))

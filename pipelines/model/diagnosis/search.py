@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.exact import Exact, Refined, refine
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import Fit, orthonormal
 from pipelines.model.diagnosis.result import Trial
-from pipelines.model.diagnosis.screen import Screened, screen
+from pipelines.model.diagnosis.screen import INVISIBLE, Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.diagnosis.through import beyond_first_order
 from pipelines.model.effects.base import Effect
@@ -267,9 +267,10 @@ def _laid(data: Data, effect: Effect, arm: Arm) -> Array:
 
 
 def _amplitudes(fit: Fit, table: Array) -> Array:
+    """Zero for a column that the model has already: what is left of it is rounding, and would be blown up."""
     c = fit.project(table)
     size = np.linalg.norm(c, axis=1)
-    size = np.where(size > 0.0, size, np.inf)
+    size = np.where(size > INVISIBLE * np.linalg.norm(table * fit.weights, axis=1), size, np.inf)
     unit = c / size[:, None]
     solved, *_ = np.linalg.lstsq(unit @ unit.T, unit @ fit.residual, rcond=1e-8)
     return np.asarray(solved / size)
