@@ -156,7 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     here = os.environ.get("RRRID_RECORDED") or Path(__file__).resolve().parents[2] / "shared" / "real"
     parser.add_argument("--data", type=Path, default=Path(here))
     parser.add_argument("--only", choices=("tx40", "odrive"))
-    parser.add_argument("--folds", type=int, default=10)
+    parser.add_argument("--folds", type=int, default=5)
     given = parser.parse_args(arguments)
     if given.only != "tx40":
         _print_odrive(given.data)

@@ -159,8 +159,10 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     told = findings(found, ruling, simulated, prepared, found.nominal.rms, white(case.data, found.final.left), chosen.blocks,
                     chosen.evidence)
     why: dict[tuple[str, int | None], str] = {}
+    late = any(step.best is not None and step.best.effect.last for step in steps)
     for k, step in enumerate(steps):
-        if step.best is not None and (doubt := sure(step, prepared, chosen.blocks) or farther(simulated[k], simulated[k + 1])):
+        if step.best is not None and (doubt := sure(step, prepared, chosen.blocks) or
+                                      farther(simulated[k], simulated[k + 1], late)):
             why[step.best.effect.name, step.best.effect.joint] = doubt
     taken = {(one.cause, one.joint) for one in told}
     why |= {(f.cause, f.joint): "it takes nothing off the held-out error" for f in case.families

@@ -91,9 +91,13 @@ def worse_log(data: Data, before: Array, after: Array) -> str:
     return ""
 
 
-def farther(before: Simulation, after: Simulation) -> str:
-    """Why the second simulated arm is no nearer to the measured one than the first; empty where it is, or chance hides it."""
-    if before.how == "none":
+def farther(before: Simulation, after: Simulation, late: bool = False) -> str:
+    """Why the second simulated arm is no nearer to the measured one than the first; empty where it is, or chance hides it.
+
+    Args:
+        late: the log's torque is not what the arm felt: windows, which it drives, tell nothing then.
+    """
+    if before.how == "none" or (late and before.how == "windowed"):
         return ""
     if after.how == "none":
         return "the simulated arm runs away with it"
