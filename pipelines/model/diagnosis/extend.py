@@ -162,7 +162,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     late = any(step.best is not None and step.best.effect.last for step in steps)
     for k, step in enumerate(steps):
         if step.best is not None and (doubt := sure(step, prepared, chosen.blocks) or
-                                      farther(simulated[k], simulated[k + 1], late)):
+                                      farther(simulated[k], simulated[k + 1], late=late)):
             why[step.best.effect.name, step.best.effect.joint] = doubt
     taken = {(one.cause, one.joint) for one in told}
     why |= {(f.cause, f.joint): "it takes nothing off the held-out error" for f in case.families

@@ -91,7 +91,7 @@ def worse_log(data: Data, before: Array, after: Array) -> str:
     return ""
 
 
-def farther(before: Simulation, after: Simulation, late: bool = False) -> str:
+def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str:
     """Why the second simulated arm is no nearer to the measured one than the first; empty where it is, or chance hides it.
 
     Args:
