@@ -38,7 +38,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    doubts = {k: sure(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1], late=late) for k in ruling.named}
+    doubts = {k: sure(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1], late=late)
+              for k in ruling.named}
     doubts = {k: why for k, why in doubts.items() if why}
     kept = _apart(found, [k for k in ruling.named if k not in doubts])
     final = _without(found, kept, case)
