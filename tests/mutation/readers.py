@@ -213,7 +213,7 @@ def _model(path: Path) -> None:
         if not log.exists():
             from tests.controlled import controlled_log  # and with it MuJoCo: every fork of this process would be dearer
 
-            write_log(log, controlled_log(60))
+            write_log(log, controlled_log(400))
         _through(simulate.STAGE, Request((log,)), replace(simulate.Settings(), model=str(path)))
 
 
