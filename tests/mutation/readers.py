@@ -195,10 +195,12 @@ def _urdfs(folder: Path) -> list[bytes]:
 
 
 def _models(folder: Path) -> list[bytes]:
+    from tests.controlled import controlled_log  # and with it MuJoCo: every fork of this process would be dearer
+
+    write_log(folder / "data/waving.h5", controlled_log(400))
     plain = read_model(SAMPLES / "models/rrr.json")
     arm = Arm.from_model(plain)
-    said = ("encoder_crosstalk:1:coefficient=0.1,from_joint=3", "cogging:2:amplitude=0.2,order=18",
-            "joint_elasticity:1:stiffness=2000")
+    said = ("encoder_crosstalk:1:coefficient=0.1,from_joint=3", "cogging:2:amplitude=0.2,order=18")
     acting = [acting_cause(text, arm.robot.revolute) for text in said]
     return [model_text(plain).encode(), *(model_text(arm.extended(one).to_model()).encode() for one in acting)]
 
@@ -209,12 +211,7 @@ def _model(path: Path) -> None:
     if arm.n_joints == 3:
         arm.torque(motion)
     if _deep(path):
-        log = path.parent / "waving.h5"
-        if not log.exists():
-            from tests.controlled import controlled_log  # and with it MuJoCo: every fork of this process would be dearer
-
-            write_log(log, controlled_log(400))
-        _through(simulate.STAGE, Request((log,)), replace(simulate.Settings(), model=str(path)))
+        _through(simulate.STAGE, Request((path.parent / "waving.h5",)), replace(simulate.Settings(), model=str(path)))
 
 
 def _configs(folder: Path) -> list[bytes]:
