@@ -89,14 +89,19 @@ def _told_apart(case: Case, prepared: Prepared, named: Sequence[Acting]) -> tupl
 def _apart(stiff: Compliance, before: Compliance | None, reference: Data, arm: Arm,
            prepared: Prepared) -> tuple[tuple[Acting, ...], tuple[Acting, ...], tuple[Acting, ...]]:
     """What is new, what stands, what nobody knows: by the reference's own responses, else by how it moved."""
-    if before is not None:
-        both = compared(stiff, before)
-        return both.new, both.standing, ()
-    _, fit = fit_nominal(reference, prepared.columns)
     new: list[Acting] = []
     old: list[Acting] = []
     open_: list[Acting] = []
-    for acting in stiff.named:
+    asked = stiff.named
+    if before is not None:
+        both = compared(stiff, before)
+        # What the reference's responses leave open, or are of no use for, is no news for being missing there.
+        asked = tuple(one for one in both.new if before.open and one.place not in {other.place for other in before.named})
+        new, old = [one for one in both.new if one not in asked], list(both.standing)
+    if not asked:
+        return tuple(new), tuple(old), ()
+    _, fit = fit_nominal(reference, prepared.columns)
+    for acting in asked:
         share, std = _strength(acting, reference, fit, arm)
         where = old if share - _SURE * std > _THERE else new if share + _SURE * std < _NOT_THERE else open_
         where.append(acting)

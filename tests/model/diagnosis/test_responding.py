@@ -83,6 +83,19 @@ def test_without_responses_of_the_reference_its_motion_tells_whether_the_base_wa
     assert found.verdict == ("cause" if news else "nothing-wrong")
 
 
+def test_responses_of_the_reference_that_leave_it_open_make_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its responses are of no use, or leave it open what gives way: its motion tells that the base was as soft before."""
+    def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance:
+        return Compliance((), False, "base or joint") if logs[0].role == "reference" else Compliance((base(),), False, "")
+
+    monkeypatch.setattr(responding, "compliance", compliance)
+    there = healthy_again([replace(log, role="identify") for log in session("base_resonance", None, seed=21)])
+    fitted, judging = session("base_resonance", None)
+    found = diagnose(Logs((fitted,), (judging,), there, (fitted,), there[:1]), SETTINGS)
+    assert found.verdict == "nothing-wrong"
+    assert [one.cause for one in found.standing] == ["base_resonance"]
+
+
 def test_a_base_that_was_always_soft_is_no_news_by_its_responses() -> None:
     """28 Hz again, by a hair; 28 and now 25 Hz; firm and now soft."""
     now, again, other = base(28.0, 1e-3), base(28.01, 1e-3), base(25.0, 1e-3)
