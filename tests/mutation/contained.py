@@ -113,7 +113,7 @@ def _judged(work: Callable[[bytes], None], data: bytes) -> tuple[int, str, str]:
     try:
         work(data)
     except RrridError as problem:
-        complete = problem.code and problem.where and problem.remedy
+        complete = problem.code and problem.remedy  # a place that the computation does not know, run_stage adds
         return problem.exit_code, problem.code, str(problem) if complete else f"INCOMPLETE {problem}"
     except BaseException as problem:
         import traceback
