@@ -170,17 +170,21 @@ def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
     if case.thresholds is None and case.changed is None:
         tried = [one for one in tried if one.error <= 1.0 - _FALLS]
     best = _fewest(tried) if more else None
-    other = _other([one for one in screened if id(one) in passes], best, now, case.nameable)
+    other = _other([one for one in screened if id(one) in passes], best, explored.tried, now, case.nameable)
     best = None if other is not None else best
     trials = ledger(screened, judged, thresholds, explored.tried, best, now, number)
     return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials, other)
 
 
-def _other(passing: Sequence[Screened], best: Tried | None, now: Refined, nameable: Sequence[str]) -> Screened | None:
-    """What gives way explains more than all that the residual can name, to first order even."""
+def _other(passing: Sequence[Screened], best: Tried | None, tried: Sequence[Tried], now: Refined,
+           nameable: Sequence[str]) -> Screened | None:
+    """What gives way explains more than all that the residual can name, to first order even; what was not fitted exactly counts
+    with what it explains to first order."""
     there = [one for one in passing if one.family.shapes[0].evidence not in nameable]
     most = max(there, key=lambda one: one.gain[0], default=None)
-    taken = 0.0 if best is None else now.rss - best.done.rss
+    fitted = {id(one.screened) for one in tried}
+    untried = [float(one.gain[0]) for one in passing if one.family.shapes[0].evidence in nameable and id(one) not in fitted]
+    taken = max([0.0 if best is None else now.rss - best.done.rss, *untried])
     return most if most is not None and most.gain[0] > _MORE * taken else None
 
 

@@ -6,7 +6,7 @@ get, which keeps the luck of few replicas out; and a hundredth of what is left a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.twin import Twin
 
@@ -33,28 +34,49 @@ class Thresholds:
     origin: str
     weight: Array  # (joints,)
     joints: tuple[int | None, ...]  # of the families
+    whole: Callable[[Array], tuple[Array, Array]] | None = None  # `gain` and `own` of causes of the whole arm, with other weights
 
     @classmethod
     def of_twin(cls, twin: Twin, families: Sequence[Family], arm: Arm, weight: Array) -> Thresholds:
         fit, residuals = twin.weighted(weight)
-        found = screen(twin.data, fit, families, arm, residuals)
-        own = np.array([one.gain.max() for one in found])
+        own = _most(twin, families, arm, fit, residuals)
+        joints = tuple(f.joint for f in families)
         once = np.array([f.event for f in families])
-        joint = np.array([f.joint or 0 for f in families])
-        there = [own[(joint == j) & ~once] for j in range(len(weight) + 1)]
-        usual = np.array([np.median(some) if len(some) else 0.0 for some in there])
-        usual[0] = max(usual[0], float(np.median(usual[1:])))
-        power = np.mean(residuals**2, axis=0)
-        left = np.bincount(twin.data.joint, power, minlength=len(weight))
-        least = _USELESS * np.append(left.mean(), left)
-        gain = _TIMES * np.max([own, np.where(once, 0.0, usual[joint]), least[joint]], axis=0)
-        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, tuple(f.joint for f in families))
+        usual = [_median(own[[j == joint and not event for j, event in zip(joints, once, strict=True)]])
+                 for joint in range(1, len(weight) + 1)]
+        left = np.bincount(twin.data.joint, np.mean(residuals**2, axis=0), minlength=len(weight))
+        place = np.array([(joint or 1) - 1 for joint in joints])
+        gain = _TIMES * np.max([own, np.where(once, 0.0, np.array(usual)[place]), _USELESS * left[place]], axis=0)
+
+        def whole(now: Array) -> tuple[Array, Array]:
+            """A cause of the whole arm acts on several joints: its gain is no multiple of what it was."""
+            some = [f for f in families if f.joint is None]
+            most = _most(twin, some, arm, *twin.weighted(now)) if (now != weight).any() else own[[j is None for j in joints]]
+            ratio, events = np.square(now / weight), np.array([f.event for f in some])
+            common = max(_median(most[~events]), float(np.median(ratio * usual)))
+            return _TIMES * np.max([most, np.where(events, 0.0, common), np.full(len(some), _USELESS * (ratio * left).mean())],
+                                   axis=0), most
+
+        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, whole).at(weight)
 
     def at(self, weight: Array) -> Thresholds:
-        """The same with other weights: a cause acts on its joint, one of the whole arm where that counts most."""
+        """The same with other weights: a cause acts on its joint; one of the whole arm is looked for anew, or counts where most."""
         ratio = np.square(weight / self.weight)
         scale = np.array([ratio.max() if joint is None else ratio[joint - 1] for joint in self.joints])
-        return Thresholds(scale * self.gain, scale * self.own, self.origin, weight, self.joints)
+        gain, own = scale * self.gain, scale * self.own
+        places = [place for place, joint in enumerate(self.joints) if joint is None]
+        if self.whole is not None and places:
+            gain[places], own[places] = self.whole(weight)
+        return Thresholds(gain, own, self.origin, weight, self.joints, self.whole)
+
+
+def _most(twin: Twin, families: Sequence[Family], arm: Arm, fit: Fit, residuals: Array) -> Array:
+    """(families,) the most that any replica gives each."""
+    return np.array([one.gain.max() for one in screen(twin.data, fit, families, arm, residuals)])
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else 0.0
 
 
 def without_twin(found: Sequence[Screened], power: float, weight: Array) -> Thresholds:
