@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from pipelines.batch.figures import fitted, residuals
-from pipelines.errors import NothingMatched, UsageError
+from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
 from pipelines.log.stored_result import StoredResult, read_result
 from pipelines.report.comparison_report import Answer, Comparison, Figure, Residual, comparison_report
@@ -67,6 +67,7 @@ def compute(inputs: Inputs, settings: Settings) -> Comparison:
 
     Raises:
         NothingMatched: C06, the two have nothing in common that could be compared.
+        InputRejected: S20, stages or findings that are none.
         UsageError: C02, an alpha that is no probability.
     """
     if not 0.0 < settings.alpha < 1.0:
@@ -74,9 +75,13 @@ def compute(inputs: Inputs, settings: Settings) -> Comparison:
     a, b = inputs.material
     names = _names(a, b)
     figures, alone = _figures(a, b, settings.alpha)
-    left = tuple(Residual(name, unit, before, residuals(b.object)[name][0]) for name, (before, unit) in residuals(a.object).items()
-                 if name in residuals(b.object))
-    answers = tuple(_answers(a.object, b.object))
+    mine, theirs = residuals(a.object), residuals(b.object)
+    left = tuple(Residual(name, unit, before, theirs[name][0]) for name, (before, unit) in mine.items() if name in theirs)
+    try:
+        answers = tuple(_answers(a.object, b.object))
+    except (KeyError, TypeError, AttributeError) as problem:
+        raise InputRejected("S20", f"not what a result of {a.command} holds ({type(problem).__name__}: {problem})",
+                            where=f"{names[0]}, {names[1]}", remedy="run the command again") from problem
     if not (figures or left or answers):
         raise NothingMatched("C06", f"the two results of {a.command} have no figure in common", where=f"{names[0]}, {names[1]}",
                              remedy="compare results of the same robot and the same settings")
@@ -120,8 +125,8 @@ def _answers(a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Answer]:
 def _said(result: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str]]:
     if isinstance(result.get("verdict"), str):
         yield f"{place}verdict", result["verdict"]
-    for kind in ("findings", "standing", "rejected"):
-        if isinstance(result.get(kind), list) and kind != "rejected":
+    for kind in ("findings", "standing"):
+        if isinstance(result.get(kind), list):
             yield f"{place}{kind}", ", ".join(sorted(_place(one) for one in result[kind])) or "none"
     for one in result.get("stages") or ():
         yield f"{place}{one['name']} ends in", str(one["exit"])

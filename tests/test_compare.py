@@ -117,7 +117,8 @@ def bad(folder: Path, text: str) -> Path:
 
 @pytest.mark.parametrize(("text", "kind", "code"), [
     ('{"command": "frf"', InputRejected, "F02"), ('{"a": 1}', InputRejected, "S19"), ("[1]", InputRejected, "S19"),
-    ('{"command": "frf"}', UsageError, "C02"), ("[" * 100_000, InputRejected, "F02")])
+    ('{"command": "frf"}', UsageError, "C02"), ('{"command": "estimate-bps", "stages": [{"exit": 0}]}', InputRejected, "S20"),
+    ('{"command": "estimate-bps", "findings": ["cogging"]}', InputRejected, "S20"), ("[" * 100_000, InputRejected, "F02")])
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str, kind: type[RrridError], code: str) -> None:
     """Half a file, another file, another command."""
     with pytest.raises(kind, match=code):

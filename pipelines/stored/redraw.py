@@ -7,7 +7,7 @@ import os
 import shutil
 from collections.abc import Iterable
 from importlib import import_module
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from pipelines import __version__
@@ -108,7 +108,10 @@ def _refers(value: Any) -> bool:
 def _provenance(folder: Path) -> dict[str, Any]:
     try:
         about: dict[str, Any] = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        dict(about.get("inputs", {})).items()
+        if any(".." in PurePath(name).parts or PurePath(name).is_absolute() for name in about.get("outputs", {})):
+            raise ValueError  # X11: nothing is written beside the folder
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise InputRejected("F05", "has no provenance.json that says what it is", where=folder, remedy=_AGAIN) from None
     return about
 

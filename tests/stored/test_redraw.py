@@ -77,6 +77,22 @@ def test_an_edited_report_is_kept(results: Path, tmp_path: Path) -> None:
     assert contents(tmp_path / "a") == contents(results / "inspect")
 
 
+@pytest.mark.parametrize("told", [{"outputs": 3}, {"inputs": 3}, "../elsewhere/notes.txt", "/etc/hostname"])
+def test_a_provenance_that_is_none_leads_nowhere(results: Path, tmp_path: Path, told: dict[str, int] | str) -> None:
+    """F05, X11: other kinds of JSON, and outputs that lie elsewhere; nothing is written beside the folder."""
+    shutil.copytree(results / "inspect", tmp_path / "a/b/result")
+    path = tmp_path / "a/b/result/provenance.json"
+    about = json.loads(path.read_text())
+    path.write_text(json.dumps(about | (told if isinstance(told, dict) else {"outputs": about["outputs"] | {told: ""}})))
+    (tmp_path / "a/b/elsewhere").mkdir()
+    (tmp_path / "a/b/elsewhere/notes.txt").write_text("mine")
+    before = contents(tmp_path)
+    with pytest.raises(RrridError) as problem:
+        redraw(tmp_path / "a/b/result")
+    assert problem.value.exit_code in (2, 3)
+    assert contents(tmp_path) == before
+
+
 def test_another_versions_result_is_refused(tmp_path: Path) -> None:
     """Fields that this version does not know of, and a command that has no report: told, exit 3 and 2."""
     for name, told, kind in (("inspect", {"logs": 3}, InputRejected), ("batch", {}, UsageError)):
