@@ -19,6 +19,9 @@ __all__ = ["known_options", "make_settings", "stage_of"]
 
 S = TypeVar("S")
 
+# What a stage's own reader needs; within `run` a stage gets its logs and models from the run.
+_READ = ("identify", "validate", "reference", "model", "text", "via_points", "recipe")
+
 
 def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path | None, sets: Iterable[str],
                   given: Mapping[str, Any], fallback: Mapping[str, Any] | None = None) -> S:
@@ -43,6 +46,10 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
             if not isinstance(options, Mapping):
                 raise UsageError("C01", f"'{name}' is a stage, not an option", where=where,
                                  remedy=f"write [{name}] and its options below")
+            if stage == "run" and name in _run_stages() and (read := next(filter(_READ.__contains__, options), None)):
+                raise UsageError("C02", f"{name}.{read} has no place in a run, whose stages take logs and models from each other",
+                                 where=where, remedy=f"give it to rrrid {name}; 'rrrid run' takes --identify, --validate, "
+                                 "--reference for all")
             owner = kind if name == stage else _settings_of(name)
             chosen.setdefault(name, {}).update(
                 {key: _value(owner, key, value, f"{where}, {name}.{key}") for key, value in options.items()})
@@ -54,12 +61,15 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
 
 def known_options(command: str) -> dict[str, list[str]]:
     """What --set takes for `command`: stage -> its options. For `run` those of every stage it runs."""
-    stages = [command]
-    if command == "run":
-        from pipelines.run import STEPS
+    if command != "run":
+        return {command: _options_of(_settings_of(command))}
+    return {stage: [name for name in _options_of(_settings_of(stage)) if name not in _READ] for stage in _run_stages()}
 
-        stages = [module.replace("_", "-") for module in STEPS]
-    return {stage: _options_of(_settings_of(stage)) for stage in stages}
+
+def _run_stages() -> list[str]:
+    from pipelines.run import STEPS
+
+    return [module.replace("_", "-") for module in STEPS]
 
 
 def _options_of(kind: type[Any]) -> list[str]:

@@ -68,6 +68,8 @@ def test_json_is_alone_on_standard_output(logs: Path) -> None:
     (("convert", "logs/a.h5", "--set", f"convert.to=1{'0' * 5000}"), "RRID-C02", 2),
     (("run", "logs", "--set", "inspect.bogus=1"), "RRID-C01", 2),
     (("run", "logs", "--set", "inspect.trust_units=3"), "RRID-C02", 2),
+    (("run", "logs", "--set", "diagnose.model=m.json"), "RRID-C02", 2),
+    (("run", "logs", "--set", "validate-writing.text=RRR"), "RRID-C02", 2),
     (("run", "logs", "--set", "run.stages=3"), "RRID-C01", 2),
     (("convert", "logs/a.h5", "--joints", "1,x"), "RRID-C02", 2),
     (("convert", "logs/a.h5", "--joints", "1,4"), "RRID-C02", 2),
