@@ -49,7 +49,6 @@ def _text(path: Path) -> str:
 
 
 @pytest.mark.row("P06", "P07")
-@pytest.mark.row("P06", "P07")
 @pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_with_a_summary_and_resume_ends_the_same(many: Path, tmp_path: Path, number: signal.Signals,
                                                                exit_code: int) -> None:

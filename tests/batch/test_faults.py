@@ -19,7 +19,6 @@ GOOD = {f"good-{i}": f"value {i} std 0.1" for i in range(6)}
 
 
 @pytest.mark.row("P03", "P04", "P05", "P11")
-@pytest.mark.row("P03", "P04", "P05", "P11")
 def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
     """P03, P04, P05 and a bug of ours beside good items: each failed with its code and cause, the others as if alone."""
     alone = obey(lay(GOOD))
@@ -41,7 +40,6 @@ def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
     assert len(cases) == 11
 
 
-@pytest.mark.row("P11")
 @pytest.mark.row("P11")
 def test_all_bad_is_exit_4_with_a_table(lay: Lay) -> None:
     """P11: nothing that could be used, and still every form of the summary."""
@@ -66,7 +64,6 @@ def test_an_item_that_failed_leaves_no_older_result(lay: Lay) -> None:
     assert [p.name for p in (outcome.folder / "items").iterdir()] == ["a"]
 
 
-@pytest.mark.row("P02")
 @pytest.mark.row("P02")
 @pytest.mark.parametrize("fault", ["full", "unreadable"])
 def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, fault: str) -> None:

@@ -27,7 +27,6 @@ with locked(Path(sys.argv[1])):
 
 
 @pytest.mark.row("P08")
-@pytest.mark.row("P08")
 def test_the_second_batch_is_told_who_has_the_folder(lay: Lay, tmp_path: Path) -> None:
     """P08: exit 6 with process and host; when that process is killed, the next batch goes on at once."""
     root = lay({"a": "fine"})

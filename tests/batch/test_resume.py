@@ -27,7 +27,6 @@ def _kept(out: Path) -> int:
 
 
 @pytest.mark.row("P07", "P09")
-@pytest.mark.row("P07", "P09")
 def test_resume_does_only_what_is_not_done(lay: Lay) -> None:
     """P07, P09: changed words, a new log, a failed item; each alone is done again, whatever the times of files say."""
     root = lay({"a": "fine", "b": "fine", "c": "reject", "d": "fine"})
@@ -46,7 +45,6 @@ def test_resume_does_only_what_is_not_done(lay: Lay) -> None:
 
 
 @pytest.mark.row("P09")
-@pytest.mark.row("P09")
 def test_resume_with_other_settings_does_all_again(lay: Lay) -> None:
     """P09: a setting that decides on results makes them old; memory and time limits do not."""
     root = lay({"a": "value 1 std 0.1", "b": "fine"})
@@ -57,7 +55,6 @@ def test_resume_with_other_settings_does_all_again(lay: Lay) -> None:
     assert json.loads((outcome.folder / "items/a/result.json").read_text())["parameters"][0]["value"] == 2.0
 
 
-@pytest.mark.row("P10")
 @pytest.mark.row("P10")
 def test_a_corrupted_result_is_done_again(lay: Lay) -> None:
     """P10: one flipped byte, a missing file, an added file: found by their hashes, told, and made whole."""
@@ -124,7 +121,6 @@ def _inspected(folder: Path, out: Path, **wanted: object) -> Path:
     return run_batch(plan, Wanted(folder / "root", out, no_report=True, **wanted)).folder  # type: ignore[arg-type]
 
 
-@pytest.mark.row("P12")
 @pytest.mark.row("P12")
 def test_every_way_gives_the_bytes_of_the_single_command(single: Path, tmp_path: Path) -> None:
     """P12: one process, two, and four shards laid together: each item's files are those of its own command."""
