@@ -158,4 +158,7 @@ def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed) -> tuple[Array
     usable[found.good.kept] = found.good.fit
     tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
     length = max(3, round(_WINDOW / log.sample_time))
-    return simulate_windows(Plant.of(arm), found.motion, tau, log.sample_time, length, usable).q, found.motion.q
+    windows = simulate_windows(Plant.of(arm), found.motion, tau, log.sample_time, length, usable)
+    if not np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():  # left out, it would count as no error at all
+        raise InputRejected("D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia")
+    return windows.q, found.motion.q

@@ -13,10 +13,14 @@ import pytest
 from pipelines.bench import experiments
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
-from pipelines.model.diagnosis.gains import Simulation, farther, gain_of, worse_log
+from pipelines.model.diagnosis import gains
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.gains import Simulation, farther, gain_of, simulation_errors, worse_log
 from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.simulation.windows import Windows, simulate_windows
 from tests.diagnose.sessions import session
 
 RNG = np.random.default_rng(5)
@@ -42,6 +46,26 @@ def test_a_model_that_runs_away_is_refused_and_has_no_simulated_gain() -> None:
     assert not farther(gone, gone)  # nobody can be simulated: no argument against anyone
     gain = gain_of(TorqueGain(np.ones(3), np.ones(3), np.zeros((3, 2))), simulated(NOISE), gone)
     assert (gain.simulated_position_rms, gain.tip_error_rms, gain.simulation) == (None, None, "none")
+
+
+def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One window of one arm without an end: that arm has no simulated error, the other keeps its own."""
+    log = replace(session()[0], controller=None)
+    prepared = prepare(Logs((log,)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    arm = Exact.start(columns, fit).arm
+    calls = []
+
+    def windows(*given: Any) -> Windows:
+        calls.append(simulate_windows(*given))
+        if len(calls) == 2:
+            calls[1].q[calls[1].first[3]:calls[1].first[4]] = np.nan
+        return calls[-1]
+
+    monkeypatch.setattr(gains, "simulate_windows", windows)
+    first, second = simulation_errors([arm, arm], prepared.motions)
+    assert (first.how, second.how) == ("windowed", "none")
+    assert "runs away" in farther(first, second)
 
 
 def two_logs() -> Any:
