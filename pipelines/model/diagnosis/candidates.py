@@ -30,6 +30,7 @@ __all__ = ["Family", "Laid", "families", "lay_family", "lay_one", "place_of", "w
 Indices = npt.NDArray[np.intp]
 
 _AT_ONCE = 48  # columns
+_AWAY = 1e50  # beyond any unit: what is larger runs away, and its square, weighted and summed, is no number any more
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -
 
 def _finite(table: Array) -> Array:
     """Columns that run away, of an arm that is badly known, are none."""
-    return table if np.isfinite(table).all() else np.zeros_like(table)
+    return table if (np.abs(table) < _AWAY).all() else np.zeros_like(table)
 
 
 def _first_samples(data: Data) -> Motion:
