@@ -6,7 +6,7 @@ half of what stands above it, nothing is: the name would be wrong more often tha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -68,7 +68,7 @@ def without_steps(found: Found, floor: Array, known: bool) -> Ruling:
 def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Ruling:
     other = next((step.other for step in found.steps if step.other is not None and (known or _much(step.other, found))), None)
     joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
-    high = ", ".join(f"joint {j + 1}" for j in joints.tolist())
+    high = _named(joints.tolist())
     gap = any(step.best is not None and step.best.effect.evidence == "reversals" for step in accepted)
     if other is not None and (not accepted or (len(joints) and not gap)):
         where = "the arm or its base" if other.joint is None else f"joint {other.joint} or what carries it"
@@ -86,13 +86,17 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
         return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
-        return Ruling("unknown", (), f"what was found leaves the residual of {high} well above the floor")
+        return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")
     return Ruling("cause", tuple(range(len(accepted))), "")
 
 
 def held_out_high(rms: Array, floor: Array) -> str:
     """Which joints stand far above the floor on held-out logs; empty where none does."""
-    return ", ".join(f"joint {j + 1}" for j in np.flatnonzero(rms > _FAR * floor).tolist())
+    return _named(np.flatnonzero(rms > _FAR * floor).tolist())
+
+
+def _named(joints: Iterable[int]) -> str:
+    return ", ".join(f"joint {j + 1}" for j in joints)
 
 
 def _much(other: Screened, found: Found) -> bool:

@@ -52,6 +52,12 @@ def test_what_leaves_much_of_a_joint_is_not_named() -> None:
     assert rule(found(left(0.01, 0.08, 0.01), left(0.01, 0.04, 0.01)), FLOOR).verdict == "unknown"
 
 
+def test_the_reason_names_the_joints_that_are_not_explained() -> None:
+    """Joint 1 stands a little above its floor as well, but it is explained for the most part."""
+    ruling = rule(found(left(0.1, 0.04, 0.01), left(0.017, 0.03, 0.01)), FLOOR)
+    assert (ruling.verdict, "joint 2" in ruling.reason, "joint 1" in ruling.reason) == ("unknown", True, False)
+
+
 def test_what_gives_way_is_not_named_by_the_residual() -> None:
     ruling = rule(found(left(0.01, 0.05, 0.01), other=SimpleNamespace(joint=2)), FLOOR)
     assert ruling.verdict == "unknown"
