@@ -77,8 +77,9 @@ class Mean:
     fold: Callable[[Array], Array]  # from any signal of the source, (kept samples, channels), to its mean and the copies
 
 
-def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = None) -> Reconstructed:
-    """The motion of `log`; `good` is `usable(log)`, for whoever has it already.
+def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = None,
+                observers: Observers | None = None) -> Reconstructed:
+    """The motion of `log`; `good` is `usable(log)`, for whoever has it already; `observers` those of a log like it.
 
     Raises:
         UsageError: C02, settings that do not fit the log.
@@ -90,7 +91,7 @@ def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = N
     seen = measured(log, good)
     states, std = np.full((3, *seen.y.shape), np.nan), np.full((3, *seen.y.shape), np.nan)
     filtering = how.method in ("smoother", "observer")
-    tuned = tuned_observers(seen.good, seen.y, seen.longest, seen.step, how) if filtering else None
+    tuned = (observers or tuned_observers(seen.good, seen.y, seen.longest, seen.step, how)) if filtering else None
     track = difference_tracker(seen, how) if tuned is None else filter_tracker(tuned, how)
     for grid in seen.grids:
         rows = slice(grid.first, grid.last)

@@ -90,7 +90,7 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     seen = []
     for level, own in ((np.zeros_like(guess), seed), (guess, seed + 1)):
         done = simulate(model.nominal, Experiment.of_log(log), Noise(level, np.zeros_like(guess)), (own,))
-        copy, found = _analysed(log, done, 0, recipe, model.columns, data, place)
+        copy, found = _analysed(motions[place], done, 0, recipe, model.columns, data, place)
         seen.append(_roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t)))))
     still, shaken = np.square(seen[0]), np.square(seen[1])
     share = (np.square(rough) - still) / np.maximum(shaken - still, 1e-6 * np.square(rough) + 1e-300)
@@ -130,7 +130,7 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
     runs = dict(zip(places, every, strict=True))
     found = []
     for k in range(replicas):
-        parts = [_motion(motions[place][0], done, k, recipe) for place, done in runs.items()]
+        parts = [_motion(motions[place], done, k, recipe) for place, done in runs.items()]
         rows = [data.logs[place].equations.rows for place in places]
         own = gather(tuple(parts), columns, recipe, rows)
         small = own.lay_each(_imperfect(model.nominal, noise, own, seed + k))
@@ -148,14 +148,17 @@ def _imperfect(arm: Arm, noise: Array, own: Data, seed: int) -> Callable[[int, M
     return loads
 
 
-def _analysed(log: ExperimentLog, done: Simulated, k: int, recipe: Recipe, columns: Columns, data: Data,
+def _analysed(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int, recipe: Recipe, columns: Columns, data: Data,
               place: int) -> tuple[Data, Fit]:
-    own = gather((_motion(log, done, k, recipe),), columns, recipe, (data.logs[place].equations.rows,))
+    own = gather((_motion(real, done, k, recipe),), columns, recipe, (data.logs[place].equations.rows,))
     return own, fit_columns(own, rows_of(own, columns))
 
 
-def _motion(log: ExperimentLog, done: Simulated, k: int, recipe: Recipe) -> tuple[ExperimentLog, Reconstructed]:
+def _motion(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int,
+            recipe: Recipe) -> tuple[ExperimentLog, Reconstructed]:
+    """Replica `k`, reconstructed as the log was: another tuning, in which ends are less certain, would be no noise of the drive."""
+    log, found = real
     signals = {name: Signal(values, log.signals[name].units, log.signals[name].long_name)
                for name, values in (("t", log.t), ("q", done.q[k]), ("tau", done.tau[k]))}
     copy = replace(log, name=f"{log.name} twin {k + 1}", torque=None, signals=signals, period=None, derived=None)
-    return copy, reconstruct(copy, recipe.how)
+    return copy, reconstruct(copy, recipe.how, observers=None if found.mean is not None else found.observers)
