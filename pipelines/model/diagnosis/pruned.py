@@ -106,12 +106,13 @@ def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | No
     """The cause that is missed least, if it is missed so little that it would not have been found beside the others."""
     least, share = None, 1.0
     error = held_out(final, case)
+    bounds = None if case.thresholds is None else case.thresholds.at(final.weight).gain
     for k in kept:
         one = found.final.model.effects[k]
         if one.log is not None:
             continue
         rest = _without(found, [other for other in kept if other != k], case, final)
-        missed = (rest.rss - final.rss) / max(_bound(case, one.effect, final), 1e-300)
+        missed = (rest.rss - final.rss) / max(_bound(case, one.effect, final, bounds), 1e-300)
         if held_out(rest, case) <= (1.0 + _PAYS) * error:
             missed = min(missed, 0.999)
         if missed < share:
@@ -119,10 +120,10 @@ def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | No
     return least
 
 
-def _bound(case: Case, effect: Effect, final: Refined) -> float:
-    """Squared weighted residual that the cause has to take away."""
+def _bound(case: Case, effect: Effect, final: Refined, bounds: Array | None) -> float:
+    """Squared weighted residual that the cause has to take away; `bounds` (families,) where thresholds say so."""
     place = next(k for k, family in enumerate(case.families) if (family.cause, family.joint) == (effect.name, effect.joint))
-    return _LEAST * final.rss if case.thresholds is None else float(case.thresholds.at(final.weight).gain[place])
+    return _LEAST * final.rss if bounds is None else float(bounds[place])
 
 
 def _without(found: Found, kept: list[int], case: Case, weighted: Refined | None = None) -> Refined:
