@@ -93,11 +93,11 @@ def compute(inputs: Inputs, settings: Settings) -> Comparison:
 def _names(a: StoredResult, b: StoredResult) -> tuple[str, str]:
     """What the two are called: as much of their paths, from the end, as tells them apart; nothing of where they lie."""
     parts = [one.path.parts if one.path.name != "result.json" else one.path.parts[:-1] for one in (a, b)]
-    for depth in range(1, 1 + min(map(len, parts))):
+    for depth in range(1, 5):
         names = ["/".join(part[-depth:]) for part in parts]
-        if names[0] != names[1] or depth == 4:
-            return (names[0], names[1]) if names[0] != names[1] else (f"{names[0]} (A)", f"{names[1]} (B)")
-    return "A", "B"
+        if names[0] != names[1]:
+            return names[0], names[1]
+    return f"{parts[0][-1]} (A)", f"{parts[1][-1]} (B)"
 
 
 def _figures(a: StoredResult, b: StoredResult, alpha: float) -> tuple[tuple[Figure, ...], tuple[tuple[str, ...], tuple[str, ...]]]:

@@ -65,10 +65,11 @@ def test_one_arm_twice_hardly_ever_differs() -> None:
 
 
 def test_the_same_arm_agrees(tmp_path: Path) -> None:
-    """Two fits of one arm; residuals that differ are shown, and not judged."""
+    """Two fits of one arm; residuals that differ are shown, not judged. Beside itself a result is called by its folder alone."""
     outcome = go(tmp_path, written(tmp_path / "monday", 1), written(tmp_path / "friday", 2))
     assert (outcome.result.differ, outcome.exit_code) == (False, 0)
     assert "agree" in outcome.report.verdict
+    assert go(tmp_path, tmp_path / "monday", tmp_path / "monday").result.names == ("monday (A)", "monday (B)")
     assert [(one.name, one.a, one.b) for one in outcome.result.residuals if one.a != one.b] == [
         ("torque rms validate joint 2", 0.01, 0.02)]
 

@@ -47,6 +47,17 @@ def test_a_lost_report_comes_back(results: Path, tmp_path: Path, command: str) -
     assert contents(tmp_path / "here") == before
 
 
+def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) -> None:
+    """Derived logs deleted to save room: the report needs none of them."""
+    shutil.copytree(results / "run", tmp_path / "a")
+    shutil.rmtree(tmp_path / "a/figures")
+    (tmp_path / "a/report.html").unlink()
+    (tmp_path / "a/result.h5").unlink(missing_ok=True)
+    (tmp_path / "a/.cache/drawing.json").unlink()
+    redraw(tmp_path / "a")
+    assert contents(tmp_path / "a")["report.html"] == contents(results / "run")["report.html"]
+
+
 def refused(folder: Path) -> RrridError:
     before = contents(folder)
     with pytest.raises(RrridError) as problem:
