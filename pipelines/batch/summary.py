@@ -23,7 +23,7 @@ __all__ = ["KINDS", "Summary", "rows_of", "summary_report"]
 _TONES: Final[dict[Status, Tone]] = {"ok": "good", "found": "attention", "rejected": "bad", "failed": "bad"}
 _ROWS = 2000  # items in one table of the page
 _DRAWN = 6  # figures of one robot
-_LISTED = 40  # of them in the table
+_LISTED, _LEAST = 40, 10  # of them in the table at most; where fewer moved
 KINDS: Final[dict[str, type]] = {"item": str, "status": str, "exit": int, "code": str, "message": str, "verdict": str,
                                  "robot": str, "recorded": str, "quantity": str, "value": float, "std": float, "unit": str,
                                  "away": float}
@@ -141,10 +141,11 @@ def _drift_section(drift: Drift, baseline: ModelFile | None, figures: bool) -> l
 
 
 def _figure_table(ranked: Sequence[Course]) -> Table:
+    listed = min(_LISTED, max(_LEAST, sum(bool(c.moved) for c in ranked)))
     rows = tuple((c.name, c.chi_square, c.freedom, c.probability, float(np.max(np.abs(c.away))), c.trend,
-                  ", ".join(c.moved[:4]) + (f" and {len(c.moved) - 4} more" if len(c.moved) > 4 else "")) for c in ranked[:_LISTED])
-    tones: tuple[Tone, ...] = tuple("attention" if c.moved else "neutral" for c in ranked[:_LISTED])
-    more = "" if len(ranked) <= _LISTED else f" The {len(ranked) - _LISTED} that moved least stand in result.json."
+                  ", ".join(c.moved[:4]) + (f" and {len(c.moved) - 4} more" if len(c.moved) > 4 else "")) for c in ranked[:listed])
+    tones: tuple[Tone, ...] = tuple("attention" if c.moved else "neutral" for c in ranked[:listed])
+    more = "" if len(ranked) <= listed else f" The {len(ranked) - listed} that moved least stand in result.json."
     return Table(("figure", "χ²", "freedom", "probability", "largest [std]", "first to last [std]", "moved"), rows,
                  caption=f"What moved most stands first.{more}", tones=tones)
 

@@ -74,11 +74,12 @@ def _figures(one: Evidence, suffix: str) -> list[Figure]:
         found.append(Figure(f"position-error{suffix}", "What the simulation gets wrong: simulated minus measured position, in "
                             f"closed loop with controller and references of {one.simulated_log}.",
                             lambda drawing: _simulated(joint_axes(drawing, joints), one), joint_size(joints)))
-    for over, words in (("order", "Orders of the joint's angle: a line is a torque that repeats every so-manieth turn."),
-                        ("frequency", "Spectrum of the residual, and of the floor.")):
+    for over, words in (("order", "Orders of the joint's angle: a line is a line at 18 is a torque that repeats 18 times a turn."),
+                        ("frequency", "Spectrum of the residual.")):
         spectra = [s for s in one.spectra if s.over == over]
         if spectra:
-            found.append(Figure(f"residual-{over}{suffix}", words, _spectra(spectra), (6.0, 0.8 + 1.2 * len(spectra))))
+            floor = " Grey: the floor." if any(s.floor is not None for s in spectra) else ""
+            found.append(Figure(f"residual-{over}{suffix}", words + floor, _spectra(spectra), (6.0, 0.8 + 1.2 * len(spectra))))
     for joint in range(1, joints + 1):
         curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:_SHOWN]
         if curves:
@@ -106,16 +107,16 @@ def _simulated(axes: Sequence[Axes], one: Evidence) -> None:
     assert t is not None  # no figure is made without
     assert nominal is not None
     for j, axis in enumerate(axes):
-        axis.plot(t, nominal[:, j], color=style.BLUE, linewidth=1.4, label="nominal model")
+        axis.plot(t, 1e3 * nominal[:, j], color=style.BLUE, linewidth=1.4, label="nominal model")
         if extended is not None:
-            axis.plot(t, extended[:, j], color=style.VERMILLION, linewidth=0.9, label="with the findings")
+            axis.plot(t, 1e3 * extended[:, j], color=style.VERMILLION, linewidth=0.9, label="with the findings")
         axis.set_title(f"joint {j + 1}", pad=3.0)
         axis.margins(x=0.01, y=0.1)
         axis.locator_params(axis="y", nbins=4)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
     axes[-1].set_xlabel("time [s]")
     if figure := axes[0].get_figure():
-        figure.supylabel("simulated − measured [rad]", fontsize="medium")
+        figure.supylabel("simulated − measured [mrad]", fontsize="medium")
 
 
 def _spectra(spectra: Sequence[Spectrum]) -> Callable[[Drawing], None]:

@@ -15,7 +15,7 @@ from pipelines.report.diagnosis_words import cause_at, floor_words, held_out_wor
 from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number
+from pipelines.report.style import format_number, format_unit
 
 __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
@@ -29,7 +29,7 @@ def diagnosis_report(result: Result) -> Report:
              for section in (finding_section(number, one), numbers_section(number, one))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
                 *_limits(result), _basis(result), *_doctor(result)]
-    return Report("Diagnosis", _verdict(result), _TONES[result.verdict],
+    return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
                   errors_table(result.residual_rms, result.after_rms, result.rated, floor_words(result)), tuple(sections))
 
 
@@ -119,7 +119,7 @@ def _worth(one: Finding) -> str:
 
 
 def _numbers(one: Finding) -> Table:
-    rows = tuple((name, told_value(value), value.unit) for name, value in in_order(one.cause, one.parameters))
+    rows = tuple((name, told_value(value), format_unit(value.unit)) for name, value in in_order(one.cause, one.parameters))
     return Table(("parameter", "value ± std", "unit"), rows, "What was identified.")
 
 
@@ -185,7 +185,7 @@ def _limits(result: Result) -> list[Section]:
     """What these logs can and cannot tell."""
     sections = []
     if result.detectable:
-        rows = tuple((title_of(one.cause), one.joint, one.parameter, told_value(one.smallest), one.smallest.unit)
+        rows = tuple((title_of(one.cause), one.joint, one.parameter, told_value(one.smallest), format_unit(one.smallest.unit))
                      for one in result.detectable)
         sections.append(Section("What would have been found", ("With 95 %, had it been there; nothing smaller can be excluded.",),
                                 (Table(("cause", "joint", "parameter", "smallest", "unit"), rows),)))
@@ -205,10 +205,12 @@ def _basis(result: Result) -> Section:
                     f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")
     if result.without:
         text.append(f"Left out, because you said so: {', '.join(map(title_of, result.without))}.")
-    best: dict[tuple[str, int | None], float] = {(one.cause, one.joint): one.gain for one in result.thresholds}
+    best: dict[tuple[str, int | None], float] = {(one.cause, one.joint): one.gain for one in result.thresholds
+                                                    if math.isfinite(one.gain)}
     rows = tuple((title_of(cause), joint, _rounded(100.0 * gain)) for (cause, joint), gain in sorted(
         best.items(), key=lambda item: (item[0][0], item[0][1] or 0)))
-    table = Table(("cause", "joint", "share of the squared residual to exceed [%]"), rows, "Thresholds.")
+    table = Table(("cause", "joint", "share of the squared residual to exceed [%]"), rows,
+                  "Thresholds of what these logs can show.")
     return Section("What this rests on", tuple(text), (table,) if rows else ())
 
 

@@ -71,7 +71,8 @@ def _verdict(result: Result) -> str:
     text = " ".join(said)
     if result.apart is not None:
         before, after = (format_number(one.similarity, 2) for one in (result.apart.before, result.apart.after))
-        text += f"; {' and '.join(result.apart.causes)} look alike by {after}, in a design for the parameters alone by {before}"
+        text += (f"; {' and '.join(result.apart.causes)} look alike by {after} (1: the same), in a design for the parameters "
+                 f"alone by {before}; from 0.8 on diagnose calls them rivals")
     if not result.reached and result.ceiling is not None:
         dear = result.dearest
         text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"
@@ -145,8 +146,8 @@ def _motion(result: Result) -> Section | None:
     if c is None:
         return None
     kinds = [("position", "positions", c.q, "position [rad]", "Positions over one period, as Fig. 8 of the paper."),
-             ("speed", "speeds", c.dq, "speed [rad/s]", "Speeds; dashed, limits that they come near to."),
-             ("acceleration", "accelerations", c.ddq, "acceleration [rad/s²]", "Accelerations and their limits.")]
+             ("speed", "speeds", c.dq, "speed [rad/s]", "Speeds; dashed, limits that are near."),
+             ("acceleration", "accelerations", c.ddq, "acceleration [rad/s²]", "Accelerations; dashed, limits that are near.")]
     if c.tau is not None:
         kinds.append(("torque", "torques", c.tau, "torque [N m]", f"Torques that the model expects; dashed, "
                       f"{100 * result.torque_share:.0f} % of the limits, what the plan may use."))

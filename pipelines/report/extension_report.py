@@ -26,7 +26,8 @@ def extension_report(result: Extension) -> Report:
     sections.append(_basis(result))
     if result.doctor:
         sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
-    return Report("Extension", _verdict(result), tone, torque_errors(result.residual_rms, result.after_rms, result.rated, _FLOOR),
+    return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
+                  torque_errors(result.residual_rms, result.after_rms, result.rated, _FLOOR),
                   tuple(sections))
 
 

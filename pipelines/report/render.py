@@ -64,6 +64,7 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
     page = _template().render(
         title=printable(report.title), verdict=_prose(report.verdict), tone=report.tone, words=_WORDS,
         key_figures=report.key_figures and _table_words(report.key_figures), sections=sections,
+        contents=_contents([printable(section.title) for section in report.sections]),
         footer=[(printable(name), _prose(value)) for name, value in footer.items()])
     return {"report.html": page.encode(), **files}
 
@@ -84,6 +85,18 @@ def _template() -> Any:
 def _prose(text: object) -> str:
     """Printable text with every number kept on one line with its unit."""
     return _NUMBER_AND_UNIT.sub("\u00a0", printable(text, _PARAGRAPH))
+
+
+def _contents(titles: Sequence[str]) -> list[dict[str, object]]:
+    """Links to all sections; sections in a row whose titles begin alike, "diagnose: …", share one line."""
+    from itertools import groupby
+
+    parts: list[dict[str, object]] = []
+    for beginning, some in groupby(enumerate(titles, 1), key=lambda one: one[1].partition(": ")[0] if ": " in one[1] else ""):
+        links = list(some)
+        shared = beginning if len(links) > 1 else ""
+        parts.append({"of": shared, "links": [(n, title.partition(": ")[2] if shared else title) for n, title in links]})
+    return parts
 
 
 def _section_words(section: Section) -> dict[str, object]:

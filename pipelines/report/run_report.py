@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pipelines.errors import NothingMatched
 from pipelines.log.places import slug
 from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.run_ledger import ledger_lines, ledger_section
@@ -28,7 +29,13 @@ def run_report(result: Result) -> Report:
         ledger_section([(group.name, ledger_lines(group)) for group in result.groups]), _stages(steps), _lacking(steps)) if section]
     for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):
         sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
-    return Report("Run", " ".join(verdicts), tone, _key_figures([step for _, step in steps]), tuple(sections))
+    return Report(_title(result), " ".join(verdicts), tone, _key_figures([step for _, step in steps]), tuple(sections))
+
+
+def _title(result: Result) -> str:
+    """With the robot, where a diagnosis knows it and there is one."""
+    robots = {step.result.robot for group in result.groups for step in group.stages if isinstance(step.result, Diagnosed)} - {""}
+    return f"Run: {robots.pop()}" if len(robots) == 1 else "Run"
 
 
 def _verdicts(group: Group) -> list[str]:

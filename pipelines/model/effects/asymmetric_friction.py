@@ -33,7 +33,7 @@ class AsymmetricFriction(Effect):
     )
     signature = "A part of the torque that is even in speed: larger friction one way than the other."
     explanation = "Preload, seal lips and worm or harmonic gears rub more in one direction of motion."
-    remedy = "Compensate each direction with its own coefficients; look at preload and seals."
+    remedy = "Look at preload and seals; what stays, compensate with coefficients of its own in each direction."
     experiment = "Hold still for two seconds in several positions, then move at several equal speeds in both directions."
     twins = ("torque_offset", "spring")
     from_motion = True

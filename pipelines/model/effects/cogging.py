@@ -48,7 +48,7 @@ class Cogging(Effect):
     )
     signature = "A torque that repeats along the turn of the joint, the same at every speed and in both directions."
     explanation = "Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: each once or many times a turn."
-    remedy = "Add it to the feed-forward by the joint's angle; a new one points to a damaged magnet, tooth or bearing."
+    remedy = "Look for a damaged magnet, tooth or bearing where it is new; else add it to the feed-forward by the joint's angle."
     experiment = "Turn the joint slowly through its whole range, both ways, at two speeds."
     twins = ("position_friction", "spring", "gravity_tilt", "encoder_eccentricity")
     per_log = ("phase", "phase_2", "phase_3")  # where an encoder is zeroed at each start

@@ -35,7 +35,7 @@ class Coulomb(Effect):
     )
     signature = "A torque of constant size that changes sign with the direction of motion."
     explanation = "Dry friction in bearings, seals and gears: its size does not depend on speed."
-    remedy = "Compensate it in the feed-forward; if it has grown, check lubrication, preload and seals."
+    remedy = "If it has grown, check lubrication, preload and seals; compensate it in the feed-forward."
     experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
     evidence = "none"
     twins = ("viscous", "three_sigmoid", "asymmetric_friction", "presliding")

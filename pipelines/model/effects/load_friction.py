@@ -28,7 +28,7 @@ class LoadFriction(Effect):
     )
     signature = "Friction that grows with the torque the joint carries and changes sign with the direction of motion."
     explanation = "Teeth and bearings are pressed together by the torque that passes them, and rub in proportion."
-    remedy = "Compensate it with the predicted torque; check the lubrication of the gear."
+    remedy = "Check the lubrication of the gear; compensate it with the predicted torque."
     experiment = "Move the joint at one speed in both directions under three loads: three postures, or payloads."
     twins = ("torque_gain", "position_friction")
     friction = True

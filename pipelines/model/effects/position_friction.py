@@ -36,7 +36,7 @@ class PositionFriction(Effect):
     )
     signature = "Friction whose size changes with the angle of the joint, always against the motion."
     explanation = "A bent shaft, an uneven seal or bearing, cables that press in some postures."
-    remedy = "Compensate it with the angle; look for wear, a bent shaft or cables that rub."
+    remedy = "Look for wear, a bent shaft or cables that rub; compensate it with the angle."
     experiment = "Turn the joint slowly through its whole range in both directions, at two speeds."
     twins = ("cogging", "load_friction", "viscous_drift")
     from_motion = True

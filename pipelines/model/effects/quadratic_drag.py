@@ -21,7 +21,7 @@ class QuadraticDrag(Effect):
     parameters = (Quantity("coefficient", "N m s^2/rad^2", 0.0, 10.0, "torque at unit speed"),)
     signature = "A torque that grows with the square of speed, against the motion."
     explanation = "Windage, and oil that is churned by gears or fills a bearing."
-    remedy = "Compensate it in the feed-forward; check the oil level."
+    remedy = "Check the oil level; compensate it in the feed-forward."
     experiment = "Move the joint in both directions at seven to ten constant speeds up to the highest it allows."
     twins = ("stribeck", "concave_friction", "viscous")
     friction = True

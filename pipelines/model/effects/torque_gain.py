@@ -27,7 +27,7 @@ class TorqueGain(Effect):
     parameters = (Quantity("gain_error", "1", -0.7, 2.0, "applied torque = (1 + gain_error) logged torque"),)
     signature = "A residual in proportion to the joint's own torque, at all speeds and in all postures."
     explanation = "Torque constant, current measurement or gear ratio is not what the log assumes; magnets lose strength."
-    remedy = "Correct the torque constant; where it fell, look at the motor's magnets and the amplifier."
+    remedy = "Where it fell, look at the motor's magnets and the amplifier; correct the torque constant."
     experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
     twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
     needs = ("a known payload, where all joints have the same error",)
