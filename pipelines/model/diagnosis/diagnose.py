@@ -28,7 +28,7 @@ from pipelines.model.diagnosis.findings import extended_arm, findings, held_find
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import Settled, settled
+from pipelines.model.diagnosis.pruned import Settled, settled, unnamed
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, ResidualRms, Threshold
 from pipelines.model.diagnosis.search import Case, Explored, clean, gap_first, gives_way, held_out_left, provisional, search
@@ -131,11 +131,16 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings) -> D
     first = replace(first, held=replace(first.held, prepared=now))
     found = search(case, chosen.most)
     done = settled(found, rule(found, since.floor), case, now, since.floor)
+    if since.absorbed is not None and done.ruling.verdict == "unknown":
+        done = unnamed(done, since.floor)
     floored = _Floored(since.floor, "reference logs", None, None, np.full(case.data.n_joints, np.nan))
     told = _told(first, case, done, floored, chosen)
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
-    if since.absorbed is None or told.verdict == "unknown" or told.extended is None:
+    if since.absorbed is None:
         return told
+    if told.verdict == "unknown" or told.extended is None:
+        why = "the base parameters have moved as it moves them, beside something that has no name"
+        return replace(told, rejected=(Rejected(since.absorbed.effect.name, since.absorbed.effect.joint, why), *told.rejected))
     one = carried(since.absorbed, done.found.final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
         return replace(told, rejected=(*told.rejected, Rejected(one.finding.cause, one.finding.joint, one.doubt)))

@@ -16,7 +16,7 @@ from pipelines.model.diagnosis.search import Case, Found, held_out, held_out_lef
 from pipelines.model.diagnosis.verdict import Ruling, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Settled", "settled"]
+__all__ = ["Settled", "settled", "unnamed"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
@@ -59,6 +59,12 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     alone = _elsewhere(alone, found, case, floor, known)
     reason = f"{alone.reason}: {next(iter(doubts.values()), '')}" if alone.verdict == "unknown" else alone.reason
     return Settled(replace(found, final=found.nominal), replace(alone, reason=reason, doubts=doubts), ())
+
+
+def unnamed(done: Settled, floor: Array) -> Settled:
+    """The same where the base parameters tell what has changed: what is left near the floor, and has no name, is no alarm then."""
+    alone = without_steps(done.found, floor, True)
+    return done if alone.verdict == "unknown" else replace(done, ruling=replace(alone, doubts=done.ruling.doubts), simulated=())
 
 
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:

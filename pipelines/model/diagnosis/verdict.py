@@ -20,6 +20,7 @@ __all__ = ["Ruling", "excess", "explained", "held_out_high", "rule", "without_st
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
+_CLEAR = 1.2  # times the floor: what stands lower may be the floor, which ten replicas know to about a tenth
 _FAR = 3.0  # times the floor, on held-out logs: other motion, so that some more is usual
 _REST = 0.35  # of a joint's residual that may be left beside a named cause, where it still stands above the floor
 
@@ -82,7 +83,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
         return Ruling("cause", tuple(range(len(accepted))), "")
     whole = excess(found.nominal.rms, floor)
     total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
-    if whole > 0.1 and total < _HALF:
+    if (found.nominal.rms > _CLEAR * floor).any() and total < _HALF:
         return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:

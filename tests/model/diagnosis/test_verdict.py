@@ -47,6 +47,11 @@ def test_a_cause_that_explains_less_than_half_is_not() -> None:
     assert rule(found(left(0.01, 0.05, 0.01), left(0.01, 0.04, 0.01)), FLOOR).verdict == "unknown"
 
 
+def test_what_may_be_the_floor_need_not_be_explained() -> None:
+    """Ten replicas know the floor to about a tenth: joint 1 is no excess that the cause at joint 3 ought to take away."""
+    assert rule(found(left(0.0115, 0.0097, 0.0105), left(0.0115, 0.0097, 0.0098)), FLOOR).named == (0,)
+
+
 def test_what_leaves_much_of_a_joint_is_not_named() -> None:
     """Half of the amplitude is left: three quarters of the power are explained, and yet it is another cause."""
     assert rule(found(left(0.01, 0.08, 0.01), left(0.01, 0.04, 0.01)), FLOOR).verdict == "unknown"
