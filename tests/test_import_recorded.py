@@ -111,6 +111,6 @@ def test_the_way_back_over_a_whole_turn_is_left_out(odrive: Outcome[Result]) -> 
         log = open_log(odrive.folder / "logs" / f"{name}.h5").log
         assert log.t[0] >= 0.5
         assert np.abs(np.gradient(log.q[:, 0], log.t)).max() < 10.0
-    said = [check.message for check in odrive.checks if check.code == "T04"]
+    said = [check.message for check in odrive.checks if check.code == "RRID-T04"]
     assert len(said) == 3
     assert all("the first 0.5 s" in message for message in said)

@@ -80,17 +80,24 @@ def _gathered(client: Any, futures: dict[Any, Item], plan: Plan, key: str,
         with contextlib.suppress(queue.Empty):
             future = ended.get(timeout=_LOOK)
         if client.status != "running" or (future is not None and future.status == "cancelled"):
-            raise EnvironmentFault("P04", "the scheduler went away", where="--backend",
-                                   remedy="start it again, and go on with --resume")
+            raise _gone()
         if future is not None:
             left -= 1
             yield futures[future], _outcome(future, futures[future], plan, key)
 
 
+def _gone() -> EnvironmentFault:
+    return EnvironmentFault("P04", "the scheduler went away", where="--backend", remedy="start it again, and go on with --resume")
+
+
 def _outcome(future: Any, item: Item, plan: Plan, key: str) -> Record:
-    problem = future.exception()
-    if problem is None:
-        return read_record(future.result())
+    try:
+        problem = future.exception()
+        answer = future.result() if problem is None else None
+    except OSError:  # the result lay on the scheduler's side of a connection that is cut
+        raise _gone() from None
+    if answer is not None:
+        return read_record(answer)
     if type(problem).__name__ == "KilledWorker":
         problem = EnvironmentFault("P04", "crashed: every worker that had it died", remedy="run the stage on it alone")
     return undone(item, problem, plan, key)
