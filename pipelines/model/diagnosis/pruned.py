@@ -68,8 +68,12 @@ def unnamed(done: Settled, floor: Array) -> Settled:
 
 
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:
-    """Nothing wrong in the fitted logs is not enough where the held-out ones show something."""
-    if ruling.verdict != "nothing-wrong" or not known or case.judge is None:
+    """Nothing wrong in the fitted logs is not enough where the held-out ones show something.
+
+    Not so of what has changed: motion that the reference logs do not have shows what no law of friction has to the last, and
+    would have shown it before.
+    """
+    if ruling.verdict != "nothing-wrong" or not known or case.judge is None or case.changed is not None:
         return ruling
     high = held_out_high(case.judge.rms(held_out_left(found.nominal, case.judge, case.blocks)), floor)
     return Ruling("unknown", (), f"on held-out logs the residual of {high} stands far above the floor") if high else ruling
