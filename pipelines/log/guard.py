@@ -27,7 +27,7 @@ from pipelines.errors import EnvironmentFault, InputRejected, RrridError, UsageE
 from pipelines.log.atomic import fault_of
 from pipelines.log.experiment import Array
 
-__all__ = ["Answer", "die_with_parent", "guarded"]
+__all__ = ["Answer", "die_with_parent", "guarded", "shared_file"]
 
 _SECONDS = 10.0  # a healthy file of 20 MB takes a tenth of it
 _BYTES_A_SECOND = 5e6
@@ -60,7 +60,7 @@ def guarded(work: Callable[[], Answer], path: Path, *, seconds: float | None = N
     size = path.stat().st_size
     limit = _SECONDS + size / _BYTES_A_SECOND if seconds is None else seconds
     budget = min(_MEMORY + 1200 * size, 32 << 30) if memory is None else memory
-    store = _shared_file()
+    store = shared_file()
     receive, send = os.pipe()
     # No signal between the fork and the child's own handlers: the child would run the rest of the parent's program.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
@@ -90,7 +90,7 @@ def guarded(work: Callable[[], Answer], path: Path, *, seconds: float | None = N
         os.close(store)
 
 
-def _shared_file() -> int:
+def shared_file() -> int:
     """A file without a name that both processes can map."""
     if hasattr(os, "memfd_create"):
         return os.memfd_create("rrrid", os.MFD_CLOEXEC)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.log.atomic import write_file
 from pipelines.report.report import Figure, Report, Section, Table, Tone
+from pipelines.report.side_by_side import Picture, drawn
 from pipelines.report.style import figure_style, format_decimals, format_number, format_unit, printable
 
 if TYPE_CHECKING:
@@ -49,14 +50,14 @@ def write_report(report: Report, folder: Path, footer: Mapping[str, str]) -> lis
 
 def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]:
     """The files of a report by their names, "report.html" first; nothing is written."""
-    names = _Names()
+    pictures, names = _pictures(report), _Names()
     files: dict[str, bytes] = {}
     sections, glyphs = [], set[str]()
     for section in report.sections:
         figures = []
         for figure in section.figures:
             name = names.unique(figure.name)
-            svg, files[f"figures/{name}.png"] = figure.finished(name) or _draw(figure, name)
+            svg, files[f"figures/{name}.png"] = pictures[name]
             files[f"figures/{name}.svg"] = svg.encode()
             figures.append({"caption": _prose(figure.caption),
                             "svg": _inline(svg, f"f{len(names.taken)}-", figure.alt or figure.caption, glyphs)})
@@ -67,6 +68,15 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
         contents=_contents([printable(section.title) for section in report.sections]),
         footer=[(printable(name), _prose(value)) for name, value in footer.items()])
     return {"report.html": page.encode(), **files}
+
+
+def _pictures(report: Report) -> dict[str, Picture]:
+    """Every figure's picture by the name of its file; what was drawn before is taken back."""
+    names = _Names()
+    named = {names.unique(figure.name): figure for section in report.sections for figure in section.figures}
+    found = {name: figure.finished(name) for name, figure in named.items()}
+    missing = drawn({name: figure for name, figure in named.items() if found[name] is None}, _draw)
+    return {name: picture or missing[name] for name, picture in found.items()}
 
 
 def _put(content: bytes, path: Path) -> None:
