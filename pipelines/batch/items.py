@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pipelines.errors import Check, NothingMatched, RrridError, UsageError
 from pipelines.log.atomic import fault_of
-from pipelines.log.files import ENDINGS, PROVENANCE, regular_file
+from pipelines.log.files import entries, regular_file
 from pipelines.log.places import slug
 
 __all__ = ["Item", "find_items", "read_shard", "shard"]
@@ -78,21 +78,14 @@ def _walk(folder: Path, root: Path, folders: dict[Path, list[Path]], faults: dic
           checks: list[Check]) -> None:
     """Gather the logs of `folder` and of the folders below it, each under its own folder."""
     try:
-        entries = sorted(folder.iterdir())
+        there = entries(folder, root, checks)
     except OSError as problem:
         faults[folder] = fault_of(problem, folder)
         return
-    for entry in entries:
-        if entry.name.startswith("."):
-            continue
-        linked = entry.is_symlink()
-        if linked and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
-            checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry,
-                                   remedy="give what it leads to by its own path, if that is meant"))
-        elif entry.is_dir():
-            if not (entry / PROVENANCE).is_file():
-                _walk(entry, root, folders, faults, checks)
-        elif entry.suffix.lower() in ENDINGS and entry.exists():
+    for entry in there:
+        if entry.is_dir():
+            _walk(entry, root, folders, faults, checks)
+        else:
             folders.setdefault(folder, []).append(entry)
 
 

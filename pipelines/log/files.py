@@ -26,7 +26,8 @@ from pipelines.log.joints import chosen
 from pipelines.log.robot import RobotDescription
 from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_format
 
-__all__ = ["ENDINGS", "PROVENANCE", "Opened", "expanded", "find_logs", "hash_file", "open_log", "regular_file", "write_log"]
+__all__ = ["ENDINGS", "PROVENANCE", "Opened", "entries", "expanded", "find_logs", "hash_file", "open_log", "regular_file",
+           "write_log"]
 
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
@@ -271,23 +272,31 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
 
 
 def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
-    found = []
     try:
-        entries = sorted(folder.iterdir())
+        there = entries(folder, root, checks)
     except FileNotFoundError:
         return []
     except OSError as problem:
         raise fault_of(problem, folder) from None
-    for entry in entries:
+    return [path for entry in there for path in (_below(entry, root, checks) if entry.is_dir() else [entry])]
+
+
+def entries(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
+    """Logs in `folder` and folders to look into, in order; links that lead out of `root` are passed over with a word (X11).
+
+    Raises:
+        OSError: the folder cannot be read.
+    """
+    found = []
+    for entry in sorted(folder.iterdir()):
         if entry.name.startswith("."):
             continue
-        linked = entry.is_symlink()
-        if linked and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
+        if entry.is_symlink() and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
             checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry,
                                    remedy="give what it leads to by its own path, if that is meant"))
         elif entry.is_dir():
             if not (entry / PROVENANCE).is_file():
-                found += _below(entry, root, checks)
+                found.append(entry)
         elif entry.suffix.lower() in ENDINGS and entry.exists():
             found.append(entry)
     return found

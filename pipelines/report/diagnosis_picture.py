@@ -93,13 +93,7 @@ def _compared(axes: Sequence[Axes], one: Evidence) -> None:
     for j, axis in enumerate(axes):
         axis.plot(*envelope(one.t, one.measured[:, j]), color=style.SKY, linewidth=3.0, label="measured")
         axis.plot(*envelope(one.t, one.predicted[:, j]), color=style.VERMILLION, linewidth=0.9, label="predicted")
-        axis.set_title(f"joint {j + 1}", pad=3.0)
-        axis.margins(x=0.01, y=0.1)
-        axis.locator_params(axis="y", nbins=4)
-    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
-    axes[-1].set_xlabel("time [s]")
-    if figure := axes[0].get_figure():
-        figure.supylabel("torque [N m]", fontsize="medium")
+    _over_time(axes, "torque [N m]")
 
 
 def _simulated(axes: Sequence[Axes], one: Evidence) -> None:
@@ -110,13 +104,18 @@ def _simulated(axes: Sequence[Axes], one: Evidence) -> None:
         axis.plot(t, 1e3 * nominal[:, j], color=style.BLUE, linewidth=1.4, label="nominal model")
         if extended is not None:
             axis.plot(t, 1e3 * extended[:, j], color=style.VERMILLION, linewidth=0.9, label="with the findings")
+    _over_time(axes, "simulated − measured [mrad]")
+
+
+def _over_time(axes: Sequence[Axes], quantity: str) -> None:
+    for j, axis in enumerate(axes):
         axis.set_title(f"joint {j + 1}", pad=3.0)
         axis.margins(x=0.01, y=0.1)
         axis.locator_params(axis="y", nbins=4)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
     axes[-1].set_xlabel("time [s]")
     if figure := axes[0].get_figure():
-        figure.supylabel("simulated − measured [mrad]", fontsize="medium")
+        figure.supylabel(quantity, fontsize="medium")
 
 
 def _spectra(spectra: Sequence[Spectrum]) -> Callable[[Drawing], None]:
