@@ -6,19 +6,21 @@ Results go to standard output, everything else to standard error, so that `--jso
 from __future__ import annotations
 
 import sys
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pipelines.errors import Check, RrridError, clean
 
 if TYPE_CHECKING:
-    from pipelines.report.report import Table
+    from pipelines.report.report import Report, Table
     from pipelines.stage import Outcome
 
-__all__ = ["Teller", "say_error", "say_outcome", "say_table"]
+__all__ = ["Teller", "say_error", "say_outcome", "say_table", "say_verdict"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
-_MOST = 12
+_MOST = 12  # remarks
+_HEAD = 12  # characters: a heading is broken into lines no shorter than that
 
 
 class Teller:
@@ -54,7 +56,7 @@ def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: b
     if quiet:
         return
     stream = sys.stderr if as_json else sys.stdout
-    print(clean(outcome.report.verdict, 1000), file=stream)
+    say_verdict(outcome.report, stream)
     if outcome.report.key_figures is not None:
         _say_table(outcome.report.key_figures, stream)
     _say_checks(outcome.checks, verbose, stream)
@@ -62,21 +64,48 @@ def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: b
     print(f"→ {report if report.exists() else outcome.folder}", file=stream)
 
 
+def say_verdict(report: Report, stream: Any = None) -> None:
+    """The sentence, and what to look at on the machine; on standard output where nothing else is said."""
+    for line in (report.verdict, *report.advice):
+        print(clean(line, 1000), file=stream)
+
+
 def _say_table(table: Table, stream: Any) -> None:
     """The rows of a table; its head as well, where a row is more than a name and a figure."""
+    from pipelines.report.cells import column_texts
     from pipelines.report.style import format_number
 
-    head = table.columns if len(table.columns) > 2 and table.rows else ()
-    say_table(head, [[format_number(c) if isinstance(c, float) else clean("–" if c is None else c, 60) for c in row]
-                     for row in table.rows], stream)
+    if len(table.columns) <= 2:  # a figure is not like the one below it
+        say_table((), [[clean(c, 60) if isinstance(c, str) else format_number(c) for c in row] for row in table.rows], stream)
+    elif table.rows:
+        columns = [column_texts(cells, lambda text: clean(text, 60)) for cells in zip(*table.rows, strict=True)]
+        say_table(table.columns, list(zip(*columns, strict=True)), stream)
 
 
-def say_table(head: Sequence[str], rows: Iterable[Sequence[str]], stream: Any = None) -> None:
-    """Words in columns, on standard output where nothing else is said."""
-    cells = [[clean(cell, 200) for cell in row] for row in (*((head,) if head else ()), *rows)]
-    widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))] if cells else []
-    for row in cells:
-        print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip(), file=stream)
+def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], stream: Any = None) -> None:
+    """Words in columns, numbers to the right where there is a head; on standard output where nothing else is said."""
+    from pipelines.report.cells import are_numbers
+
+    columns = [[clean(cell, 200) for cell in column] for column in zip(*rows, strict=True)]
+    widths = [max(map(len, column)) for column in columns]
+    heads: list[list[str]] = []
+    if head and rows:
+        heads = [_heading(words, max(width, _HEAD)) for words, width in zip(head, widths, strict=True)]
+        widths = [max(width, *map(len, lines)) for width, lines in zip(widths, heads, strict=True)]
+    right = [bool(head) and are_numbers(column) for column in columns]
+    deep = max(map(len, heads), default=0)
+    above = [[""] * (deep - len(lines)) + lines for lines in heads]
+    for row in (*zip(*above, strict=True), *zip(*columns, strict=True)):
+        cells = (cell.rjust(width) if number else cell.ljust(width) for cell, width, number in zip(row, widths, right, strict=True))
+        print("  " + "  ".join(cells).rstrip(), file=stream)
+
+
+def _heading(words: str, width: int) -> list[str]:
+    """A heading in lines, its unit in one of them."""
+    if len(words) <= width:
+        return [words]
+    name, bracket, unit = words.partition("[")
+    return [*textwrap.wrap(name, width, break_long_words=False), *((bracket + unit,) if bracket else ())]
 
 
 def _say_checks(checks: Iterable[Check], verbose: bool, stream: Any) -> None:

@@ -14,7 +14,7 @@ from pipelines.report.diagnosis_words import floor_words
 from pipelines.report.figures import envelope, joint_axes, joint_size
 from pipelines.report.report import Figure, Section, Table
 from pipelines.report.sections import joint_signal_figure
-from pipelines.report.style import format_number, format_unit
+from pipelines.report.style import format_number, format_unit, to_one_place
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,13 +38,14 @@ def _section(found: Diagnosis, one: Evidence, rated: Sequence[float], number: in
 
 
 def _above(found: Diagnosis, one: Evidence, rated: Sequence[float]) -> Table:
-    rows = []
-    for j in range(len(one.above_floor)):
+    joints, rows = len(one.above_floor), []
+    torques = to_one_place([float(x) for one_rms in (found.residual_rms.identify, found.residual_rms.floor) for x in one_rms])
+    for j in range(joints):
         residual = float(found.residual_rms.identify[j])
         share = 100.0 * residual / rated[j] if j < len(rated) and math.isfinite(rated[j]) else None
         low, high = one.band[j]
         band = f"{format_number(float(low), 2)} to {format_number(float(high), 2)}" if np.isfinite([low, high]).all() else None
-        rows.append((j + 1, _digits(residual), _digits(share), _digits(float(found.residual_rms.floor[j])),
+        rows.append((j + 1, torques[j], _digits(share), torques[joints + j],
                      _digits(100.0 * float(one.above_floor[j])), band))
     columns = ("joint", "residual, rms [N m]", "[% of rated]", "floor [N m]", "power above the floor [%]", "mostly between [Hz]")
     return Table(columns, tuple(rows), "Of the nominal model, refitted to these logs.")

@@ -7,15 +7,24 @@ from collections.abc import Iterable
 
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.responding import BELOW
-from pipelines.model.diagnosis.result import Finding, Gain
+from pipelines.model.diagnosis.result import Detectable, Finding, Gain
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_proof import proof_figures
-from pipelines.report.diagnosis_words import cause_at, floor_words, held_out_words, in_order, per_joint, title_of, told_value
+from pipelines.report.diagnosis_words import (
+    cause_at,
+    floor_name,
+    floor_words,
+    held_out_words,
+    in_order,
+    per_joint,
+    title_of,
+    told_value,
+)
 from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number, format_unit
+from pipelines.report.style import format_number, format_unit, to_one_place
 
 __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
@@ -30,7 +39,8 @@ def diagnosis_report(result: Result) -> Report:
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
                 *_limits(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
-                  errors_table(result.residual_rms, result.after_rms, result.rated, floor_words(result)), tuple(sections))
+                  errors_table(result.residual_rms, result.after_rms, result.rated, floor_name(result), floor_words(result)),
+                  tuple(sections), _advice(result))
 
 
 def _verdict(result: Result) -> str:
@@ -51,6 +61,13 @@ def _verdict(result: Result) -> str:
     return f"{changed}{first.title}{_at(first.joint)}{size}{moved}{others}.{rest}"
 
 
+def _advice(result: Result) -> tuple[str, ...]:
+    """What to look at on the machine, finding by finding."""
+    several = len(result.findings) > 1
+    return tuple(f"What to check{f' for {cause_at(one.cause, one.joint)}' if several else ''}: "
+                 f"{_sentence(find_effect(one.cause).remedy)}" for one in result.findings)
+
+
 def _at(joint: int | None) -> str:
     return "" if joint is None else f" at joint {joint}"
 
@@ -64,10 +81,15 @@ def _rounded(x: float) -> float | None:
     return float(f"{x:.3g}") if math.isfinite(x) else None
 
 
-def finding_section(number: int, one: Finding, offer: bool = True) -> Section:
-    """What it is, what to check, what it is worth, and the figure that proves it; `offer` says how to extend the model by it."""
+def finding_section(number: int, one: Finding, offer: bool = True, floor: str = "the floor") -> Section:
+    """What it is, what to check, what it is worth, and the figure that proves it.
+
+    Args:
+        offer: say how to extend the model by it.
+        floor: what its share is counted from.
+    """
     kind = find_effect(one.cause)
-    text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one)]
+    text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one, floor)]
     if one.origin == "frequency responses":
         text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
                     f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
@@ -104,7 +126,7 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
-def _worth(one: Finding) -> str:
+def _worth(one: Finding, floor: str) -> str:
     simulation = {"closed-loop": "simulated in closed loop, with the controller of the logs",
                   "windowed": "simulated over short windows from smoothed states, for the logs do not know their controller",
                   "none": "not simulated"}[one.gain.simulation]
@@ -114,7 +136,7 @@ def _worth(one: Finding) -> str:
         before, after = 1e3 * tip.before, 1e3 * tip.after
         said = f" The simulated tip is {format_number(before, 3)} mm off without it and {format_number(after, 3)} mm with it"
         said += f", {simulation}."
-    return (f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above the floor; the refitted model could "
+    return (f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above {floor}; the refitted model could "
             f"hide {format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{said}")
 
 
@@ -125,13 +147,13 @@ def _numbers(one: Finding) -> Table:
 
 def gain_table(gain: Gain, caption: str) -> Table:
     """Joint by joint: torque and simulated position, without and with."""
+    torque, position = gain.validate_torque_rms, gain.simulated_position_rms
+    joints = len(torque.before)
+    errors = to_one_place([*map(float, torque.before), *map(float, torque.after)])
     rows = []
-    for j in range(len(gain.validate_torque_rms.before)):
-        torque = gain.validate_torque_rms
+    for j in range(joints):
         low, high = torque.ci95[j]
-        position = gain.simulated_position_rms
-        rows.append((j + 1, _rounded(torque.before[j]), _rounded(torque.after[j]),
-                     f"{format_number(float(low), 2)} to {format_number(float(high), 2)}",
+        rows.append((j + 1, *errors[j::joints], f"{format_number(float(low), 2)} to {format_number(float(high), 2)}",
                      None if position is None else _rounded(position.before[j]),
                      None if position is None else _rounded(position.after[j])))
     return Table(("joint", "torque error without [N m]", "with [N m]", "change, 95 % [N m]",
@@ -185,15 +207,24 @@ def _limits(result: Result) -> list[Section]:
     """What these logs can and cannot tell."""
     sections = []
     if result.detectable:
-        rows = tuple((title_of(one.cause), one.joint, one.parameter, told_value(one.smallest), format_unit(one.smallest.unit))
-                     for one in result.detectable)
-        sections.append(Section("What would have been found", ("With 95 %, had it been there; nothing smaller can be excluded.",),
+        rows = tuple((title_of(one.cause), one.joint, one.parameter, *_smallest(one)) for one in result.detectable)
+        sections.append(Section("What would have been found", ("With 95 %, had it been there; nothing smaller can be excluded. "
+                                                               "Cannot be seen: nothing that is physically likely would show.",),
                                 (Table(("cause", "joint", "parameter", "smallest", "unit"), rows),)))
     if result.not_testable:
         hidden = tuple((title_of(one.cause), one.joint, one.reason, one.record) for one in result.not_testable)
         sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
                                 (Table(("cause", "joint", "why", "what to record"), hidden),)))
     return sections
+
+
+def _smallest(one: Detectable) -> tuple[str, str]:
+    """Value and unit; words where even the largest that is to be expected in either direction would not show."""
+    value = one.smallest.value
+    expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
+    if isinstance(value, float) and expected and value >= min(expected):
+        return "cannot be seen", ""
+    return told_value(one.smallest), format_unit(one.smallest.unit)
 
 
 def _basis(result: Result) -> Section:

@@ -11,9 +11,10 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Diagnosis, ResidualRms, Value
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.report import Table
-from pipelines.report.style import format_number, with_std
+from pipelines.report.style import format_number, to_one_place, with_std
 
-__all__ = ["cause_at", "floor_words", "held_out_words", "in_order", "per_joint", "title_of", "told_value", "torque_errors"]
+__all__ = ["cause_at", "floor_name", "floor_words", "held_out_words", "in_order", "per_joint", "title_of", "told_value",
+           "torque_errors"]
 
 _FLOORS = {
     "twin": "The floor is what the simulated twin leaves: the fitted model run through the same experiment and the same analysis.",
@@ -21,6 +22,9 @@ _FLOORS = {
     "repetition": "The floor is what two repetitions of the same motion differ by.",
     "blocks": "The floor is the noise in the residual itself: neither reference logs nor a known controller give a better one.",
 }
+
+_FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference logs", "repetition": "between repetitions",
+                "blocks": "noise of the residual"}
 
 
 def cause_at(cause: str, joint: int | None) -> str:
@@ -52,6 +56,11 @@ def per_joint(x: Array) -> str:
     return ", ".join(format_number(float(v), 2) for v in np.ravel(x))
 
 
+def floor_name(found: Diagnosis) -> str:
+    """What the floor is, in a heading: what nobody calls a fault, which is more than noise where the arm was known before."""
+    return _FLOOR_NAMES.get(found.floor_origin, "floor")
+
+
 def floor_words(found: Diagnosis) -> str:
     """Where the floor comes from."""
     return _FLOORS.get(found.floor_origin, f"The floor comes from {found.floor_origin}.")
@@ -64,16 +73,16 @@ def held_out_words(held_out: str) -> str:
     return "No log has the role validate: contiguous blocks of time were held out, one after the other."
 
 
-def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: str = "") -> Table:
-    """Joint by joint: the held-out torque error before and after, in N m and in percent of the rated torque, and the floor."""
-    rows = []
-    for j in range(len(before.floor)):
-        limit = rated[j] if j < len(rated) and math.isfinite(rated[j]) else math.nan
-        both = float(before.validate[j]), float(after.validate[j])
-        rows.append((j + 1, *(_digits(x) for x in (*both, float(before.floor[j]))), *(_digits(100.0 * x / limit) for x in both)))
-    return Table(("joint", "held-out torque error now [N m]", "extended [N m]", "floor [N m]", "now [% of rated]",
-                  "extended [% of rated]"), tuple(rows), f"Root mean square. {floor}".strip())
+def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: str, words: str) -> Table:
+    """Joint by joint: the held-out torque error before and after, in N m and in percent of the rated torque, and the floor.
 
-
-def _digits(x: float) -> float | None:
-    return float(f"{x:.3g}") if math.isfinite(x) else None
+    Args:
+        floor: what the floor is called; `words`: where it comes from.
+    """
+    torques = to_one_place([*map(float, before.validate), *map(float, after.validate), *map(float, before.floor)])
+    joints = len(before.floor)
+    limits = [rated[j] if j < len(rated) and math.isfinite(rated[j]) else math.nan for j in range(joints)]
+    shares = to_one_place([100.0 * float(x[j]) / limits[j] for x in (before.validate, after.validate) for j in range(joints)])
+    rows = tuple((j + 1, *torques[j::joints], *shares[j::joints]) for j in range(joints))
+    return Table(("joint", "held-out torque error now [N m]", "extended [N m]", f"{floor} [N m]", "now [% of rated]",
+                  "extended [% of rated]"), rows, f"Root mean square. {words}".strip())

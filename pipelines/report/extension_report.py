@@ -11,14 +11,14 @@ from pipelines.report.style import format_number
 
 __all__ = ["extension_report"]
 
-_FLOOR = "The floor is the noise in the residual itself, which no model can be below."
+_NOISE = ("noise of the residual", "Noise of the residual: what of it no model can explain, for it does not hang together in time.")
 
 
 def extension_report(result: Extension) -> Report:
     """Verdict, key figures, one section a cause, what was refused."""
     tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
     sections = [section for number, one in enumerate(result.findings, 1)
-                for section in (finding_section(number, one, offer=False), numbers_section(number, one))]
+                for section in (finding_section(number, one, offer=False, floor="the noise"), numbers_section(number, one))]
     if result.rejected:
         rows = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
         sections.insert(0, Section("Not accepted", ("The held-out logs do not bear it out. There is no way around that.",),
@@ -27,7 +27,7 @@ def extension_report(result: Extension) -> Report:
     if result.doctor:
         sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
-                  torque_errors(result.residual_rms, result.after_rms, result.rated, _FLOOR),
+                  torque_errors(result.residual_rms, result.after_rms, result.rated, *_NOISE),
                   tuple(sections))
 
 
@@ -62,5 +62,5 @@ def _basis(result: Extension) -> Section:
         text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --like LOG\" "
                     "simulates it.")
     tables = (gain_table(result.gain, "Gain of all accepted causes together, on held-out time, root mean square."),) \
-        if result.gain is not None else ()
+        if result.gain is not None and len(result.findings) > 1 else ()
     return Section("What this rests on", tuple(text), tables)

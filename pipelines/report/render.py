@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.log.atomic import write_file
+from pipelines.report.cells import are_numbers, column_texts
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.side_by_side import Picture, drawn
-from pipelines.report.style import figure_style, format_decimals, format_number, format_unit, printable
+from pipelines.report.style import figure_style, format_unit, printable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -29,8 +30,6 @@ __all__ = ["render_report", "write_report"]
 
 _WORDS: Final[dict[Tone, str]] = {"good": "Good", "attention": "Attention", "bad": "Problem", "neutral": "Result"}
 _PARAGRAPH = 4000  # characters; longer ones are cut
-_NUMBER = re.compile(r"\(?[−+-]?\d[\d\s.,]*(e[+-]?\d+)?(\s*±\s*[\d\s.,∞]+)?\)?(\s*×\s*10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\s*%)?"
-                     r"|[–—-]|")
 _NUMBER_AND_UNIT = re.compile(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(%|°C|[mµnk]?(s|Hz|N|m|rad|g|A|V|W)\b|(min|deg|rev)\b))|(?<=\bN) (?=m\b)"
                               r"|(?<=[\d)]) (?=[±×] [\d∞])|(?<=[±×]) (?=[\d∞])")
 
@@ -63,8 +62,8 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
                             "svg": _inline(svg, f"f{len(names.taken)}-", figure.alt or figure.caption, glyphs)})
         sections.append(_section_words(section) | {"figures": figures})
     page = _template().render(
-        title=printable(report.title), verdict=_prose(report.verdict), tone=report.tone, words=_WORDS,
-        key_figures=report.key_figures and _table_words(report.key_figures), sections=sections,
+        title=printable(report.title), verdict=_prose(report.verdict), advice=[_prose(line) for line in report.advice],
+        tone=report.tone, words=_WORDS, key_figures=report.key_figures and _table_words(report.key_figures), sections=sections,
         contents=_contents([printable(section.title) for section in report.sections]),
         footer=[(printable(name), _prose(value)) for name, value in footer.items()])
     return {"report.html": page.encode(), **files}
@@ -116,7 +115,7 @@ def _section_words(section: Section) -> dict[str, object]:
 
 def _table_words(table: Table) -> dict[str, object]:
     """Cells as text, with the kind of each column."""
-    rows = list(zip(*(_column(cells) for cells in zip(*table.rows, strict=True)), strict=True))
+    rows = list(zip(*(column_texts(cells, _prose) for cells in zip(*table.rows, strict=True)), strict=True))
     columns = []
     for place, heading in enumerate(table.columns):
         name, bracket, unit = printable(heading).partition(" [")
@@ -131,27 +130,11 @@ def _table_words(table: Table) -> dict[str, object]:
 
 def _kind(cells: Sequence[str]) -> str:
     """How a column is set: numbers to the right, what is short on one line, long words with room."""
-    if any(cells) and all(_NUMBER.fullmatch(cell) for cell in cells):
+    if are_numbers(cells):
         return "number"
     if all(len(cell) <= (30 if cell[:1].isdigit() or cell[:1] in "(−±" else 14) for cell in cells):
         return "short"
     return "long" if any(len(cell) > 40 for cell in cells) else "words"
-
-
-def _column(cells: tuple[object, ...]) -> list[str]:
-    """Cells as text; decimal numbers of like size get equally many decimals, so that they stand point under point."""
-    texts = [_cell(cell) for cell in cells]
-    decimals = [len(text.partition(".")[2]) if isinstance(cell, float) and text[-1:].isdigit() else None
-                for cell, text in zip(cells, texts, strict=True)]
-    wanted = max((count for count in decimals if count is not None), default=0)
-    if wanted == 0 or any("×" in text or len(text.partition(".")[0]) + wanted > 6 for text in texts if text != "–"):
-        return texts
-    return [text if count is None else format_decimals(cell, wanted)  # type: ignore[arg-type]  # a float, by `decimals`
-            for cell, text, count in zip(cells, texts, decimals, strict=True)]
-
-
-def _cell(cell: object) -> str:
-    return _prose(cell) if isinstance(cell, str) else format_number(cell)  # type: ignore[arg-type]
 
 
 class _Names:

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-__all__ = ["Figure", "Report", "Section", "Table", "Tone"]
+__all__ = ["Cell", "Figure", "Report", "Section", "Table", "Tone"]
 
 Tone = Literal["good", "attention", "bad", "neutral"]
-Cell = str | int | float | None
+Cell = str | int | float | None  # of a table
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """The verdict first, then the key figures, then the evidence."""
+    """The verdict first and what to do about it, then the key figures, then the evidence."""
 
     title: str
     verdict: str  # one sentence
     tone: Tone = "neutral"
     key_figures: Table | None = None
     sections: tuple[Section, ...] = ()
+    advice: tuple[str, ...] = ()  # what to look at on the machine, a sentence a finding

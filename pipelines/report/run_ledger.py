@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from pipelines.report import style
 from pipelines.report.diagnosis_words import cause_at, title_of
 from pipelines.report.report import Figure, Section, Table, Tone
 from pipelines.report.run_result import Group
-from pipelines.report.style import format_number
+from pipelines.report.style import format_number, to_one_place
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -58,9 +58,12 @@ def _of(result: Any, stage: str) -> Iterator[Line]:
         for one in result.findings:
             if _whole(one.gain):
                 yield _with(f"+ {title_of(one.cause)} ({cause_at(one.cause, one.joint)})", stage, one.gain)
-    elif isinstance(result, Extension) and result.gain is not None and result.accepted and _whole(result.gain):
+    elif isinstance(result, Extension) and result.gain is not None and result.findings and _whole(result.gain):
         named = ", ".join(cause_at(one.cause, one.joint) for one in result.findings)
-        yield _with(f"the model with {named}, everything refitted", stage, result.gain)
+        whole = _with(f"the model with {named}, everything refitted", stage, result.gain)
+        # the model that is written, as the key figures have it: a finding's own gain is that of the moment it was found
+        now, was = (tuple(map(float, one.validate)) for one in (result.after_rms, result.residual_rms))
+        yield replace(whole, rms=now, before=was)
 
 
 def _nominal(result: Estimate, stage: str) -> Iterator[Line]:
@@ -95,9 +98,10 @@ def ledger_section(groups: Sequence[tuple[str, tuple[Line, ...]]]) -> Section | 
     several = len(groups) > 1
     rows, tones = [], list[Tone]()
     for name, lines in told:
+        rounded = iter(to_one_place([error for line in lines for error in line.rms]))
         for line in lines:
-            errors = [_rounded(line.rms[j]) if j < len(line.rms) else None for j in range(joints)]
-            rows.append((*((name,) if several else ()), line.step, *errors, _rounded(line.gain, 1), _judged(line), _tip(line)))
+            errors = [next(rounded) if j < len(line.rms) else None for j in range(joints)]
+            rows.append((*((name,) if several else ()), line.step, *errors, _rounded(line.gain), _judged(line), _tip(line)))
             tones.append("attention" if line.sure is False else "good" if line.sure else "neutral")
     heads = (*(("logs",) if several else ()), "step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain [%]", "beyond chance",
              "simulated tip [mm]")
@@ -116,10 +120,8 @@ def _compared(told: Sequence[tuple[str, tuple[Line, ...]]]) -> str:
             "torque in its own way: lines of one stage can be compared with each other, those of two only roughly.")
 
 
-def _rounded(x: float | None, decimals: int | None = None) -> float | None:
-    if x is None or not math.isfinite(x):
-        return None
-    return round(x, decimals) if decimals is not None else float(f"{x:.3g}")
+def _rounded(x: float | None) -> float | None:
+    return None if x is None or not math.isfinite(x) else round(x, 1)
 
 
 def _judged(line: Line) -> str:

@@ -29,7 +29,13 @@ def run_report(result: Result) -> Report:
         ledger_section([(group.name, ledger_lines(group)) for group in result.groups]), _stages(steps), _lacking(steps)) if section]
     for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):
         sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
-    return Report(_title(result), " ".join(verdicts), tone, _key_figures([step for _, step in steps]), tuple(sections))
+    return Report(_title(result), " ".join(verdicts), tone, _key_figures([step for _, step in steps]), tuple(sections),
+                  _advice(steps))
+
+
+def _advice(steps: Iterable[tuple[str, Step]]) -> tuple[str, ...]:
+    """That of every diagnosis, with the logs it is of."""
+    return tuple(f"{name}: {line}" if name else line for name, step in steps for line in step.report.advice)
 
 
 def _title(result: Result) -> str:

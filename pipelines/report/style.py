@@ -13,7 +13,7 @@ import os
 import shutil
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
 __all__ = ["BLACK", "BLUE", "COLOURS", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILLION", "figure_style",
-           "format_decimals", "format_number", "format_unit", "log_ticks", "printable", "with_std"]
+           "format_decimals", "format_number", "format_unit", "log_ticks", "printable", "to_one_place", "with_std"]
 
 BLACK: Final = "#1a1f24"
 GREY: Final = "#5b6670"
@@ -84,6 +84,13 @@ def format_number(value: float | None, digits: int = 4) -> str:
     if value != 0.0 and not -3 <= exponent <= 5:
         return f"{_trimmed(mantissa)} × 10{_raised(exponent)}"
     return _grouped(_trimmed(f"{float(value):.{max(0, digits - 1 - exponent)}f}"))
+
+
+def to_one_place(values: Sequence[float]) -> list[float | None]:
+    """Rounded to the same decimal place, where the largest has three digits and the smallest two; None where there is no value."""
+    sizes = [math.floor(math.log10(abs(x))) for x in values if math.isfinite(x) and x != 0.0]
+    place = max(2 - max(sizes), 1 - min(sizes)) if sizes else 0
+    return [round(float(x), place) if math.isfinite(x) else None for x in values]
 
 
 def format_decimals(value: float, decimals: int) -> str:

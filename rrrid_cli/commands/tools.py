@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.errors import EnvironmentFault, UsageError, clean, did_you_mean
+from pipelines.errors import EnvironmentFault, UsageError, did_you_mean
 from rrrid_cli.commands.application import STAGES, app, go
 from rrrid_cli.options import Common, StageCommand, with_common
 
@@ -47,7 +47,10 @@ def report(
     del debug  # `entry` looks for it
     drawn, _ = redraw(folder.absolute(), None if out is None else out.absolute(), force)
     if not quiet:
-        print(f"{clean(drawn.verdict, 1000)}\n→ {(out or folder) / 'report.html'}")
+        from rrrid_cli.console import say_verdict
+
+        say_verdict(drawn)
+        print(f"→ {(out or folder) / 'report.html'}")
 
 
 @app.command()

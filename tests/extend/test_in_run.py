@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from pipelines import diagnose, run
 from pipelines.errors import UsageError
 from pipelines.log.model_file import read_model
+from pipelines.model.diagnosis.result import Rejected
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, session, written
@@ -35,6 +37,12 @@ def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
     assert "Stages" in titles[:answer]
     effect, extended = ledger_lines(outcome.result.groups[0])
     gain = outcome.result.stages[1].result.findings[0].gain.validate_torque_rms
+    shown = outcome.result.stages[1].result.after_rms.validate  # of the key figures
+    assert extended.rms == pytest.approx(shown, rel=1e-6)  # one model, fitted by both stages
+    partly = tuple(replace(step, result=replace(step.result, accepted=False, rejected=(Rejected("spring", 1, "no gain"),)))
+                   if step.name == "extend" else step for step in outcome.result.stages)
+    assert ledger_lines(replace(outcome.result.groups[0], stages=partly))[-1] == extended  # what was accepted beside it stays
+    assert outcome.report.advice[0].startswith("What to check: ")
     assert (effect.stage, extended.stage, effect.sure) == ("diagnose", "extend", True)
     assert effect.gain == pytest.approx(100.0 * (1.0 - np.linalg.norm(gain.after) / np.linalg.norm(gain.before)))
     assert effect.gain is not None

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipelines.report.style import format_number, format_unit, printable, with_std
+from pipelines.report.style import format_number, format_unit, printable, to_one_place, with_std
 
 
 @pytest.mark.parametrize(("value", "text"), [
@@ -47,3 +47,11 @@ def test_four_digits_are_kept(value: float) -> None:
 def test_units_and_texts() -> None:
     assert format_unit("rad/s^2") == "rad/s²"
     assert printable("a\x1b[31m\udc80\nb") == "a[31m? b"
+
+
+def test_a_row_of_errors_is_rounded_at_one_place() -> None:
+    """Three digits of the largest, two of the smallest; what is none stays none."""
+    assert to_one_place([0.08783, 0.23728, 0.009995]) == [0.0878, 0.2373, 0.0100]
+    assert to_one_place([0.0, math.nan, 0.0]) == [0.0, None, 0.0]
+    assert to_one_place([1234.5, 99.4]) == [1234.0, 99.0]
+    assert to_one_place([]) == []

@@ -1,0 +1,49 @@
+"""Tables on a terminal: numbers under numbers, headings broken before their units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipelines.report.report import Report, Table
+from pipelines.stage import Outcome
+from rrrid_cli.console import say_outcome, say_table
+
+TABLE = Table(("joint", "held-out torque error now [N m]", "cause"),
+              ((1, 0.08783, "cogging"), (2, 1.2, "–"), (3, None, "no cause")))
+
+
+def outcome_of(report: Report) -> Outcome[Any]:
+    return Outcome(None, {}, report, Path("out"), 0, ())
+
+
+def test_numbers_stand_point_under_point(capsys: pytest.CaptureFixture[str]) -> None:
+    say_outcome(outcome_of(Report("t", "It is so.", key_figures=TABLE)), as_json=False, quiet=False, verbose=False)
+    verdict, *lines = capsys.readouterr().out.splitlines()[:-1]
+    assert verdict == "It is so."
+    head, body = lines[:-3], lines[-3:]
+    assert [line.rstrip() for line in head] == ["             held-out", "         torque error", "                  now",
+                                                "  joint         [N m]  cause"]
+    assert body == ["      1       0.08783  cogging", "      2       1.20000  –", "      3             –  no cause"]
+
+
+def test_figures_of_different_things_are_left_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    """A name and a figure: none is filled up for the sake of another."""
+    table = Table(("what", "value"), (("condition number", 2.31), ("samples", 30000), ("torque error, relative [%]", 0.0871)))
+    say_outcome(outcome_of(Report("t", "v", key_figures=table)), as_json=False, quiet=False, verbose=False)
+    assert [line.split("  ")[-1].strip() for line in capsys.readouterr().out.splitlines()[1:-1]] == ["2.31", "30 000", "0.0871"]
+
+
+def test_what_to_check_follows_the_verdict(capsys: pytest.CaptureFixture[str]) -> None:
+    report = Report("t", "Cogging at joint 2.", advice=("What to check: the magnets.",))
+    say_outcome(outcome_of(report), as_json=False, quiet=False, verbose=False)
+    assert capsys.readouterr().out.splitlines()[:2] == ["Cogging at joint 2.", "What to check: the magnets."]
+    say_outcome(outcome_of(report), as_json=False, quiet=True, verbose=False)
+    assert capsys.readouterr().out == ""
+
+
+def test_no_rows_no_table(capsys: pytest.CaptureFixture[str]) -> None:
+    say_table(("a", "b"), [])
+    assert capsys.readouterr().out == ""
