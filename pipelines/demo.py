@@ -16,11 +16,13 @@ from pipelines.errors import UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.results import NOT_STORED
+from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
 from pipelines.report.report import Report, Section, Table
+from pipelines.report.style import format_number, format_unit
 from pipelines.stage import Inputs, Request, Stage
 
-__all__ = ["STAGE", "Recorded", "Result", "Settings", "compute", "report"]
+__all__ = ["STAGE", "Recorded", "Result", "Settings", "compute", "hidden", "report"]
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,31 @@ def write(result: Result, folder: Path, request: Request) -> None:
         write_log(folder / f"{item.file}.{request.format}", item.log)
 
 
+def hidden(result: Result) -> str:
+    """What was hidden, in words: "cogging at joint 2 (order 18 per rev, amplitude 0.4 N m)"."""
+    return "; ".join(map(_in_words, result.fault)) or "nothing"
+
+
+def _in_words(fault: str) -> str:
+    name, *rest = fault.split(":")
+    kind = find_effect(name)
+    units = {q.name: _unit(q.unit) for q in kind.parameters}
+    place = "".join(f" at joint {part}" for part in rest if "=" not in part)
+    given = dict(pair.split("=") for part in rest if "=" in part for pair in part.split(",") if pair.strip())
+    numbers = ", ".join(f"{key.strip().replace('_', ' ')} {format_number(float(value))}{units[key.strip()]}"
+                        for key, value in given.items())
+    return f"{kind.title[:1].lower()}{kind.title[1:]}{place} ({numbers})"
+
+
+def _unit(unit: str) -> str:
+    """Behind a number in a sentence: " N m", " per rev", nothing for a ratio."""
+    return "" if unit == "1" else f" per {unit[2:]}" if unit.startswith("1/") else f" {format_unit(unit)}"
+
+
 def report(result: Result) -> Report:
     """What was recorded, and what was hidden."""
-    hidden = ", ".join(result.fault) or "nothing"
     rows = tuple((item.file.removeprefix("logs/"), item.experiment, item.role, item.samples) for item in result.logs)
-    verdict = f"{len(rows)} logs of {result.robot} were simulated; hidden in them: {hidden}."
+    verdict = f"{len(rows)} logs of {result.robot} were simulated; hidden in them: {hidden(result)}."
     return Report("Logs to try things on", verdict, "neutral", None,
                   (Section("Logs", ("The arm of Kostić et al. 2004 with synthetic links, Coulomb and viscous friction, a PD "
                                     "controller, noisy drives and encoders with steps.",),

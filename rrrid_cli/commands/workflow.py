@@ -69,11 +69,11 @@ def demo(
     recorded = run_stage(recording.STAGE, request, settings)
     teller.done()
     if not common.quiet:
-        where = f"{out / 'recording/logs'}: what rrrid run is given now"
-        print(f"Recorded {len(recorded.result.logs)} logs into {where}.", file=sys.stderr)
+        print(f"Simulated {len(recorded.result.logs)} logs into {out / 'recording/logs'}; now: rrrid run {out / 'recording'}",
+              file=sys.stderr)
     try:
         go(workflow.STAGE, (out / "recording",), replace(common, out=out / "run"), {})
     finally:
         if not common.quiet:
-            hidden = ", ".join(recorded.result.fault) or "nothing"
-            print(f"Hidden in these logs: {hidden}. Your own: rrrid run FOLDER", file=sys.stderr)
+            hidden = recording.hidden(recorded.result)
+            print(f"What had been hidden: {hidden}. With logs of your own: rrrid run FOLDER", file=sys.stderr)

@@ -32,7 +32,8 @@ def test_logs_and_what_was_hidden(tmp_path: Path) -> None:
     """Logs that rrrid run takes, the run beside them, and the answer in the last line."""
     done = rrrid("demo", *QUICK, "--fault", "quadratic_drag:3:coefficient=0.1", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stderr.splitlines()[-1].startswith("Hidden in these logs: quadratic_drag:3:coefficient=0.1.")
+    assert done.stderr.splitlines()[-1].startswith(
+        "What had been hidden: quadratic drag at joint 3 (coefficient 0.1 N m s²/rad²).")
     assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == ["recording", "run"]
     assert len(list((tmp_path / "demo/recording/logs").iterdir())) == 3
     assert json.loads((tmp_path / "demo/run/result.json").read_text())["stages"][0]["name"] == "inspect"
