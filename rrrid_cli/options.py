@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 
 from pipelines.errors import UsageError
 from rrrid_cli.conversion import plainly
 
-__all__ = ["Common", "LogPaths", "Roles", "SomeLogs", "StageCommand", "StageGroup", "numbers", "whole_numbers", "with_common"]
+__all__ = ["Common", "LogPaths", "Roles", "SomeLogs", "StageCommand", "StageGroup", "numbers", "whole_numbers", "with_common",
+           "with_common_but"]
 
 LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
                                                   readable=False)]  # rrrid says it better: exit 6, RRID-F13
@@ -128,8 +130,9 @@ class StageCommand(typer.core.TyperCommand):
             formatter.write_text(f"--set {stage}.OPTION=VALUE, options: {', '.join(names) or 'none'}.")
 
 
+_OUT = "Folder for everything the command leaves."
 _SHARED: tuple[tuple[str, Any, Any], ...] = (
-    ("out", Annotated[Path | None, _path("Folder for everything the command leaves. [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
+    ("out", Annotated[Path | None, _path(f"{_OUT} [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
     ("json", Annotated[bool, _flag("Print result.json on standard output, and nothing else there.", "--json")], False),
     ("strict", Annotated[bool, _flag("A repair of the data is an error (exit 3).", "--strict")], False),
     ("check", Annotated[bool, _flag("Exit 1 where a gate failed or something was found.", "--check")], False),
@@ -157,12 +160,36 @@ _ROLES: tuple[tuple[str, Any, Any], ...] = tuple((role, Annotated[list[str], _fl
     ("reference", "Logs of the arm as it was before. Repeatable.")))
 
 
+def _but(kind: Any, **said: Any) -> Any:
+    """An option of which help says other things."""
+    typed, option = get_args(kind)
+    other = copy.copy(option)
+    vars(other).update(said)
+    return Annotated[typed, other]
+
+
+def with_common_but(*idle: str, out: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """`with_common` of a command on which the options `idle` have no effect: they are taken, and its help is silent about them.
+
+    Args:
+        out: where its output goes by default, if not where that of others goes.
+    """
+    return lambda command: _with_common(command, idle, out)
+
+
 def with_common(command: Callable[..., None]) -> Callable[..., None]:
     """`command(own options…, common)` as a command that takes the shared options as well; with `roles`, those too."""
+    return _with_common(command, (), "")
+
+
+def _with_common(command: Callable[..., None], idle: tuple[str, ...], out: str) -> Callable[..., None]:
+    words: dict[str, dict[str, Any]] = {name: {"hidden": True} for name in idle}
+    if out:
+        words["out"] = {"help": f"{_OUT} [{out}]"}
     own = inspect.signature(command, eval_str=True)
     by_role = _ROLES if "roles" in own.parameters else ()
     options = (*by_role, *_SHARED, *((_JOINTS,) if "logs" in own.parameters else ()))
-    shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
+    shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=_but(kind, **words.get(name, {})), default=default)
               for name, kind, default in options]
     kept = [p for p in own.parameters.values() if p.name not in ("common", "roles")]
 

@@ -59,7 +59,8 @@ def examine(self_test: bool = True) -> Iterator[Finding]:
 def _python() -> Finding:
     found = f"{platform.python_version()} ({platform.system()} {platform.machine()})"
     if platform.system() != "Linux":
-        return Finding("Python", "warn", found, "rrrid is tested on Linux alone")
+        return Finding("Python", "warn", found,
+                       "rrrid is tested on Linux alone; elsewhere folders are replaced in two steps, not in one")
     return Finding("Python", "ok", found)
 
 

@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 
 from rrrid_cli.commands.application import app, go
-from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, numbers, with_common
+from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, numbers, with_common, with_common_but
 
 __all__ = ["diagnose", "extend"]
 
 
 @app.command(cls=StageCommand)
-@with_common
+@with_common_but("format")
 def diagnose(
     common: Common, roles: Roles,
     logs: SomeLogs = None,

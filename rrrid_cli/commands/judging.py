@@ -8,13 +8,13 @@ from typing import Annotated
 import typer
 
 from rrrid_cli.commands.application import app, go
-from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, numbers, whole_numbers, with_common
+from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, numbers, whole_numbers, with_common, with_common_but
 
 __all__ = ["frf", "simulate", "validate_writing"]
 
 
 @app.command(cls=StageCommand)
-@with_common
+@with_common_but("check")
 def simulate(
     common: Common,
     model: Annotated[str, typer.Argument(help="The model.json of estimate-bps, or the shipped 'rrr'.", show_default=False)],
@@ -73,7 +73,7 @@ def validate_writing(
 
 
 @app.command(cls=StageCommand)
-@with_common
+@with_common_but("format")
 def frf(
     common: Common, roles: Roles, logs: SomeLogs = None,
     estimator: Annotated[str | None, typer.Option(help="auto, multisine, local-polynomial or welch. [auto]")] = None,

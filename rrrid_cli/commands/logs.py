@@ -10,7 +10,7 @@ import typer
 
 from pipelines.errors import UsageError
 from rrrid_cli.commands.application import app, go
-from rrrid_cli.options import Common, LogPaths, StageCommand, with_common
+from rrrid_cli.options import Common, LogPaths, StageCommand, with_common_but
 
 __all__ = ["convert", "import_", "inspect"]
 
@@ -20,7 +20,7 @@ AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One record
 
 
 @app.command(cls=StageCommand)
-@with_common
+@with_common_but("format")
 def inspect(
     logs: LogPaths, common: Common, trust_units: TrustUnits = None,
     allow_same: AllowSame = None,
@@ -32,7 +32,7 @@ def inspect(
 
 
 @app.command("import", cls=StageCommand)
-@with_common
+@with_common_but("check")
 def import_(
     common: Common,
     recipe: Annotated[str | None,
@@ -55,7 +55,7 @@ def import_(
 
 
 @app.command(cls=StageCommand)
-@with_common
+@with_common_but("check")
 def convert(
     logs: LogPaths, common: Common,
     to: Annotated[str | None, typer.Option(help="h5, parquet or csv; goes before --format. [what the log is not in]")] = None,

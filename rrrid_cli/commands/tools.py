@@ -10,7 +10,7 @@ import typer
 
 from pipelines.errors import EnvironmentFault, UsageError, did_you_mean
 from rrrid_cli.commands.application import STAGES, app, go
-from rrrid_cli.options import Common, StageCommand, with_common
+from rrrid_cli.options import Common, StageCommand, with_common_but
 
 __all__ = ["compare", "doctor", "report", "schema"]
 
@@ -18,7 +18,7 @@ _SIGNS = {"ok": "·", "warn": "!", "bad": "x"}
 
 
 @app.command(cls=StageCommand)
-@with_common
+@with_common_but("robot", "assume_units", "format", "strict")
 def compare(
     common: Common,
     a: Annotated[Path, typer.Argument(help="A folder that a command has left, its result.json, or a model.json.",

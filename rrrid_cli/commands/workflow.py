@@ -11,7 +11,7 @@ import typer
 
 from rrrid_cli.batch import BatchCommand, batch
 from rrrid_cli.commands.application import app, asked, go
-from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, with_common
+from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, with_common, with_common_but
 
 __all__ = ["batch", "demo", "run"]
 
@@ -50,7 +50,7 @@ app.command(cls=BatchCommand)(batch)
 
 
 @app.command(cls=StageCommand)
-@with_common
+@with_common_but("robot", "assume_units", out="demo")
 def demo(
     common: Common,
     fault: Annotated[list[str] | None, typer.Option(

@@ -121,6 +121,19 @@ def test_rrrid_alone_says_its_help(tmp_path: Path) -> None:
     assert rrrid("--version", cwd=tmp_path).stdout.startswith("rrrid 0.")
 
 
+@pytest.mark.parametrize(("command", "idle"), [("compare", "--robot"), ("compare", "--format"), ("demo", "--assume-units"),
+                                               ("inspect", "--format"), ("convert", "--check")])
+def test_help_is_silent_about_options_without_effect(command: str, idle: str, tmp_path: Path) -> None:
+    done = rrrid(command, "--help", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "--no-report" in done.stdout
+    assert idle not in done.stdout.replace("before --format", "")
+
+
+def test_an_option_without_effect_is_taken(logs: Path) -> None:
+    assert rrrid("convert", "logs", "--check", "--no-report", "--out", "out", cwd=logs).returncode == 0
+
+
 def test_settings_come_from_file_then_set_then_options(logs: Path) -> None:
     """The last word has the command line; tables of other stages in the same file are left alone."""
     (logs / "c.toml").write_text('[convert]\nto = "csv"\n[inspect]\n')

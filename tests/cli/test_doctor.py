@@ -61,3 +61,9 @@ def test_what_breaks_in_the_self_test_is_named(monkeypatch: pytest.MonkeyPatch) 
     found = list(self_test.run_self_test())
     assert [one.level for one in found] == ["ok", "bad", "bad", "ok", "ok"]
     assert "HDF5 library version mismatch" in found[1].found
+
+
+def test_another_system_is_remarked_upon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(examine.platform, "system", lambda: "Darwin")
+    python = named(list(examine.examine(self_test=False)), "Python")
+    assert (python.level, "Linux alone" in python.remedy) == ("warn", True)
