@@ -7,6 +7,7 @@ import os
 import random
 import signal
 import time
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,7 +33,9 @@ def contents(out: Path) -> dict[str, str]:
 
 def killed(folder: Path, settings: run.Settings, after: float) -> bool:
     """Run in a child that is killed after so many seconds; whether it was still at work."""
-    child = os.fork()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # a fork beside threads: this child takes none of their locks
+        child = os.fork()
     if child == 0:
         try:
             go(folder, settings)
@@ -69,11 +72,13 @@ def sweep(folder: Path, points: int, seed: int) -> int:
     return met
 
 
+@pytest.mark.row("P01", "P07")
 def test_a_killed_run_leaves_the_old_or_the_new(tmp_path: Path) -> None:
     """P01, P07: some moments of a sweep."""
     assert sweep(tmp_path, 4, 1) > 1
 
 
+@pytest.mark.row("P01", "P07")
 @pytest.mark.slow
 def test_200_moments(tmp_path: Path) -> None:
     """P01, P07: the whole sweep."""
