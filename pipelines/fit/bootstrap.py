@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.fit.equations import Array
 
-__all__ = ["apart"]
+__all__ = ["apart", "apart_in", "drawn"]
 
 _DRAWS = 4000
 _NORMAL = 1.96  # standard deviations of 95 %
@@ -29,8 +29,17 @@ def apart(ours: Array, theirs: Array, power: Array, rng: np.random.Generator) ->
         ours, theirs: (blocks,) Σ (y - A β)² of each block.
         power: (blocks,) Σ y².
     """
+    return apart_in(drawn(len(power), rng), ours, theirs, power)
+
+
+def drawn(blocks: int, rng: np.random.Generator) -> Array:
+    """(draws, blocks) how often each block is drawn, for several questions of the same blocks."""
+    return rng.multinomial(blocks, np.full(blocks, 1.0 / blocks), size=_DRAWS).astype(np.float64)
+
+
+def apart_in(drawn: Array, ours: Array, theirs: Array, power: Array) -> tuple[float, float]:
+    """The same with these draws."""
     blocks = len(power)
-    drawn = rng.multinomial(blocks, np.full(blocks, 1.0 / blocks), size=_DRAWS).astype(np.float64)
     whole = drawn @ power
     known = whole > 0.0
     if blocks < 2 or not known.any():

@@ -23,15 +23,16 @@ from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.compliance import Compliance, untold
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import evidence
-from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.exact import Exact, Refined
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
+from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import Settled, settled, unnamed
 from pipelines.model.diagnosis.responding import Responding, responding
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, ResidualRms, Threshold
-from pipelines.model.diagnosis.search import Case, Explored, clean, gap_first, gives_way, held_out_left, provisional, search
+from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, Rejected, ResidualRms, Threshold
+from pipelines.model.diagnosis.search import Case, Explored, Step, clean, gap_first, gives_way, held_out_left, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
@@ -134,7 +135,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings) -> D
     if since.absorbed is not None and done.ruling.verdict == "unknown":
         done = unnamed(done, since.floor)
     floored = _Floored(since.floor, "reference logs", None, None, np.full(case.data.n_joints, np.nan))
-    told = _told(first, case, done, floored, chosen)
+    told = _told(first, case, done, floored, chosen, since.probed)
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
     if since.absorbed is None:
         return told
@@ -153,7 +154,8 @@ def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: -finding.explained))
 
 
-def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings) -> Diagnosis:
+def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings,
+          probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None = None) -> Diagnosis:
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
     plain = first.held.plain or nominal  # nothing taken out for what responses name
@@ -167,7 +169,7 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     thresholds = last.thresholds
     bounds = tuple(Threshold(f.cause, f.joint, float(g / last.before.rss), thresholds.origin)
                    for f, g in zip(case.families, thresholds.gain, strict=True))
-    limits = detectable(last.screened, thresholds, prepared.data.logs[0].log.robot.revolute) if chosen.limits else ()
+    limits, beyond = _limits(last, case, prepared, probed) if chosen.limits else ((), ())
     hidden = not_testable(prepared.data, nominal.fit, nominal.model.columns, found.steps[0].screened, nominal.model.arm,
                           bool(prepared.referring), chosen.without)
     judge = first.held.judge if parts else prepared.judge
@@ -180,11 +182,18 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     standing = [one for one in case.beside if one not in first.held.acting]
     return Diagnosis(
         ruling.verdict, _sentence(ruling, named), named, (), (*harmful, *rejected(found, ruling)), limits,
-        (*first.undecided, *hidden, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
+        (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
         0 if floored.twin is None else len(floored.twin.fits), floored.noise, acted(plain.model.arm, standing),
         acted(arm, responded.acting))
+
+
+def _limits(last: Step, case: Case, prepared: Prepared, probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None,
+            ) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
+    """By hiding causes in what the last model leaves; with reference logs beside these."""
+    probe, bounds = (Probe.of(last.before, case.judge), last.thresholds) if probed is None else probed(last.before, case.judge)
+    return detectable(last.screened, bounds, prepared.data.logs[0].log.robot.revolute, probe)
 
 
 def _sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:

@@ -1,21 +1,25 @@
 """What these logs can and cannot tell: the smallest cause that would have been found, and what the model absorbs.
 
-    detectable(step, fit)           the amplitude that exceeds its threshold with 95 %
-    not_testable(...)               causes of which nothing shows, with the parameters that hide them
+    detectable(screened, thresholds, revolute, probe)       the amplitude that is found with 95 %
+    not_testable(...)                                       causes of which nothing shows, with the parameters that hide them
 
-A cause of amplitude A adds A²‖c⊥‖² to what it gains, give or take what chance gives it on the twin. It is found with 95 % where
+The amplitude is found by hiding the cause in the logs (`injection`). Of what is not hidden, events, a formula tells it: a cause of
+amplitude A adds A²‖c⊥‖² to what it gains, give or take what chance gives it on the twin. It is found with 95 % where
 A ‖c⊥‖ exceeds the root of the threshold by 1.65 of that. c⊥ is that of a shape that reaches less than three quarters of them do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.injection import Probe
+from pipelines.model.diagnosis.injection import smallest as smallest_hidden
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
 from pipelines.model.diagnosis.screen import Screened
@@ -32,31 +36,56 @@ _VISIBLE = 0.02  # η below which a cause cannot be told from the model
 _MAIN = 0.1  # of a column: a parameter that makes up less of it does not hide it
 
 
-def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: tuple[bool, ...]) -> tuple[Detectable, ...]:
-    """Every cause that shows, with the smallest amplitude that would have been found."""
-    found = []
+def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: tuple[bool, ...],
+               probe: Probe | None = None) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
+    """Every cause that shows, with the smallest amplitude that would have been found; and those for which it is beyond its range.
+
+    Args:
+        screened, thresholds: of the last step, in the order of the families.
+        probe: the final model, into whose logs causes are put; None: by the formula above.
+    """
+    found, beyond = [], []
+    named = {(e.effect.name, e.effect.joint) for e in probe.final.model.effects} if probe is not None else set()
     for one, bound, chance in zip(screened, thresholds.gain, thresholds.own, strict=True):
         effect = one.family.shapes[0]
-        if one.best_visibility < _VISIBLE or one.reach <= 0.0 or effect.evidence != "residual":
+        if one.best_visibility < _VISIBLE or effect.evidence != "residual" or (one.cause, one.joint) in named:
             continue
-        size = (np.sqrt(bound) + _SIDE * np.sqrt(chance)) / one.reach
-        found.append(_limit(effect, one.width, float(size), revolute))
-    return tuple(one for one in found if one is not None)
+        hidden = None if probe is None else smallest_hidden(one.family, float(bound), probe)
+        limit = None
+        if hidden is not None:
+            limit = _limit(hidden.effect, hidden.amplitudes, revolute, one.best_visibility, "injected")
+        elif one.reach > 0.0 and np.isfinite(bound):
+            amplitudes = (np.sqrt(bound) + _SIDE * np.sqrt(chance)) / one.reach * np.eye(one.width)[0]
+            limit = _limit(effect, amplitudes, revolute, one.best_visibility, "analytic")
+        if limit is None:
+            continue
+        told, possible = limit
+        if possible and (hidden is None or hidden.found):
+            found.append(told)
+            continue
+        size = f"{told.smallest.value:.2g} {told.smallest.unit} of {told.parameter}"
+        why = (f"less than {size}, which is more than such a cause has, would not have been found in these logs"
+               if hidden is None or hidden.found else "hidden in these logs it was found at no strength")
+        beyond.append(NotTestable(effect.name, effect.joint, why, effect.experiment))
+    return tuple(found), tuple(beyond)
 
 
-def _limit(effect: Effect, width: int, size: float, revolute: tuple[bool, ...]) -> Detectable | None:
-    """The reported parameter that goes with the first amplitude."""
-    names = [q for q in effect.parameters if not q.shape and not q.derived]
-    amplitudes = np.zeros(width)
-    amplitudes[0] = size
+def _limit(effect: Effect, amplitudes: Array, revolute: tuple[bool, ...], visibility: float,
+           way: Literal["injected", "analytic"]) -> tuple[Detectable, bool] | None:
+    """The reported parameter that goes with the amplitudes, and whether its range holds it."""
     if effect.fixed_amplitudes is not None:
         return None
     values = effect.values(amplitudes)
-    main = next((q for q in names if values.get(q.name) and np.isfinite(values[q.name])), None)
+    main = next((q for q in effect.parameters if not q.shape and not q.derived and values.get(q.name)
+                 and np.isfinite(values[q.name])), None)
     if main is None:
         return None
     turning = effect.joint is None or revolute[effect.joint - 1]
-    return Detectable(effect.name, effect.joint, main.name, Value(abs(values[main.name]), None, main.unit_at(turning)))
+    at = {q.name: Value(values[q.name], None, q.unit_at(turning)) for q in effect.parameters
+          if q.shape and not q.derived and np.isfinite(values.get(q.name, np.nan))}
+    size = abs(values[main.name])
+    smallest = Value(size, None, main.unit_at(turning))
+    return Detectable(effect.name, effect.joint, main.name, smallest, at, way, visibility), size <= max(abs(main.low), main.high)
 
 
 def not_testable(data: Data, fit: Fit, columns: Columns, screened: Sequence[Screened], arm: Arm,

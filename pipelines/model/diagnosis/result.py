@@ -139,6 +139,9 @@ class Detectable:
     joint: int | None
     parameter: str  # whose value it is
     smallest: Value
+    at: dict[str, Value] = field(default_factory=dict)  # non-linear numbers for which it is: order, speed
+    way: Literal["injected", "analytic"] = "analytic"  # hidden in these logs and found, or worked out
+    visibility: float = float("nan")  # part of its columns that the refitted model cannot absorb
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,13 +19,14 @@ from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.candidates import families, lay_one, whole_motion
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import fit_columns, fit_nominal, law_slopes, rows_of
 from pipelines.model.diagnosis.result import Standing, Value
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Case
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.standing import Chosen, apart, changes, joined, standing_set
+from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.thresholds import Thresholds
 
 __all__ = ["Since", "since_reference"]
@@ -40,6 +41,8 @@ class Since:
     standing: tuple[Standing, ...]
     acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
     absorbed: Absorbed | None  # what the base parameters show
+    chance: Chance
+    probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]]  # beside a final model: what limits are looked for with
 
 
 def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = ()) -> Since:
@@ -63,13 +66,15 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm))
     start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
 
+    floor = reference.rms(whole.left[~later])
+    chance = Chance.of(data, later, nominal, common, 1.0 / np.maximum(floor, 1e-12), arm)
+
     def changed(found: Refined, wanted: Sequence[bool]) -> tuple[Sequence[Screened], Thresholds]:
-        more = np.zeros((0, data.rows))
-        places = [k for place in range(len(found.model.effects)) for k in found.of_effect(place)]
-        if places:
-            more = np.zeros((len(places), data.rows))
-            more[:, later] = found.slopes[places]
-        return changes(data, later, nominal, common, more, found.weight, every, wanted, arm)
+        return changes(data, later, nominal, common, _slopes(found, later), found.weight, every, wanted, arm, chance)
+
+    def probed(found: Refined, judge: Data | None) -> tuple[Probe, Thresholds]:
+        fit = fit_changed(data, later, nominal, common, _slopes(found, later), found.weight)
+        return Probe.of(found, judge, (data, fit, later)), bounds(every, [True] * len(every), fit, later, chance)
 
     acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
     case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed,
@@ -77,8 +82,15 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     kept = len(columns.kept)
     moved = absorbed(data, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
     pairs = list(zip(standing, sizes, strict=True))
-    return Since(case, reference.rms(whole.left[~later]), tuple(_told(one, size, arm) for one, size in pairs),
-                 case.beside, moved)
+    return Since(case, floor, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed)
+
+
+def _slopes(found: Refined, later: Mask) -> Array:
+    """(n, rows) slopes of the effects found so far, which act in the later rows."""
+    places = [k for place in range(len(found.model.effects)) for k in found.of_effect(place)]
+    more = np.zeros((len(places), len(later)))
+    more[:, later] = found.slopes[places]
+    return more
 
 
 def _torques(data: Data, standing: Sequence[Chosen], arm: Arm) -> Array:

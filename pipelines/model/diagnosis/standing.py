@@ -12,7 +12,7 @@ against the first, or some of them against the others, is what it has to exceed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.screen import Screened, products_of, screen, scre
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Chosen", "changes", "joined", "standing_set"]
+__all__ = ["Chance", "Chosen", "apart", "bounds", "changes", "fit_changed", "joined", "standing_set"]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -130,8 +130,48 @@ def apart(table: Array, later: Mask) -> Array:
     return np.concatenate([np.where(later, 0.0, table), np.where(later, table, 0.0)])
 
 
+@dataclass(frozen=True, eq=False)
+class Chance:
+    """What causes gain where nothing changed, found once for each: parts of the reference logs are taken for later ones."""
+
+    data: Data  # of the reference logs
+    masks: tuple[Mask, ...]
+    fits: tuple[Fit, ...]  # each with the nominal model apart before and after, at the weights of the reference
+    arm: Arm
+    known: dict[Family, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, data: Data, later: Mask, nominal: Array, common: Array, weight: Array, arm: Arm) -> Chance:
+        """As in `changes`; `weight` (joints,) by what is left of the reference logs."""
+        rows = ~later
+        known = None if data.known is None else data.known[rows]
+        before = replace(data, logs=data.logs[:int(data.log_of[rows].max()) + 1], known=known)
+        masks = tuple(mask[rows] for mask in _nothing(data, rows))
+        fits = tuple(fit_columns(before, np.concatenate([apart(nominal[:, rows], mask), common[:, rows]]), data.y[rows], weight)
+                     for mask in masks)
+        return cls(before, masks, fits, arm)
+
+    def most(self, family: Family, weight: Array) -> float:
+        """The most that any part gives it, with joints weighted by `weight`: a cause acts on its joint, or counts where most."""
+        if family not in self.known:
+            self.known[family] = (float(screen_event(self.data, self.fits[0], family, self.arm).gain.max()) if family.event
+                                  else self._gained(family))
+        ratio = np.square(weight / self.fits[0].weight)
+        return self.known[family] * float(ratio.max() if family.joint is None else ratio[family.joint - 1])
+
+    def _gained(self, family: Family) -> float:
+        most = 0.0
+        for laid in lay_family(self.data, family, self.arm):
+            width = laid.table.shape[1]
+            for mask, fit in zip(self.masks, self.fits, strict=True):
+                moved = np.where(mask[laid.rows], laid.table, 0.0)
+                products = products_of(replace(laid, table=np.concatenate([laid.table, moved], axis=1)), fit, fit.residual[None])
+                most = max(most, float((products.gains()[0] - products.first(width).gains()[0]).max()))
+        return most
+
+
 def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array, weight: Array, families: Sequence[Family],
-            wanted: Sequence[bool], arm: Arm) -> tuple[list[Screened], Thresholds]:
+            wanted: Sequence[bool], arm: Arm, chance: Chance) -> tuple[list[Screened], Thresholds]:
     """Every cause that is wanted by what its change gains, and what it has to exceed; the others gain nothing.
 
     Args:
@@ -141,29 +181,21 @@ def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array,
         more: (n, rows) slopes of the effects found so far, zero in the reference.
         weight: (joints,) before and after alike.
     """
-    fit = fit_columns(data, np.concatenate([apart(nominal, later), common, more]), weight=weight)
-    masks = _nothing(data, ~later)
-    rows = ~later
-    known = None if data.known is None else data.known[rows]
-    before = replace(data, logs=data.logs[:int(data.log_of[rows].max()) + 1], known=known)
-    still = [fit_columns(before, np.concatenate([apart(nominal[:, rows], mask[rows]), common[:, rows]]), data.y[rows], weight)
-             for mask in masks]
-    found, own = [], []
-    ratio = float(later.sum()) / max(float(rows.sum()) / 2.0, 1.0)
+    fit = fit_changed(data, later, nominal, common, more, weight)
+    found = []
     for family, asked in zip(families, wanted, strict=True):
         if family.event and asked:  # it happened to the later logs, or did not
             found.append(screen_event(data, fit, family, arm, np.where(later, fit.residual, 0.0)[None]))
-            own.append(float(screen_event(before, still[0], family, arm).gain.max()))
-            continue
-        if not asked:
-            one = Screened(family, np.zeros(1), family.shapes[:1], np.ones(1), 1.0, 0.0, 1)
-            found.append(one)
-            own.append(np.inf)
-            continue
-        one, chance = _screened(data, later, fit, masks, still, family, arm)
-        found.append(one)
-        own.append(max(1.0, ratio) * chance)
-    return found, _bounds(families, np.array(own), fit)
+        elif asked:
+            found.append(_screened(data, later, fit, family, arm))
+        else:
+            found.append(Screened(family, np.zeros(1), family.shapes[:1], np.ones(1), 1.0, 0.0, 1))
+    return found, bounds(families, wanted, fit, later, chance)
+
+
+def fit_changed(data: Data, later: Mask, nominal: Array, common: Array, more: Array, weight: Array) -> Fit:
+    """The model of reference and later logs together; as in `changes`."""
+    return fit_columns(data, np.concatenate([apart(nominal, later), common, more]), weight=weight)
 
 
 def _nothing(data: Data, reference: Mask) -> list[Mask]:
@@ -178,12 +210,9 @@ def _nothing(data: Data, reference: Mask) -> list[Mask]:
     return masks
 
 
-def _screened(data: Data, later: Mask, fit: Fit, masks: Sequence[Mask], still: Sequence[Fit], family: Family,
-              arm: Arm) -> tuple[Screened, float]:
-    gained, eta, chance, width, rows = [], [], 0.0, 0, ~later
+def _screened(data: Data, later: Mask, fit: Fit, family: Family, arm: Arm) -> Screened:
+    gained, eta, width = [], [], 0
     for laid in lay_family(data, family, arm):
-        here = np.zeros(data.rows, dtype=bool)
-        here[laid.rows] = True
         changed = np.where(later[laid.rows], laid.table, 0.0)
         both = replace(laid, table=np.concatenate([laid.table, changed], axis=1))
         width = laid.table.shape[1]
@@ -191,20 +220,16 @@ def _screened(data: Data, later: Mask, fit: Fit, masks: Sequence[Mask], still: S
         one, (two, seen, _) = products.first(width).gains()[0], products.gains()
         gained.append(two[:, 0] - one[:, 0])
         eta.append(seen)
-        inside = rows[laid.rows]
-        for mask, own in zip(masks, still, strict=True):
-            part = replace(laid, table=laid.table[:, :, inside], rows=np.flatnonzero(here[rows]))
-            moved = np.where(mask[laid.rows][inside], part.table, 0.0)
-            products = products_of(replace(part, table=np.concatenate([part.table, moved], axis=1)), own, own.residual[None])
-            alone, pair = products.first(width).gains()[0], products.gains()[0]
-            chance = max(chance, float((pair - alone).max()))
     gain, visible = np.concatenate(gained), np.concatenate(eta)
     best = int(np.argmax(gain))
-    return Screened(family, gain[best:best + 1], (family.shapes[best],), visible[best:best + 1], float(visible.max()), 0.0,
-                    width), chance
+    return Screened(family, gain[best:best + 1], (family.shapes[best],), visible[best:best + 1], float(visible.max()), 0.0, width)
 
 
-def _bounds(families: Sequence[Family], own: Array, fit: Fit) -> Thresholds:
+def bounds(families: Sequence[Family], wanted: Sequence[bool], fit: Fit, later: Mask, chance: Chance) -> Thresholds:
+    """What a change has to exceed: of those wanted; infinite for the others."""
+    longer = max(1.0, float(later.sum()) / max(float((~later).sum()) / 2.0, 1.0))
+    own = np.array([(1.0 if family.event else longer) * chance.most(family, fit.weight) if asked else np.inf
+                    for family, asked in zip(families, wanted, strict=True)])
     joint = np.array([f.joint or 0 for f in families])
     left = np.bincount(fit.data.joint, fit.residual**2, minlength=fit.data.n_joints)
     least = _LEAST * np.append(left.mean(), left)

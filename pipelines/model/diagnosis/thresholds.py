@@ -6,7 +6,7 @@ get, which keeps the luck of few replicas out; and a hundredth of what is left a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,14 +14,12 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family
-from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.twin import Twin
+from pipelines.model.diagnosis.wide import TIMES, USELESS, Wide, median
 
 __all__ = ["Thresholds", "without_twin"]
 
-_TIMES = 3.0
-_USELESS = 0.01  # of the squared weighted residual of a joint of the twin
 _SHARE = 0.02  # of the squared weighted residual of one joint: what is less is no finding, whatever the twin says
 
 
@@ -34,30 +32,22 @@ class Thresholds:
     origin: str
     weight: Array  # (joints,)
     joints: tuple[int | None, ...]  # of the families
-    whole: Callable[[Array], tuple[Array, Array]] | None = None  # `gain` and `own` of causes of the whole arm, with other weights
+    wide: Wide | None = None  # what those of causes of the whole arm follow from, with other weights
 
     @classmethod
     def of_twin(cls, twin: Twin, families: Sequence[Family], arm: Arm, weight: Array) -> Thresholds:
         fit, residuals = twin.weighted(weight)
-        own = _most(twin, families, arm, fit, residuals)
+        found = screen(twin.data, fit, families, arm, residuals)
+        own = np.array([one.gain.max() for one in found])
         joints = tuple(f.joint for f in families)
         once = np.array([f.event for f in families])
-        usual = [_median(own[[j == joint and not event for j, event in zip(joints, once, strict=True)]])
-                 for joint in range(1, len(weight) + 1)]
-        left = np.bincount(twin.data.joint, np.mean(residuals**2, axis=0), minlength=len(weight))
+        usual = np.array([median(own[[j == joint and not event for j, event in zip(joints, once, strict=True)]])
+                          for joint in range(1, len(weight) + 1)])
+        left = np.asarray(np.bincount(twin.data.joint, np.mean(residuals**2, axis=0), minlength=len(weight)), dtype=np.float64)
         place = np.array([(joint or 1) - 1 for joint in joints])
-        gain = _TIMES * np.max([own, np.where(once, 0.0, np.array(usual)[place]), _USELESS * left[place]], axis=0)
-
-        def whole(now: Array) -> tuple[Array, Array]:
-            """A cause of the whole arm acts on several joints: its gain is no multiple of what it was."""
-            some = [f for f in families if f.joint is None]
-            most = _most(twin, some, arm, *twin.weighted(now)) if (now != weight).any() else own[[j is None for j in joints]]
-            ratio, events = np.square(now / weight), np.array([f.event for f in some])
-            common = max(_median(most[~events]), float(np.median(ratio * usual)))
-            return _TIMES * np.max([most, np.where(events, 0.0, common), np.full(len(some), _USELESS * (ratio * left).mean())],
-                                   axis=0), most
-
-        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, whole).at(weight)
+        gain = TIMES * np.max([own, np.where(once, 0.0, usual[place]), USELESS * left[place]], axis=0)
+        wide = Wide.of_twin(fit, residuals, [f for f in families if f.joint is None], usual, left, arm)
+        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, wide).at(weight)
 
     def at(self, weight: Array) -> Thresholds:
         """The same with other weights: a cause acts on its joint; one of the whole arm is looked for anew, or counts where most."""
@@ -65,18 +55,9 @@ class Thresholds:
         scale = np.array([ratio.max() if joint is None else ratio[joint - 1] for joint in self.joints])
         gain, own = scale * self.gain, scale * self.own
         places = [place for place, joint in enumerate(self.joints) if joint is None]
-        if self.whole is not None and places:
-            gain[places], own[places] = self.whole(weight)
-        return Thresholds(gain, own, self.origin, weight, self.joints, self.whole)
-
-
-def _most(twin: Twin, families: Sequence[Family], arm: Arm, fit: Fit, residuals: Array) -> Array:
-    """(families,) the most that any replica gives each."""
-    return np.array([one.gain.max() for one in screen(twin.data, fit, families, arm, residuals)])
-
-
-def _median(values: Array) -> float:
-    return float(np.median(values)) if len(values) else 0.0
+        if self.wide is not None and places:
+            gain[places], own[places] = self.wide.at(weight)
+        return Thresholds(gain, own, self.origin, weight, self.joints, self.wide)
 
 
 def without_twin(found: Sequence[Screened], power: float, weight: Array) -> Thresholds:

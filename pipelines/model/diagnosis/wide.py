@@ -1,0 +1,144 @@
+"""Thresholds of causes of the whole arm, whose gain with other weights is no multiple of what it was.
+
+    wide = Wide.of_twin(fit, residuals, found, own, usual, arm)
+    gain, own = wide.at(weight)
+
+A cause of one joint gains with the square of that joint's weight. One of the whole arm acts on several, and how much of it the
+model imitates hangs on which joint counts. But all of it follows from sums over the rows of each joint, which are few numbers:
+with B an orthonormal basis of the model's columns at the reference weights, c a cause's columns, r a replica's residual and ρ_j the
+weight of joint j over its reference,
+
+    BᵀB → Σ ρ_j² (BᵀB)_j,    cᵀB → Σ ρ_j² (cᵀB)_j,    cᵀc → Σ ρ_j² (cᵀc)_j,    cᵀr → Σ ρ_j² (cᵀr)_j
+
+so that thresholds can be stored, and neither replicas nor logs are needed to ask for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import Family, lay_family
+from pipelines.model.diagnosis.nominal import Fit
+from pipelines.model.diagnosis.screen import Products
+
+__all__ = ["TIMES", "USELESS", "Wide", "WideCause", "median"]
+
+Indices = npt.NDArray[np.intp]
+
+TIMES = 3.0
+USELESS = 0.01  # of the squared weighted residual of a joint of the twin
+_EVENTS = 3  # replicas that an event is looked for in
+_FAR = 100.0  # times the reference's square, of the weights for which an event's shapes are kept
+
+
+@dataclass(frozen=True, eq=False)
+class WideCause:
+    """Sums over the rows of each joint, columns and residuals weighted by the reference."""
+
+    event: bool
+    columns: Array  # (joints, shapes, k, k) cᵀc
+    model: Array  # (joints, shapes, k, rank) cᵀB
+    left: Array  # (joints, shapes, k, replicas) cᵀr; of an event only the replica that a shape was found in
+
+
+@dataclass(frozen=True, eq=False)
+class Wide:
+    """What thresholds of causes of the whole arm follow from, with any weights."""
+
+    weight: Array  # (joints,) the reference
+    model: Array  # (joints, rank, rank) BᵀB
+    left: Array  # (joints, rank, replicas) Bᵀr
+    usual: Array  # (joints,) what half the causes of a joint get
+    rest: Array  # (joints,) squared weighted residual of the replicas
+    causes: tuple[WideCause, ...]
+
+    @classmethod
+    def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], usual: Array, rest: Array, arm: Arm) -> Wide:
+        """`families`: the causes of the whole arm; `residuals` (replicas, rows) weighted, that `fit` leaves."""
+        rows = [np.flatnonzero(fit.data.joint == j) for j in range(len(fit.weight))]
+        basis = fit.basis
+        model = np.array([basis[:, own] @ basis[:, own].T for own in rows])
+        left = np.array([basis[:, own] @ residuals[:, own].T for own in rows])
+        causes = (_event(one, fit, residuals, arm, rows, model, left) if one.event else _cause(one, fit, residuals, arm, rows)
+                  for one in families)
+        return cls(fit.weight, model, left, usual, rest, tuple(causes))
+
+    def at(self, weight: Array) -> tuple[Array, Array]:
+        """Gains (causes,) to exceed with joints weighted by `weight`, and the most that any replica gives."""
+        ratio = np.square(weight / self.weight)
+        own = np.array([_gains(one, self.model, self.left, ratio).max(initial=0.0) for one in self.causes])
+        events = np.array([one.event for one in self.causes], dtype=bool)
+        common = max(median(own[~events]), float(np.median(ratio * self.usual)))
+        useless = np.full(len(own), USELESS * float((ratio * self.rest).mean()))
+        return TIMES * np.max([own, np.where(events, 0.0, common), useless], axis=0), own
+
+
+def median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else 0.0
+
+
+def _cause(family: Family, fit: Fit, residuals: Array, arm: Arm, rows: Sequence[Indices]) -> WideCause:
+    parts = []
+    for laid in lay_family(fit.data, family, arm):
+        table = np.zeros((*laid.table.shape[:2], fit.data.rows))
+        table[:, :, laid.rows] = laid.table
+        parts.append(table)
+    return WideCause(False, *_sums(np.concatenate(parts), fit, residuals, rows))
+
+
+def _event(family: Family, fit: Fit, residuals: Array, arm: Arm, rows: Sequence[Indices], model: Array, left: Array) -> WideCause:
+    """In each replica and log the shapes that its residual speaks for; kept are those that gain most with some weights or other."""
+    parts = []
+    for replica, residual in enumerate(residuals[:_EVENTS]):
+        only = np.arange(len(residuals)) == replica
+        for place, (one, x) in enumerate(zip(fit.data.logs, fit.data.split(residual / fit.weights), strict=True)):
+            full = np.stack([np.interp(one.motion.t, one.t, row) for row in x], axis=1)
+            shapes = tuple(family.shapes[0].promising(one.motion, arm, full))
+            start = int(np.argmax(fit.data.log_of == place))
+            if not shapes:
+                continue
+            for laid in lay_family(replace(fit.data, logs=(one,), known=None), replace(family, shapes=shapes), arm):
+                table = np.zeros((*laid.table.shape[:2], fit.data.rows))
+                table[:, :, start + laid.rows] = laid.table
+                columns, seen, own = _sums(table, fit, residuals, rows)
+                parts.append(_best(WideCause(True, columns, seen, own * only), model, left))
+    if not parts:
+        return WideCause(True, *(np.zeros((len(rows), 0, 1, size)) for size in (1, model.shape[1], len(residuals))))
+    return _best(WideCause(True, *(np.concatenate([getattr(one, name) for one in parts], axis=1)
+                                   for name in ("columns", "model", "left"))), model, left)
+
+
+def _best(one: WideCause, model: Array, left: Array) -> WideCause:
+    """Of its shapes only those that gain most in a replica, with the reference weights, or one joint weighted far more or less."""
+    kept = set()
+    for ratio in (np.ones(len(model)), *(1.0 + (far - 1.0) * np.eye(len(model))[j] for j in range(len(model))
+                                         for far in (_FAR, 1.0 / _FAR))):
+        gains = _gains(one, model, left, ratio)
+        kept |= {int(k) for k in np.argmax(gains, axis=0)[gains.max(axis=0, initial=0.0) > 0.0]}
+    some = sorted(kept)
+    return WideCause(one.event, one.columns[:, some], one.model[:, some], one.left[:, some])
+
+
+def _sums(table: Array, fit: Fit, residuals: Array, rows: Sequence[Indices]) -> tuple[Array, Array, Array]:
+    """Of `table` (shapes, k, rows): cᵀc, cᵀB, cᵀr of the rows of each joint."""
+    c = [(table * fit.weights)[..., own] for own in rows]
+    return (np.array([x @ x.transpose(0, 2, 1) for x in c]),
+            np.array([x @ fit.basis[:, own].T for x, own in zip(c, rows, strict=True)]),
+            np.array([x @ residuals[:, own].T for x, own in zip(c, rows, strict=True)]))
+
+
+def _gains(one: WideCause, model: Array, left: Array, ratio: Array) -> Array:
+    """(shapes, replicas)"""
+    gram = np.einsum("j,jab->ab", ratio, model)
+    moved = np.linalg.solve(gram, np.einsum("j,jam->am", ratio, left))  # of the model, for it is fitted anew
+    seen = np.einsum("j,jska->ska", ratio, one.model)
+    columns = np.einsum("j,jskl->skl", ratio, one.columns)
+    hidden = np.linalg.solve(gram, seen.reshape(-1, len(gram)).T).T.reshape(seen.shape)
+    moment = np.einsum("j,jskm->skm", ratio, one.left) - seen @ moved
+    return Products(columns, columns - seen @ hidden.transpose(0, 2, 1), moment).gains()[0]
