@@ -10,7 +10,7 @@ import typer
 
 from pipelines.errors import UsageError
 from rrrid_cli.console import Teller, say_outcome
-from rrrid_cli.options import Common, StageCommand, with_common
+from rrrid_cli.options import Common, StageCommand, with_common_but
 
 __all__ = ["BatchCommand", "batch"]
 
@@ -25,7 +25,7 @@ class BatchCommand(StageCommand):
         formatter.write_text("--set STAGE.OPTION=VALUE and --config give the stage its options: 'rrrid STAGE --help' lists them.")
 
 
-@with_common
+@with_common_but(out="runs/several/ROOT/batch")
 def batch(
     logs: Annotated[Path, typer.Argument(help="Folder with many folders of logs.", show_default=False, metavar="ROOT",
                                          readable=False)],

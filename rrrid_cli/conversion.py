@@ -14,6 +14,7 @@ from typing import Any
 __all__ = ["plainly"]
 
 _PLAIN: dict[Any, Any] = {str: str, list[str]: str, Path: Path, list[Path]: Path, int: int, float: float}
+_NAMES: dict[Any, str] = {str: "TEXT", list[str]: "TEXT", Path: "PATH", list[Path]: "PATH", int: "NUMBER", float: "NUMBER"}
 
 
 class _Plainly:
@@ -37,9 +38,14 @@ class _Plainly:
 
 
 def plainly(parameters: list[Any]) -> list[Any]:
-    """`parameters`, each of which converts by itself what needs no schema; with a typer that makes none, nothing changes."""
+    """`parameters`, each of which converts by itself what needs no schema; with a typer that makes none, nothing changes there.
+
+    In help an option's value has a plain name, where typer would print Python's type.
+    """
     for parameter in parameters:
         described, typers_own = (getattr(parameter, name, None) for name in ("type_descriptor", "get_runtime_param"))
         if described is not None and typers_own is not None and not isinstance(typers_own, _Plainly):
             parameter.get_runtime_param = _Plainly(described.annotation, typers_own)
+        if described is not None and parameter.metavar is None and parameter.param_type_name == "option":
+            parameter.metavar = _NAMES.get(described.annotation)
     return parameters
