@@ -8,7 +8,15 @@ from typing import Any
 
 import pytest
 
+from pipelines.log import files
+
 _REPO = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(autouse=True)
+def _fresh_reader() -> None:
+    """Each test begins as a program does: what it changes in this process, the child that reads logs has as well."""
+    files._guard.let_go()
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,161 @@
+"""A reading child that is kept from file to file: what a crash, a hang or a trace of an earlier file costs is that file alone."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.errors import InputRejected
+from pipelines.log import files
+from pipelines.log.files import open_log, write_log
+from pipelines.log.guard import Answer, Guard
+from tests.cli.commands import REPO
+from tests.log.logs import small_log
+
+Ask = Callable[..., Answer]
+
+
+class _Served:
+    """A child's work: it counts what it was asked, and misbehaves as the words say once it has been asked before."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, words: Any) -> Answer:
+        self.count += 1
+        if words == "crash" or (words == "crash later" and self.count > 1):
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if words == "hang" or (words == "hang later" and self.count > 1):
+            time.sleep(60.0)
+        if words == "refuse later" and self.count > 1:
+            raise InputRejected("F02", "damaged", where="", remedy="copy it again")
+        if words == "leave":
+            os._exit(3)
+        return Answer({"pid": os.getpid(), "count": self.count}, {"x": np.arange(3.0) + self.count})
+
+
+@pytest.fixture
+def ask(tmp_path: Path) -> Iterator[Ask]:
+    """Ask a guard about a file; its answer is vouched for unless said otherwise."""
+    guard, path = Guard(_Served()), tmp_path / "a"
+    path.write_bytes(b"x")
+
+    def asked(words: str = "", vouch: bool = True, path: Path = path, needs: str = "numpy") -> Answer:
+        answer = guard.ask(words, path, needs)
+        if vouch:
+            guard.vouch()
+        return answer
+
+    yield asked
+    guard.let_go()
+
+
+def test_a_child_is_kept_while_its_answers_are_verified(ask: Ask) -> None:
+    """One process for file after file; a fresh one after a file that nobody could verify, or with a library it has not got."""
+    first, second, third = ask(), ask(vouch=False), ask()
+    assert first.about["pid"] == second.about["pid"] != third.about["pid"]
+    assert [a.about["count"] for a in (first, second, third)] == [1, 2, 1]
+    assert [a.arrays["x"].tolist() for a in (first, second, third)] == [[1.0, 2.0, 3.0], [2.0, 3.0, 4.0], [1.0, 2.0, 3.0]]
+    assert ask(needs="no.such.module").about["count"] == 1
+
+
+@pytest.mark.row("F03")
+@pytest.mark.parametrize("trace", ["crash later", "hang later", "refuse later"])
+def test_no_file_pays_for_an_earlier_one(ask: Ask, trace: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What only a used child does is not the file's fault: a fresh child decides, within the time that the file has."""
+    monkeypatch.setattr("pipelines.log.guard._SECONDS", 2.0)
+    ask()
+    began = time.monotonic()
+    assert ask(trace).about["count"] == 1
+    assert time.monotonic() - began < 2.0
+
+
+@pytest.mark.row("F03")
+def test_a_file_that_harms_every_child_is_refused(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Crash and hang of the file itself: F03 in time, kept child or not, and the next file is read."""
+    monkeypatch.setattr("pipelines.log.guard._SECONDS", 1.0)
+    for words, said in (("crash", "signal 11"), ("hang", "did not end within 1 s"), ("leave", "ended its process")):
+        ask()
+        began = time.monotonic()
+        with pytest.raises(InputRejected, match=f"RRID-F03 .*{said}"):
+            ask(words)
+        assert time.monotonic() - began < 3.0
+        assert ask().about["count"] == 1
+
+
+def test_relative_paths_are_read_from_where_the_program_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program changes its folder, and its kept child does not."""
+    for name in "ab":
+        write_log(tmp_path / name / "log.h5", small_log(name=name))
+    for name in ("a", "b", "a"):
+        monkeypatch.chdir(tmp_path / name)
+        assert open_log("log.h5").log.name == name
+
+
+def test_what_is_read_stays_what_it_was(ask: Ask) -> None:
+    """Arrays of earlier files are not those of later ones, and nobody can write to them."""
+    first = ask()
+    ask()
+    assert first.arrays["x"].tolist() == [1.0, 2.0, 3.0]
+    with pytest.raises(ValueError, match="read-only"):
+        first.arrays["x"][0] = 9.0
+
+
+def test_an_opened_log_is_not_kept_locked(tmp_path: Path) -> None:
+    """F15 looks for a lock; the child holds none when the log has been read."""
+    path = tmp_path / "a.h5"
+    write_log(path, small_log())
+    files._guard.let_go()
+    open_log(path)
+    assert files._guard._child is not None
+    with path.open("r+b") as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_each_thread_has_a_child_of_its_own(tmp_path: Path) -> None:
+    """A child dies with the thread that made it; logs are read in any."""
+    path = tmp_path / "a.h5"
+    write_log(path, small_log())
+    found: list[object] = []
+
+    def read() -> None:
+        found.extend(open_log(path).log for _ in range(3))
+
+    open_log(path)
+    threads = [threading.Thread(target=read) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    read()
+    assert found == [small_log()] * 12
+
+
+@pytest.mark.parametrize("end", ["", "os._exit(0)", "os.kill(os.getpid(), 9)"])
+def test_the_child_goes_with_its_program(tmp_path: Path, end: str) -> None:
+    """However a program ends: nobody waits for its output any longer, and no process stays."""
+    write_log(tmp_path / "a.h5", small_log())
+    program = ("import os, sys\nfrom pipelines.log import files\nfiles.open_log(os.path.abspath('a.h5'))\n"
+               f"print(files._guard._child._process, flush=True)\n{end}\n")
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(REPO)}, timeout=20,
+                          stdout=subprocess.PIPE, text=True, check=False)
+    child = int(done.stdout)
+    for _ in range(200):
+        with contextlib.suppress(OSError):
+            if Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[0] != "Z":
+                time.sleep(0.01)
+                continue
+        return
+    pytest.fail("the child lives on")
