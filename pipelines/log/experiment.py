@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.errors import RrridError
 from pipelines.log import schema
 from pipelines.log.robot import RobotDescription, parse_robot
 
@@ -149,7 +150,16 @@ class ExperimentLog:
 
     @cached_property
     def robot(self) -> RobotDescription:
-        return parse_robot(self.robot_text, where=self.source or self.name, inside_log=True)
+        try:
+            return _described(self.robot_text)
+        except RrridError:  # once more, to say where
+            return parse_robot(self.robot_text, where=self.source or self.name, inside_log=True)
+
+
+@lru_cache(maxsize=16)
+def _described(text: str) -> RobotDescription:
+    """The logs of a session carry one and the same description, and reading it takes longer than their hashes."""
+    return parse_robot(text)
 
 
 def _rebuild(values: dict[str, object]) -> ExperimentLog:

@@ -105,15 +105,16 @@ def _read_file(file: Any, where: str, only: Collection[str] | None) -> tuple[Exp
     signals = _group(file, "signals", where)
     _refuse_links(signals, f"{where}, /signals")
     _few(signals, f"{where}, /signals")
-    _within_budget(signals, Path(where).stat().st_size, where)
-    read = {name: _signal(signals[name], f"{where}, /signals/{name}") for name in signals
+    datasets = _within_budget(signals, Path(where).stat().st_size, where)
+    read = {name: _signal(dataset, f"{where}, /signals/{name}") for name, dataset in datasets.items()
             if only is None or name in only}
     attributes.pop("format"), attributes.pop("format_version")
     return canonical.from_parts(groups, read, where=where), digest
 
 
 def _version(file: Any, where: str) -> None:
-    form, version = (_attribute(file, name, f"{where}, attribute {name}") if name in file.attrs else None
+    there = file.attrs
+    form, version = (_attribute(there, name, f"{where}, attribute {name}") if name in there else None
                      for name in ("format", "format_version"))
     if form != schema.FORMAT:
         raise InputRejected("F06", f"an HDF5 file, but not an experiment log: its format is {form!r}", where=where,
@@ -162,15 +163,16 @@ def _group(file: Any, name: str, where: str) -> Any:
 
 
 def _attributes(owner: Any, where: str) -> dict[str, object]:
-    if len(owner.attrs) > _MANY_ATTRIBUTES:
-        raise InputRejected("X04", f"{len(owner.attrs)} attributes", where=where, remedy="a log has fewer than twenty")
-    return {name: _attribute(owner, name, f"{where}, attribute {name}") for name in owner.attrs}
+    there = owner.attrs  # made anew with each look
+    if len(there) > _MANY_ATTRIBUTES:
+        raise InputRejected("X04", f"{len(there)} attributes", where=where, remedy="a log has fewer than twenty")
+    return {name: _attribute(there, name, f"{where}, attribute {name}") for name in there}
 
 
-def _attribute(owner: Any, name: str, where: str) -> object:
+def _attribute(there: Any, name: str, where: str) -> object:
     import h5py
 
-    info = owner.attrs.get_id(name)
+    info = there.get_id(name)
     declared = math.prod(info.shape) * info.dtype.itemsize
     if declared > _LONG_ATTRIBUTE:
         raise InputRejected("X05", f"declares {declared} bytes", where=where, remedy="an attribute is a few words or numbers")
@@ -178,7 +180,7 @@ def _attribute(owner: Any, name: str, where: str) -> object:
     if h5py.check_string_dtype(kind) is None and kind.kind not in "SUfiu":
         raise InputRejected("S12", f"of type {kind}, neither text nor number", where=where,
                             remedy="write it as a text or a number")
-    value = owner.attrs[name]
+    value = there[name]
     if isinstance(value, h5py.Empty):
         raise InputRejected("S20", "empty", where=where, remedy="write its value, or leave it out")
     if isinstance(value, np.ndarray):
@@ -211,16 +213,16 @@ def foreign_storage(dataset: Any) -> str | None:
     return "virtual data" if dataset.is_virtual else None
 
 
-def _within_budget(signals: Any, file_size: int, where: str) -> None:
-    """X02-X06, S12: every data set is judged by its declaration before one byte of it is read."""
+def _within_budget(signals: Any, file_size: int, where: str) -> dict[str, Any]:
+    """The data sets by their names. X02-X06, S12: every one is judged by its declaration before one byte of it is read."""
     import h5py
 
-    declared = 0
+    declared, found = 0, {}
     for name in signals:
         place = f"{where}, /signals/{name}"
         if signals.get(name, getclass=True) is not h5py.Dataset:
             raise InputRejected("S19", "not a data set", where=place, remedy="a signal is one data set")
-        dataset = signals[name]
+        dataset = found[name] = signals[name]
         if foreign := foreign_storage(dataset):
             raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=place,
                                 remedy="store the data in the log itself")
@@ -230,6 +232,7 @@ def _within_budget(signals: Any, file_size: int, where: str) -> None:
         _filters_available(dataset, place)
         declared += 8 * math.prod(dataset.shape)
     refuse_oversize(declared, file_size, "X05", where)
+    return found
 
 
 def refuse_oversize(declared: int, file_size: int, code: str, where: str) -> None:

@@ -117,16 +117,16 @@ def given_names(paths: Iterable[Path]) -> dict[str, str]:
 
 def renamed(value: Any, names: Mapping[str, str]) -> Any:
     """`value` with every path that begins with one of `names` written by what stands for it."""
-    rules = []
-    for root in sorted((root for root in names if root != os.sep), key=len, reverse=True):
-        # Messages hold the path as `clean` leaves it, on one line.
-        for text in dict.fromkeys((root, clean(root))):
-            rules.append((re.compile(rf"(?<![^\s,:;(\['\"]){re.escape(text)}(?:(/)|(?![^\s,:;)\]'\"]))"), names[root]))
+    # Messages hold the path as `clean` leaves it, on one line.
+    rules = [(text, names[root]) for root in sorted((root for root in names if root != os.sep), key=len, reverse=True)
+             for text in dict.fromkeys((root, clean(root)))]
 
     def rename(text: str) -> str:
-        for rule, name in rules:
-            below, itself = (f"{name}/", name) if name else ("", ".")
-            text = rule.sub(partial(_replacement, below, itself), text)
+        for place, name in rules:
+            if place in text:  # else no rule is made of it: an item of a batch has a folder of its own
+                below, itself = (f"{name}/", name) if name else ("", ".")
+                text = re.sub(rf"(?<![^\s,:;(\['\"]){re.escape(place)}(?:(/)|(?![^\s,:;)\]'\"]))",
+                              partial(_replacement, below, itself), text)
         return text
 
     return _texts(value, rename) if rules else value
