@@ -1,0 +1,132 @@
+"""Share a list of work between two processes: each takes the next piece when it is done with its last.
+
+    answers = shared_out(work, pieces)        [work(piece) for piece in pieces]
+
+The other process is a copy of this one, made where a second processor is there and nobody else has it: what `work` needs it has
+already, and its answers are copied back. A piece gets the same answer in either: the outcome does not hang on how the pieces fell.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import struct
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from pipelines.log.guard import die_with_parent
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+__all__ = ["shared_out"]
+
+P = TypeVar("P")
+A = TypeVar("A")
+
+_PLACE = struct.Struct("<I")
+_MOST = 10_000  # pieces: their places fit into a pipe that nobody reads yet
+_STOPPING = (signal.SIGINT, signal.SIGTERM)
+_COPY = threading.Event()  # set in the other process: it makes no further one
+
+
+def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[], Any] = lambda: None,
+               take: Callable[[Any], None] = lambda words: None) -> list[A]:
+    """What `work` makes of each piece, in order.
+
+    Args:
+        left: asked in the other process at its end, for what it leaves beside its answers; `take` is given that here.
+    """
+    if not 1 < len(pieces) < _MOST or not _second():
+        return [work(piece) for piece in pieces]
+    places = _places(len(pieces))
+    other = _Other(lambda: ([(k, work(pieces[k])) for k in _next(places)], left()))
+    found: dict[int, A] = {}
+    try:
+        found.update((k, work(pieces[k])) for k in _next(places))
+        with contextlib.suppress(EOFError):  # it came to grief: its pieces are done here, where an error can be told
+            answers, words = other.answer()
+            found.update(answers)
+            take(words)
+    finally:
+        other.end()
+        os.close(places)
+    return [found[k] if k in found else work(piece) for k, piece in enumerate(pieces)]
+
+
+def _second() -> bool:
+    """Whether another process may be made: not among the workers of a batch, which have every processor already."""
+    alone = multiprocessing.parent_process() is None and threading.current_thread() is threading.main_thread()
+    return alone and not _COPY.is_set() and processors() > 1
+
+
+def processors() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _places(count: int) -> int:
+    """A pipe with the numbers up to `count`, to be read by both."""
+    read, write = os.pipe()
+    os.write(write, b"".join(map(_PLACE.pack, range(count))))
+    os.close(write)
+    return read
+
+
+def _next(places: int) -> Iterator[int]:
+    while number := os.read(places, _PLACE.size):
+        yield _PLACE.unpack(number)[0]
+
+
+class _Other:
+    """A copy of this process that answers once."""
+
+    def __init__(self, work: Callable[[], Any]) -> None:
+        self._ours, theirs = multiprocessing.Pipe(duplex=False)
+        parent = os.getpid()
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)  # the copy has no use for this program's handlers
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)  # a fork beside threads: the copy takes none of their locks
+                self._process = os.fork()
+            if self._process == 0:
+                _serve(work, theirs, before, parent)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            theirs.close()
+
+    def answer(self) -> Any:
+        """What it has made of its work.
+
+        Raises:
+            EOFError: it came to grief.
+        """
+        return self._ours.recv()
+
+    def end(self) -> None:
+        """It has answered, or nobody waits for it any more."""
+        self._ours.close()
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self._process, signal.SIGKILL)
+        os.waitpid(self._process, 0)
+
+
+def _serve(work: Callable[[], Any], end: Connection[Any, Any], mask: set[int | signal.Signals],
+           parent: int) -> None:
+    status = 1
+    try:
+        _COPY.set()
+        die_with_parent()
+        if os.getppid() != parent:  # it was killed before
+            return
+        for stop in _STOPPING:
+            signal.signal(stop, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        end.send(work())
+        status = 0
+    finally:
+        os._exit(status)

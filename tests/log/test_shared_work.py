@@ -1,0 +1,96 @@
+"""Work shared by two processes gives what one gives; what the other process cannot do is done, or fails, here."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import numpy as np
+import pytest
+
+from pipelines.log import shared_work
+from pipelines.log.shared_work import shared_out
+
+PIECES = list(range(9))
+
+
+@pytest.fixture(autouse=True)
+def two_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_work, "processors", lambda: 2)
+    monkeypatch.setattr("multiprocessing.parent_process", lambda: None)
+
+
+def slowly(piece: int) -> tuple[int, int]:
+    time.sleep(0.03)
+    return piece, os.getpid()
+
+
+def test_both_processes_work_and_answers_stand_in_order() -> None:
+    found = shared_out(slowly, PIECES)
+    assert [piece for piece, _ in found] == PIECES
+    assert len({process for _, process in found}) == 2
+
+
+def test_large_arrays_come_back_as_they_were() -> None:
+    def noise(seed: int) -> np.ndarray:
+        time.sleep(0.02)
+        return np.random.default_rng(seed).normal(size=200_000)
+
+    assert all((got == noise(seed)).all() for seed, got in zip(PIECES, shared_out(noise, PIECES), strict=True))
+
+
+def test_what_the_other_leaves_is_taken_here() -> None:
+    seen, taken = list[int](), list[int]()
+
+    def note(piece: int) -> int:
+        time.sleep(0.02)
+        seen.append(piece)
+        return piece
+
+    assert shared_out(note, PIECES, left=lambda: seen, take=taken.extend) == PIECES
+    assert sorted([*seen, *taken]) == PIECES
+    assert taken
+
+
+def test_there_is_no_third_process() -> None:
+    def inner(piece: int) -> set[int]:
+        return {process for _, process in shared_out(slowly, PIECES[:3])} | {os.getpid()}
+
+    here = os.getpid()
+    assert all(here in made or len(made) == 1 for made in shared_out(inner, PIECES[:4]))
+
+
+def test_pieces_of_a_process_that_dies_are_done_here() -> None:
+    here = os.getpid()
+
+    def only_here(piece: int) -> int:
+        time.sleep(0.01)
+        if os.getpid() != here:
+            os._exit(3)
+        return piece
+
+    assert shared_out(only_here, PIECES) == PIECES
+
+
+@pytest.mark.parametrize("bad", [0, 1, 7])
+def test_an_error_is_told_and_no_process_is_left(bad: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    started, fork = list[int](), os.fork
+    monkeypatch.setattr(os, "fork", lambda: started.append(child := fork()) or child)
+
+    def fails(piece: int) -> int:
+        time.sleep(0.01)
+        if piece == bad:
+            raise ValueError(f"piece {piece}")
+        return piece
+
+    with pytest.raises(ValueError, match=f"piece {bad}"):
+        shared_out(fails, PIECES)
+    assert started
+    for child in started:  # not any child: other tests have theirs
+        with pytest.raises(ChildProcessError):
+            os.waitpid(child, os.WNOHANG)
+
+
+def test_workers_of_a_batch_share_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("multiprocessing.parent_process", lambda: object())
+    assert {process for _, process in shared_out(slowly, PIECES[:3])} == {os.getpid()}
