@@ -128,22 +128,9 @@ def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
     return one.lay_signals(table.reshape(-1, table.shape[2]))
 
 
-@dataclass(frozen=True, eq=False)
-class _Same:
-    """An arm that is the same object."""
-
-    arm: Arm
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.arm is self.arm
-
-    def __hash__(self) -> int:
-        return id(self.arm)
-
-
 def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bool) -> tuple[Indices, list[Array]]:
     """Joints that they act on, and of each log (shapes, k, rows of those joints); kept for the next time the same arm is asked."""
-    laid = [one.keep((tuple(some), _Same(whole)), partial(_laid_anywhere, one, some, arm, whole)) if keep
+    laid = [one.keep((tuple(some), one.kept.number(whole)), partial(_laid_anywhere, one, some, arm, whole)) if keep
             else _laid_anywhere(one, some, arm, whole) for one in data.logs]
     acting = np.flatnonzero([any(x[:, :, j].any() for x in laid) for j in range(data.n_joints)])
     return acting, [x[:, :, acting].reshape(*x.shape[:2], -1) for x in laid]

@@ -135,9 +135,12 @@ class Exact:
 
     def added(self, data: Data, one: Named) -> Array:
         """(rows,) what an effect adds, beside the nominal model, in the logs it belongs to."""
-        values = one.values
-        torque = one.effect.amplitudes(values) @ effect_rows(data, one.effect.at(values), self.nominal)
-        return np.asarray(torque if one.log is None else np.where(data.log_of == one.log - data.first, torque, 0.0))
+        return np.asarray(one.effect.amplitudes(one.values) @ self.columns_of(data, one))
+
+    def columns_of(self, data: Data, one: Named) -> Array:
+        """(k, rows) the same of each of its amplitudes."""
+        columns = effect_rows(data, one.effect.at(one.values), self.nominal)
+        return columns if one.log is None else np.where(data.log_of == one.log - data.first, columns, 0.0)
 
     def moved(self, shift: Array, names: list[tuple[int, int, str]]) -> Exact:
         """Every number moved: base first, then what `names` says: shapes of laws, numbers of effects."""
@@ -255,11 +258,15 @@ def _slopes(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[tuple[i
     more, core = list(bent), model.core
     here = model.core_torque(data, core) if core else np.zeros(0)
     for place, one in enumerate(model.effects):
-        alone = model.added(data, one) if place >= core else here
+        own = model.columns_of(data, one) if place >= core else None
+        alone = here if own is None else one.effect.amplitudes(one.values) @ own
         for name, step in _steps(one):
             names.append((1, place, name))
+            if own is not None and name.isdigit():  # it is linear in its amplitudes
+                more.append(own[int(name)][None])
+                continue
             moved = number_moved(one, name, step)
-            if place >= core:
+            if own is not None:
                 there = model.added(data, moved)
             else:
                 effects = (*model.effects[:place], moved, *model.effects[place + 1:core])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.fit.bootstrap import apart
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Refined
@@ -110,11 +112,9 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]
     logs = motions[:_LOGS]
     soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
     for closed in (True, False):
-        try:
-            first = _all(arms[0], logs, closed, soft)
-        except InputRejected:
-            continue
-        return [first, *(_if_possible(arm, logs, closed, soft) for arm in arms[1:])]
+        found = shared_out(partial(_if_possible, motions=logs, closed=closed, soft=soft), arms)
+        if found[0].how != "none":
+            return found
     return [Simulation.none(arm.n_joints) for arm in arms]
 
 

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.log.derive import recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
+from pipelines.log.shared_work import shared_out
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.plausibility import mismatches
 
@@ -25,17 +27,24 @@ def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tup
         InputRejected: its first reason to reject a log; S13, S14, S15, T06: torque and motion of a log do not belong together,
             with the repair, unless `allow_mismatch`.
     """
-    said: list[Check] = []
-    for log in logs:
-        subject = Subject(recording(log))
-        checks = [check for check in check_log(subject) if check.level != "ok"]
-        if reject := next((check for check in checks if check.level == "reject"), None):
-            raise reject.as_error()
-        against = mismatches(subject)
-        if not allow_mismatch and (gate := next((check for check in against if check.gate), None)):
-            raise replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch").as_error()
-        said += [replace(check, gate=False) for check in (*checks, *against)]
-    return tuple(said)
+    every = list(logs)
+    said = shared_out(partial(_said, allow_mismatch=allow_mismatch), every)
+    for told in said:
+        if isinstance(told, Check):
+            raise told.as_error()
+    return tuple(check for told in said if not isinstance(told, Check) for check in told)
+
+
+def _said(log: ExperimentLog, allow_mismatch: bool) -> tuple[Check, ...] | Check:
+    """Of one log; the check that rejects it, where one does."""
+    subject = Subject(recording(log))
+    checks = [check for check in check_log(subject) if check.level != "ok"]
+    if reject := next((check for check in checks if check.level == "reject"), None):
+        return reject
+    against = mismatches(subject)
+    if not allow_mismatch and (gate := next((check for check in against if check.gate), None)):
+        return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch")
+    return tuple(replace(check, gate=False) for check in (*checks, *against))
 
 
 def logs_of_roles(logs: Sequence[ExperimentLog], label: str) -> Logs:

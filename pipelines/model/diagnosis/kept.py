@@ -1,16 +1,26 @@
 """Rows that were laid before: the columns of an effect that follow from the motion alone are the same whatever was fitted since.
 
-    kept.of(key, lay)       what `lay()` makes, made once as long as there is room
+    kept.of(key, lay)                       what `lay()` makes, made once as long as there is room
+    together(stores, work, pieces)          [work(piece) for piece in pieces] by two processes, what either lays kept for both
 """
 
 from __future__ import annotations
 
+import os
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.log.shared_work import shared_out
 
-__all__ = ["Kept"]
+__all__ = ["Kept", "together"]
+
+P = TypeVar("P")
+A = TypeVar("A")
 
 _ROOM = 128 << 20  # [bytes]
 
@@ -21,6 +31,7 @@ class Kept:
     def __init__(self, room: int = _ROOM) -> None:
         self._room, self._used = room, 0
         self._rows: OrderedDict[Hashable, Array] = OrderedDict()
+        self._numbered: list[tuple[object, Hashable]] = []
 
     def of(self, key: Hashable, lay: Callable[[], Array]) -> Array:
         found = self._rows.pop(key, None)
@@ -33,3 +44,38 @@ class Kept:
             _, old = self._rows.popitem(last=False)
             self._used -= old.nbytes
         return found
+
+    def number(self, thing: object) -> Hashable:
+        """One for each object, as part of a key; what a copy of this process numbers has no number of this one's."""
+        for other, number in self._numbered:
+            if other is thing:
+                return number
+        self._numbered.append((thing, (os.getpid(), len(self._numbered))))
+        return self._numbered[-1][1]
+
+    def keys(self) -> frozenset[Hashable]:
+        """Of all there is."""
+        return frozenset(self._rows)
+
+    def since(self, before: frozenset[Hashable]) -> list[tuple[Hashable, Array]]:
+        """What came in after `before`, the newest last."""
+        return [(key, rows) for key, rows in self._rows.items() if key not in before]
+
+    def take(self, more: Iterable[tuple[Hashable, Array]]) -> None:
+        for key, rows in more:
+            self.of(key, partial(np.asarray, rows))
+
+
+def together(stores: Iterable[Kept], work: Callable[[P], A], pieces: Sequence[P]) -> list[A]:
+    """What `work` makes of each piece, in order; rows that another process lays for it come into the `stores` of this one."""
+    own = list({id(store): store for store in stores}.values())
+    before = [store.keys() for store in own]
+
+    def left() -> list[list[tuple[Hashable, Array]]]:
+        return [store.since(keys) for store, keys in zip(own, before, strict=True)]
+
+    def take(more: list[list[tuple[Hashable, Array]]]) -> None:
+        for store, rows in zip(own, more, strict=True):
+            store.take(rows)
+
+    return shared_out(work, pieces, left=left, take=take)

@@ -9,20 +9,29 @@ g = c⊥ᵀ r. Several residuals at once: those of a log and of the twin's repli
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, Laid, lay_family
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.kept import together
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.through import passed_through
 from pipelines.model.effects.base import Effect
 
-__all__ = ["INVISIBLE", "Screened", "gains_of", "products_of", "screen", "screen_event", "screen_family"]
+__all__ = ["INVISIBLE", "Screened", "for_each", "gains_of", "products_apart", "products_of", "screen", "screen_event",
+           "screen_family"]
+
+A = TypeVar("A")
+
+Mask = npt.NDArray[np.bool_]
 
 INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
 _USUAL = 0.25  # of the shapes reach less
@@ -45,6 +54,11 @@ class Screened:
     amplitude: float | None = None  # of the first residual, where the whole model was fitted through the effect
 
     @property
+    def lean(self) -> Screened:
+        """Without its family, which has hundreds of shapes: what another process need not send."""
+        return replace(self, family=Family(self.family.cause, self.family.joint, ()))
+
+    @property
     def cause(self) -> str:
         return self.family.cause
 
@@ -55,8 +69,20 @@ class Screened:
 
 def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm, residuals: Array | None = None) -> list[Screened]:
     """Every family; `residuals` (m, rows), weighted and orthogonal to the fit, that of the fit where left out."""
-    return [screen_event(data, fit, family, arm, residuals) if family.event else screen_family(data, fit, family, arm, residuals)
-            for family in candidates]
+    def one(family: Family) -> Screened:
+        return (screen_event if family.event else screen_family)(data, fit, family, arm, residuals).lean
+
+    found = for_each(data, one, candidates, (fit,), arm)
+    return [replace(seen, family=family) for seen, family in zip(found, candidates, strict=True)]
+
+
+def for_each(data: Data, work: Callable[[Family], A], candidates: Sequence[Family], fits: Iterable[Fit], arm: Arm) -> list[A]:
+    """What `work` makes of each family, by two processes; `fits` and `arm` are what it needs."""
+    for fit in fits:
+        _ = fit.basis, fit.residual  # once, before there are two
+    for log in data.logs:
+        log.kept.number(arm)
+    return together([log.kept for log in data.logs], work, candidates)
 
 
 def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Array | None = None) -> Screened:
@@ -138,10 +164,41 @@ class Products:
 
 
 def products_of(laid: Laid, fit: Fit, residuals: Array) -> Products:
-    shapes, k, _ = laid.table.shape
+    return _sums(laid, fit, residuals, np.ones(len(laid.rows), dtype=bool))[1].products()
+
+
+def products_apart(laid: Laid, fit: Fit, residuals: Array, part: Mask) -> Products:
+    """The same of twice the columns: as they are, and zero beyond some of their rows, `part` (rows here,)."""
+    rest, own = _sums(laid, fit, residuals, part)
+    every = _Sums(own.whole + rest.whole, own.seen + rest.seen, own.moment + rest.moment)
+    whole = np.block([[every.whole, own.whole], [own.whole, own.whole]])
+    seen, moment = (np.concatenate(pair, axis=1) for pair in ((every.seen, own.seen), (every.moment, own.moment)))
+    return _Sums(whole, seen, moment).products()
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Over some rows, weighted."""
+
+    whole: Array  # (shapes, k, k) cᵀc
+    seen: Array  # (shapes, k, rank) cᵀQ
+    moment: Array  # (shapes, k, residuals) cᵀr
+
+    def products(self) -> Products:
+        return Products(self.whole, self.whole - self.seen @ self.seen.transpose(0, 2, 1), self.moment)
+
+
+def _sums(laid: Laid, fit: Fit, residuals: Array, part: Mask) -> tuple[_Sums, _Sums]:
+    """Over the rows out of `part`, and in it; rows in a row are taken as they lie, without a copy."""
+    shapes, k, count = laid.table.shape
     c = laid.table * fit.weights[laid.rows]
-    flat = c.reshape(shapes * k, -1)
-    seen = (flat @ fit.basis[:, laid.rows].T).reshape(shapes, k, -1)
-    whole = c @ c.transpose(0, 2, 1)
-    moment = (flat @ residuals[:, laid.rows].T).reshape(shapes, k, -1)
-    return Products(whole, whole - seen @ seen.transpose(0, 2, 1), moment)
+    flat = c.reshape(shapes * k, count)
+    sums = tuple(_Sums(np.zeros((shapes, k, k)), np.zeros((shapes, k, len(fit.basis))), np.zeros((shapes, k, len(residuals))))
+                 for _ in range(2))
+    ends = np.flatnonzero((np.diff(laid.rows) != 1) | (part[1:] != part[:-1])) + 1
+    for here in (slice(first, last) for first, last in pairwise([0, *ends.tolist(), count]) if first < last):
+        there, into = slice(int(laid.rows[here.start]), int(laid.rows[here.stop - 1]) + 1), sums[int(part[here.start])]
+        into.whole[...] += c[:, :, here] @ c[:, :, here].transpose(0, 2, 1)
+        into.seen[...] += (flat[:, here] @ fit.basis[:, there].T).reshape(shapes, k, -1)
+        into.moment[...] += (flat[:, here] @ residuals[:, there].T).reshape(shapes, k, -1)
+    return sums[0], sums[1]

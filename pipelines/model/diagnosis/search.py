@@ -71,9 +71,17 @@ class Explored:
     """Every cause on what one model leaves, and the greatest of them fitted exactly."""
 
     before: Refined
-    error: float  # held out
     screened: tuple[Screened, ...]
     tried: tuple[Tried, ...]  # best first
+
+
+@dataclass(frozen=True, eq=False)
+class _Gate:
+    """What the causes that were screened have to exceed."""
+
+    judged: Sequence[Screened]  # with the gains that the thresholds are for
+    thresholds: Thresholds
+    passed: tuple[Screened, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +89,6 @@ class Step:
     """One search for one cause."""
 
     before: Refined
-    error_before: float
     best: Tried | None  # accepted
     rivals: tuple[Tried, ...]  # above their thresholds, best first
     screened: tuple[Screened, ...]
@@ -103,7 +110,8 @@ def provisional(case: Case) -> tuple[Explored, ...]:
     """The causes that explain the most of what a joint leaves, right or wrong, until none explains a third of it."""
     now, found = refine(case.model, case.data, case.weight), []
     for _ in range(_GREAT):
-        one = _explored(case, now)
+        screened = _screened(case, now)
+        one = _explored(case, now, screened, screened)
         found.append(one)
         best = _fewest(one.tried)
         if best is None or _share(best.screened, now) < _LARGE:
@@ -118,7 +126,9 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
     nominal, steps = now, []
     for number in range(1, most + 2):
         same = number <= len(rough) and rough[number - 1].before is now
-        step = _step(case, rough[number - 1] if same else _explored(case, now), number, number <= most)
+        screened = rough[number - 1].screened if same else _screened(case, now)
+        gate = _gate(case, now, screened)
+        step = _step(case, rough[number - 1] if same else _explored(case, now, screened, gate.passed), gate, number, number <= most)
         steps.append(step)
         if step.best is None:
             break
@@ -145,35 +155,46 @@ def _share(one: Screened, now: Refined) -> float:
     return float(one.gain[0] / max(float(own @ own), 1e-300))
 
 
-def _explored(case: Case, now: Refined) -> Explored:
-    screened = screen(case.data, now.fit, case.families, now.model.arm)
+def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
+    return tuple(screen(case.data, now.fit, case.families, now.model.arm))
+
+
+def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened]) -> Explored:
+    """The greatest causes fitted exactly, as far as they are wanted: what stays below its threshold need not be."""
     taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
     able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
             or (case.again and one.shape[0].again(case.data.logs[0].motion))]
     order = sorted((one for one in able if one.gain[0] >= _LEAST * now.rss), key=lambda one: -one.gain[0])
-    error = held_out(now, case)
     able = [one for one in order if one.family.shapes[0].evidence in case.nameable]
-    tried = [_fitted(case, now, one, error) for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
-    return Explored(now, error, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
+    asked = {id(one) for one in wanted}
+    great = [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0] and id(one) in asked]
+    error = held_out(now, case) if great else np.nan
+    tried = [_fitted(case, now, one, error) for one in great]
+    return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
 
 
-def _step(case: Case, explored: Explored, number: int, more: bool) -> Step:
-    now, screened = explored.before, explored.screened
+def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
     judged: Sequence[Screened] = screened
     if case.changed is not None:
         most = max((one.gain[0] for one in screened), default=0.0)
         judged, thresholds = case.changed(now, [bool(one.gain[0] >= _CLOSE**2 * most) for one in screened])
     else:
         thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
-    passes = {id(one) for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True) if seen.gain[0] > bound}
+    passed = tuple(one for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True) if seen.gain[0] > bound)
+    return _Gate(judged, thresholds, passed)
+
+
+def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool) -> Step:
+    now, screened, thresholds = explored.before, explored.screened, gate.thresholds
+    passes = {id(one) for one in gate.passed}
     tried = [one for one in explored.tried if id(one.screened) in passes]
     if case.thresholds is None and case.changed is None:
         tried = [one for one in tried if one.error <= 1.0 - _FALLS]
     best = _fewest(tried) if more else None
-    other = _other([one for one in screened if id(one) in passes], best, explored.tried, now, case.nameable)
+    other = _other(gate.passed, best, explored.tried, now, case.nameable)
     best = None if other is not None else best
-    trials = ledger(screened, judged, thresholds, explored.tried, best, now, number)
-    return Step(now, explored.error, best, tuple(tried), screened, thresholds, trials, other)
+    trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number)
+    return Step(now, best, tuple(tried), screened, thresholds, trials, other)
 
 
 def _other(passing: Sequence[Screened], best: Tried | None, tried: Sequence[Tried], now: Refined,

@@ -54,7 +54,8 @@ def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> 
     Pati, Rezaiifar & Krishnaprasad 1993: orthogonal matching pursuit. A scale of torque is none of them: at all joints
     together the torque would explain itself.
     """
-    found = [one for one in screen(data, fit, families, arm) if not one.family.event and not one.shape[0].needs]
+    able = [family for family in families if not family.event and not family.shapes[0].needs]
+    found = screen(data, fit, able, arm)
     tables = [fit.project(lay_one(data, one.shape[0], arm)) for one in found]
     residual, basis = fit.residual, np.zeros((0, data.rows))
     powers = np.bincount(data.joint, residual**2, minlength=data.n_joints)

@@ -13,6 +13,7 @@ import pytest
 from pipelines.bench import experiments
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
+from pipelines.log import shared_work
 from pipelines.model.diagnosis import gains
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.gains import Simulation, farther, gain_of, simulation_errors, worse_log
@@ -63,6 +64,7 @@ def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest
         return calls[-1]
 
     monkeypatch.setattr(gains, "simulate_windows", windows)
+    monkeypatch.setattr(shared_work, "processors", lambda: 1)  # `calls` counts in one process
     first, second = simulation_errors([arm, arm], prepared.motions)
     assert (first.how, second.how) == ("windowed", "none")
     assert "runs away" in farther(first, second)
