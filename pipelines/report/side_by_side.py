@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 
 from pipelines.log.shared_work import shared_out
 from pipelines.report.report import Figure
+from pipelines.report.style import prepare_matplotlib
 
 __all__ = ["Picture", "drawn"]
 
@@ -24,6 +25,7 @@ def drawn(figures: Mapping[str, Figure], draw: Callable[[Figure, str], Picture])
 
     if len(figures) < _MANY:
         return {name: one(name) for name in figures}
+    prepare_matplotlib()
     import matplotlib.figure  # noqa: F401  # once, before there are two
 
     return dict(zip(figures, shared_out(one, list(figures)), strict=True))

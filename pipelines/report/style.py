@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
 __all__ = ["BLACK", "BLUE", "COLOURS", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILLION", "figure_style",
-           "format_decimals", "format_number", "format_unit", "log_ticks", "printable", "to_one_place", "with_std"]
+           "format_decimals", "format_number", "format_unit", "log_ticks", "prepare_matplotlib", "printable", "to_one_place",
+           "with_std"]
 
 BLACK: Final = "#1a1f24"
 GREY: Final = "#5b6670"
@@ -157,7 +158,7 @@ def figure_style(salt: str) -> Iterator[None]:
     Args:
         salt: makes the identifiers inside the SVG of one figure differ from those of the next, and equal on every run.
     """
-    _prepare_matplotlib()
+    prepare_matplotlib()
     import matplotlib
 
     with matplotlib.rc_context(), warnings.catch_warnings():
@@ -168,8 +169,8 @@ def figure_style(salt: str) -> Iterator[None]:
         yield
 
 
-def _prepare_matplotlib() -> None:
-    """Give matplotlib a folder it may write to and keep its remarks on fonts and caches to itself."""
+def prepare_matplotlib() -> None:
+    """Before its first import: give matplotlib a folder it may write to, and keep its remarks on fonts and caches to itself."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     if "MPLCONFIGDIR" in os.environ or _writable_home():
         return
@@ -185,4 +186,9 @@ def _writable_home() -> bool:
         return False
     folders = [Path(os.environ.get(name) or home / below) / "matplotlib"
                for name, below in (("XDG_CONFIG_HOME", ".config"), ("XDG_CACHE_HOME", ".cache"))]
-    return all(os.access(next(p for p in (folder, *folder.parents) if p.exists()), os.W_OK) for folder in folders)
+    return all(map(_can_be_made, folders))
+
+
+def _can_be_made(folder: Path) -> bool:
+    nearest = next(path for path in (folder, *folder.parents) if os.path.exists(path))  # Path.exists raises where it may not look
+    return nearest.is_dir() and os.access(nearest, os.W_OK)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -35,3 +38,17 @@ def test_many_figures_come_from_two_processes() -> None:
 def test_few_figures_are_drawn_here() -> None:
     few = dict(list(FIGURES.items())[:4])
     assert {svg.partition(" by ")[2] for svg, _ in drawn(few, by_process).values()} == {str(os.getpid())}
+
+
+@pytest.mark.parametrize("home", ["/dev/null", "/proc/nothing"])
+def test_a_home_that_cannot_be_written_is_not_remarked_upon(home: str, tmp_path: Path) -> None:
+    """matplotlib's settings are looked for in a folder of ours, which is gone afterwards."""
+    code = ("from pipelines.report.report import Figure, Report, Section\nfrom pipelines.report.render import render_report\n"
+            "draw = lambda drawing: drawing.subplots().plot([0, 1])\n"
+            "many = tuple(Figure(f'f{k}', '', draw) for k in range(9))\n"
+            "render_report(Report('t', 'v', sections=(Section('s', figures=many),)), {})")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("MPL", "XDG"))}
+    done = subprocess.run([sys.executable, "-c", code], env=environment | {"HOME": home, "TMPDIR": str(tmp_path)}, text=True,
+                          capture_output=True, check=False, timeout=120, cwd=Path(__file__).parents[2])
+    assert (done.returncode, done.stderr) == (0, "")
+    assert list(tmp_path.iterdir()) == []
