@@ -1,7 +1,7 @@
 """Diagnose an arm: what its simulation gets wrong, why, and how much better it becomes.
 
 Reads    logs of any experiment: "identify" to fit, "validate" to judge, "reference" as it was before; optionally a model
-Writes   result.json, result.h5, report.html
+Writes   result.json, result.h5, report.html; calibration.json and calibration.h5, thresholds for later logs of the same arm
 Source   Kostić et al. 2004, Sections III and IV, for the model; causes.md and diagnosis.md for what it lacks
 
 Gates come first: swapped columns, a flipped sign, a wrong scale or unsynchronised clocks are refused with their repair named,
@@ -18,6 +18,8 @@ from pathlib import Path
 from pipelines.errors import UsageError, did_you_mean
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.calibration import Calibration
+from pipelines.model.diagnosis.calibration_file import calibration_files, read_calibration, write_calibration
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.gates import examined, logs_of_roles
 from pipelines.model.diagnosis.outcome import Result
@@ -49,6 +51,7 @@ class Settings:
     decimate: int | None = None  # every so-manieth sample; None: from the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
     seed: int = DiagnosisSettings.seed  # of the twin's noise
+    calibration: str | None = None  # thresholds that an earlier diagnosis has stored: its folder, or its calibration.json
     allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion is diagnosed
 
 
@@ -58,22 +61,29 @@ class Material:
 
     arm: Arm | None
     tell: Callable[[str], None]
+    calibration: Calibration | None = None
 
 
 def read(request: Request, settings: Settings) -> Inputs:
-    """The logs in their roles, and the model whose friction laws are to be taken.
+    """The logs in their roles, the model whose friction laws are to be taken, and stored thresholds.
 
     Raises:
         UsageError: C02, no logs, or a log with two roles; C04, no such file.
+        InputRejected: a model (S18) or a calibration (S19, F05, F11) that cannot be used.
     """
     inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
                                               "reference": settings.reference})
+    stored = None
+    if settings.calibration is not None:
+        home = Path(settings.calibration).expanduser().absolute()
+        stored = read_calibration(home)
+        inputs = replace(inputs, sources=(*inputs.sources, *calibration_files(home)), folders=(*inputs.folders, home))
     if settings.model is None:
-        return replace(inputs, material=Material(None, request.tell))
+        return replace(inputs, material=Material(None, request.tell, stored))
     path = Path(settings.model).absolute()
     sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
     arm = Arm.from_model(read_model(settings.model), path)
-    return replace(inputs, sources=(*inputs.sources, *sources), material=Material(arm, request.tell))
+    return replace(inputs, sources=(*inputs.sources, *sources), material=Material(arm, request.tell, stored))
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
@@ -81,11 +91,14 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         NothingMatched: C06, no log to fit.
-        UsageError: C01, C02, settings that do not fit, logs of several robots, or a model of another one.
+        UsageError: C01, C02, settings that do not fit, logs of several robots, or a model or a calibration of another one.
         InputRejected: the doctor rejects a log: its first reason; S13, S14, S15, T06, torque and motion of a log do not belong
             together; T04, no stretch of a log can be used; T08, too few equations are left; D14, one recording in two roles.
     """
     _refuse_strange(settings)
+    if settings.calibration is not None and not isinstance(inputs.material, Material):
+        raise UsageError("C02", "a run makes its own thresholds", where="diagnose.calibration",
+                         remedy="take stored ones with rrrid diagnose --calibration")
     given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
     if given.arm is not None and given.arm.n_joints != chosen.identify[0].n_joints:
@@ -95,13 +108,14 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     said = examined((*chosen.identify, *chosen.validate, *chosen.reference, *chosen.frf), settings.allow_mismatch)
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
                                settings.decimate, settings.min_speed, settings.seed)
-    found = diagnose(chosen, engine, given.arm, given.tell)
+    found = diagnose(chosen, engine, given.arm, given.tell, given.calibration)
     given.tell("simulating what was found")
     found = with_simulation(found, (*chosen.validate, *chosen.identify))
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
-                  without=settings.without, doctor=said)
+                  without=settings.without, doctor=said,
+                  calibrated_with=() if given.calibration is None else tuple(one.name for one in given.calibration.origin.logs))
 
 
 def _refuse_strange(settings: Settings) -> None:
@@ -122,6 +136,12 @@ def _refuse_strange(settings: Settings) -> None:
         raise UsageError("C02", f"a low-pass at {settings.filter:g} Hz", where="--filter", remedy="give a frequency above 0")
 
 
+def write(result: Result, folder: Path, request: Request) -> None:
+    """The thresholds, where there are any beside a share of the residual."""
+    if result.calibration is not None:
+        write_calibration(folder, result.calibration)
+
+
 def _exit_code(result: Result, check: bool) -> int:
     return int(check and result.verdict != "nothing-wrong")
 
@@ -131,5 +151,5 @@ def report(result: Result) -> Report:
     return diagnosis_report(result)
 
 
-STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, None, _exit_code,
+STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, write, _exit_code,
               lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result), hands_on="material")

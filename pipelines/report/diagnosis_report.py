@@ -29,6 +29,7 @@ from pipelines.report.style import format_number, format_unit, to_one_place
 __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
 _LEDGER = 40  # lines
+_WAY = {"injected": "hidden", "analytic": "worked out"}  # how a detection limit was found
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
 
 
@@ -207,15 +208,22 @@ def _limits(result: Result) -> list[Section]:
     """What these logs can and cannot tell."""
     sections = []
     if result.detectable:
-        rows = tuple((title_of(one.cause), one.joint, one.parameter, *_smallest(one)) for one in result.detectable)
+        rows = tuple((title_of(one.cause), one.joint, one.parameter, *_smallest(one), _numbers_at(one), _WAY[one.way])
+                     for one in result.detectable)
         sections.append(Section("What would have been found", ("With 95 %, had it been there; nothing smaller can be excluded. "
-                                                               "Cannot be seen: nothing that is physically likely would show.",),
-                                (Table(("cause", "joint", "parameter", "smallest", "unit"), rows),)))
+                                                               "Cannot be seen: nothing that is physically likely would show. Hidden: "
+                                                               "put into these logs and found; worked out: by a formula.",),
+                                (Table(("cause", "joint", "parameter", "smallest", "unit", "at", "by"), rows),)))
     if result.not_testable:
         hidden = tuple((title_of(one.cause), one.joint, one.reason, one.record) for one in result.not_testable)
         sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
                                 (Table(("cause", "joint", "why", "what to record"), hidden),)))
     return sections
+
+
+def _numbers_at(one: Detectable) -> str:
+    """The non-linear numbers for which the limit is."""
+    return ", ".join(f"{name} {told_value(value)} {format_unit(value.unit)}".strip() for name, value in one.at.items())
 
 
 def _smallest(one: Detectable) -> tuple[str, str]:
@@ -231,6 +239,8 @@ def _basis(result: Result) -> Section:
     """Where floor and thresholds come from, and what judged."""
     origins = sorted({one.origin for one in result.thresholds})
     text = [floor_words(result), held_out_words(result.held_out), f"Thresholds come from {' and '.join(origins) or 'nothing'}."]
+    if result.calibrated_with:
+        text.append(f"An earlier diagnosis has stored them, of {', '.join(result.calibrated_with)}.")
     if result.replicas:
         text.append(f"The twin is the fitted model run {result.replicas} times through the same controllers, references, encoders "
                     f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")

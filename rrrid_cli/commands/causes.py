@@ -26,6 +26,7 @@ def diagnose(
     decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the twins' noise. [1]")] = None,
+    calibration: Annotated[str | None, typer.Option(help="Folder of an earlier diagnosis, for its thresholds. [none]")] = None,
     allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Diagnose torque that looks misplaced.")] = None,
 ) -> None:
     """Say what the simulation gets wrong, why, what to check, and how much better the model becomes."""
@@ -34,7 +35,7 @@ def diagnose(
     go(STAGE, tuple(logs or ()), common, {
         **roles.named, "without": tuple(without or ()) or None, "model": model,
         "replicas": replicas, "most": most, "blocks": blocks, "filter": filter, "decimate": decimate,
-        "min_speed": numbers(min_speed, "--min-speed"), "seed": seed, "allow_mismatch": allow_mismatch})
+        "min_speed": numbers(min_speed, "--min-speed"), "seed": seed, "calibration": calibration, "allow_mismatch": allow_mismatch})
 
 
 @app.command(cls=StageCommand)

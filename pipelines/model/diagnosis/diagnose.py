@@ -18,11 +18,13 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.beside import Held, acted, judged
+from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origin_of, refuse_unfit, thresholds_of
+from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.compliance import Compliance, untold
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.evidence import evidence
+from pipelines.model.diagnosis.evidence import evidence, floors_of
 from pipelines.model.diagnosis.exact import Exact, Refined
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.injection import Probe
@@ -36,7 +38,7 @@ from pipelines.model.diagnosis.search import Case, Explored, Step, clean, gap_fi
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.twin import Twin, drive_noise, make_twin, replayable, white
+from pipelines.model.diagnosis.twin import drive_noise, make_twin, replayable, white
 from pipelines.model.diagnosis.verdict import Ruling, rule
 
 __all__ = ["diagnose"]
@@ -44,15 +46,18 @@ __all__ = ["diagnose"]
 Tell = Callable[[str], None]
 
 
-def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None) -> Diagnosis:
+def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None,
+             calibration: Calibration | None = None) -> Diagnosis:
     """What the nominal model of an arm gets wrong in `logs`, and why.
 
     Args:
         arm: whose friction laws the nominal model takes, fitted anew; Coulomb and viscous friction where left out.
         tell: progress, in words.
+        calibration: thresholds that an earlier diagnosis has stored, instead of a twin.
 
     Raises:
         InputRejected: no log can be fitted (S01, T04, T08).
+        UsageError: C02, the calibration is not for these logs.
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     prepared = prepare(logs, chosen, arm)
@@ -62,7 +67,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     first = responding(plain, prepared, chosen.without)
     if first.held.prepared.reference is not None:
         say("comparing with the reference logs")
-        return _changed(first, first.held.prepared.reference, chosen)
+        return _changed(first, first.held.prepared.reference, chosen, calibration)
     case, prepared = _nameable(first.held.case, first.stiff), first.held.prepared
     say("looking for the greatest causes")
     rough = provisional(case)
@@ -73,12 +78,13 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
         seen = provisional(there)
         if gap_first(seen[0]):
             case, prepared, rough, first = there, slow, seen, replace(first, held=Held(there, slow))
-    say("simulating the twin")
-    floored = _floored(prepared, case, rough, chosen)
+    say("simulating the twin" if calibration is None else "taking the stored thresholds")
+    floored = _floored(prepared, case, rough, chosen, calibration)
     say("looking for causes")
     case = replace(case, thresholds=floored.thresholds)
     found = search(case, chosen.most, rough)
-    done = settled(found, rule(found, floored.rms, floored.twin is not None), case, prepared, floored.rms, floored.twin is not None)
+    known = floored.thresholds is not None
+    done = settled(found, rule(found, floored.rms, known), case, prepared, floored.rms, known)
     return _told(first, case, done, floored, chosen)
 
 
@@ -100,33 +106,49 @@ class _Floored:
 
     rms: Array  # (joints,) [N m]
     origin: str
-    twin: Twin | None
     thresholds: Thresholds | None
-    noise: Array
+    calibration: Calibration | None
 
 
-def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> _Floored:
-    """By the twin where a controller is known, else by the noise in the residual."""
-    left, last = clean(rough[-1]), rough[-1].before
+def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
+             given: Calibration | None) -> _Floored:
+    """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
+    if given is not None:
+        refuse_unfit(given, prepared, case.families, "twin")
+    made = _calibrated(prepared, case, rough, chosen) if given is None else given
+    if made is None:
+        return _Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None)
+    return _Floored(made.floor, "twin", thresholds_of(made, case.families, prepared.data, given is not None), made)
+
+
+def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> Calibration | None:
+    """Thresholds by the twin; None where the logs do not know their controller, or the fitted arm cannot be simulated."""
     places = replayable([log for log, _ in prepared.motions])
-    nan = np.full(prepared.data.n_joints, np.nan)
-    if places and chosen.replicas:
-        model = last.model
-        try:
-            noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
-            twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas,
-                             chosen.seed)
-        except InputRejected:  # such an arm cannot be simulated: D15, D17
-            twin = None
-        if twin is not None:
-            bounds = Thresholds.of_twin(twin, case.families, model.nominal, rough[0].before.weight)
-            return _Floored(twin.rms, "twin", twin, bounds, twin.noise)
-    return _Floored(white(prepared.data, left), "blocks", None, None, nan)
+    if not places or not chosen.replicas:
+        return None
+    left, last, weight = clean(rough[-1]), rough[-1].before, rough[0].before.weight
+    model = last.model
+    try:
+        noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
+        twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas, chosen.seed)
+    except InputRejected:  # such an arm cannot be simulated: D15, D17
+        return None
+    if twin is None:
+        return None
+    found = Thresholds.of_twin(twin, case.families, model.nominal, weight)
+    return Calibration(
+        origin_of("twin", [prepared.motions[place][0] for place in places], model.nominal, chosen), conditions_of(prepared), weight,
+        twin.rms, twin.noise, bounds_of(case.families, found.gain, found.own), found.wide,
+        floors_of(twin.data, twin.fits[0].left) if chosen.evidence else ())
 
 
-def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings) -> Diagnosis:
+def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given: Calibration | None) -> Diagnosis:
     """What is different since the reference logs."""
-    since = since_reference(first.held.prepared, reference, chosen, first.held.case.beside)
+    logs = [log for log, _ in first.held.prepared.referring]
+    if given is not None:
+        refuse_unfit(given, first.held.prepared, first.held.case.families, "reference logs", logs)
+    known = None if given is None else (given.weight, {(one.cause, one.joint): one.own for one in given.causes})
+    since = since_reference(first.held.prepared, reference, chosen, first.held.case.beside, known)
     case = _nameable(since.case, first.stiff)
     now = replace(first.held.prepared, data=case.data, judge=case.judge)
     first = replace(first, held=replace(first.held, prepared=now))
@@ -134,8 +156,11 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings) -> D
     done = settled(found, rule(found, since.floor), case, now, since.floor)
     if since.absorbed is not None and done.ruling.verdict == "unknown":
         done = unnamed(done, since.floor)
-    floored = _Floored(since.floor, "reference logs", None, None, np.full(case.data.n_joints, np.nan))
-    told = _told(first, case, done, floored, chosen, since.probed)
+    told = _told(first, case, done, _Floored(since.floor, "reference logs", None, given), chosen, since.probed)
+    if given is None:
+        told = replace(told, calibration=Calibration(
+            origin_of("reference logs", logs, None, chosen), conditions_of(now), since.chance.weight, since.floor,
+            np.full(case.data.n_joints, np.nan), since.chance.bounds, None, ()))
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
     if since.absorbed is None:
         return told
@@ -175,7 +200,8 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     judge = first.held.judge if parts else prepared.judge
     rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
            for one, rows in ((plain, judge), (responded.final, responded.judge))]
-    pictures = (evidence(plain, floored.rms, floored.twin, None),) if chosen.evidence else ()
+    made = floored.calibration
+    pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()
     harmful = tuple(Rejected(part.acting.effect.name, part.acting.effect.joint, f"named by frequency responses, but the model goes "
                              f"without it: {part.doubt}") for part in parts if part.doubt)
     arm = extended_arm(replace(found, final=responded.final), ruling)
@@ -185,8 +211,8 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
         (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
-        0 if floored.twin is None else len(floored.twin.fits), floored.noise, acted(plain.model.arm, standing),
-        acted(arm, responded.acting))
+        0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise,
+        acted(plain.model.arm, standing), acted(arm, responded.acting), made)
 
 
 def _limits(last: Step, case: Case, prepared: Prepared, probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None,

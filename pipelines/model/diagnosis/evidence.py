@@ -6,17 +6,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.calibration import Floors
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Refined
 from pipelines.model.diagnosis.result import Curve, Evidence, Proof, Spectrum
 from pipelines.model.diagnosis.signals import binned, signals
-from pipelines.model.diagnosis.twin import Twin
 from pipelines.signal.spectra import welch
 
-__all__ = ["evidence", "proof"]
+__all__ = ["evidence", "floors_of", "proof"]
 
 _POINTS = 3000  # of a series
 _FINE = 96  # bins of a proof: a wave of order 18 over half a turn has ten of them a period
@@ -26,11 +28,18 @@ _MOST = 0.8  # of the excess that the band holds
 _ORDERS = np.arange(0.5, 80.25, 0.25)
 
 
-def evidence(done: Refined, floor: Array, twin: Twin | None, simulated: tuple[Array, Array] | None) -> Evidence:
+def floors_of(data: Data, left: Array) -> tuple[Floors, ...]:
+    """Of each joint; `left` (rows,) [N m]."""
+    found = [(_frequency(data, left, joint), _orders(data, left, joint)) for joint in range(data.n_joints)]
+    return tuple(Floors(None if one is None else one[1], orders) for one, orders in found)
+
+
+def evidence(done: Refined, floor: Array, floors: Sequence[Floors], simulated: tuple[Array, Array] | None) -> Evidence:
     """Of the first log that was fitted; curves and spectra of all.
 
     Args:
         done: the nominal model.
+        floors: of each joint, where they are known.
         simulated: t (samples,) and position error (samples, joints) of the nominal arm in closed loop.
     """
     data, left = done.data, done.left
@@ -44,7 +53,7 @@ def evidence(done: Refined, floor: Array, twin: Twin | None, simulated: tuple[Ar
             means = binned(signal.values, own)
             share = float(np.sum(means.count * means.mean**2) / max(float(own @ own), 1e-300))
             curves.append(Curve(joint + 1, signal.name, signal.unit, means.x, means.mean, means.spread, share))
-        spectra += _spectra(data, left, joint, twin)
+        spectra += _spectra(data, left, joint, floors[joint] if floors else None)
     table = np.array([[_correlation(left[data.joint == i], data.y[data.joint == j]) for j in range(data.n_joints)]
                       for i in range(data.n_joints)])
     t, error = (None, None) if simulated is None else _thinned(*simulated)
@@ -69,17 +78,16 @@ def _torques(data: Data, predicted: Array) -> Array:
     return np.array([np.linalg.lstsq(table.T, data.y[data.joint == j], rcond=None)[0] for j in range(data.n_joints)])
 
 
-def _spectra(data: Data, left: Array, joint: int, twin: Twin | None) -> list[Spectrum]:
-    """Over frequency and over orders of the joint's angle, beside those of the twin."""
+def _spectra(data: Data, left: Array, joint: int, floor: Floors | None) -> list[Spectrum]:
+    """Over frequency and over orders of the joint's angle, beside those of an arm in order."""
     turning = data.logs[0].log.robot.revolute[joint]
     own = _frequency(data, left, joint)
-    floor = None if twin is None else _frequency(twin.data, twin.fits[0].left, joint)
     found = []
     if own is not None:
-        beside = None if floor is None or len(floor[0]) != len(own[0]) else floor[1]
+        beside = None if floor is None or floor.frequency is None or len(floor.frequency) != len(own[0]) else floor.frequency
         found.append(Spectrum(joint + 1, "frequency", "Hz", own[0], own[1], beside))
     orders = _orders(data, left, joint)
-    below = None if twin is None else _orders(twin.data, twin.fits[0].left, joint)
+    below = None if floor is None else floor.orders
     found.append(Spectrum(joint + 1, "order", "1/rev" if turning else "1/(2 pi m)", _ORDERS, orders, below))
     return found
 

@@ -81,8 +81,9 @@ def _limit(effect: Effect, amplitudes: Array, revolute: tuple[bool, ...], visibi
     if main is None:
         return None
     turning = effect.joint is None or revolute[effect.joint - 1]
+    shown = effect.reported(values)
     at = {q.name: Value(values[q.name], None, q.unit_at(turning)) for q in effect.parameters
-          if q.shape and not q.derived and np.isfinite(values.get(q.name, np.nan))}
+          if q.shape and q.name in shown and np.isfinite(values.get(q.name, np.nan))}
     size = abs(values[main.name])
     smallest = Value(size, None, main.unit_at(turning))
     return Detectable(effect.name, effect.joint, main.name, smallest, at, way, visibility), size <= max(abs(main.low), main.high)

@@ -23,6 +23,7 @@ class Result(Diagnosis):
     rated: tuple[float, ...] = ()  # [N m] rated torque of each; infinite where nobody knows it
     without: tuple[str, ...] = ()  # causes that were left out
     doctor: tuple[Check, ...] = ()
+    calibrated_with: tuple[str, ...] = ()  # logs of an earlier diagnosis, whose thresholds were taken; none: its own
 
 
 @dataclass(frozen=True)

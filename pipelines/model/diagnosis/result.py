@@ -12,6 +12,7 @@ from typing import Literal
 from pipelines.log.experiment import Array
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.calibration import Calibration
 
 __all__ = ["BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof", "Rejected",
            "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial", "Value", "Verdict"]
@@ -258,3 +259,4 @@ class Diagnosis:
     noise: Array  # [N m] of the drives, as the twin has it; NaN without
     nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding, with what stands
     extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects
+    calibration: Calibration | None = field(default=None, metadata=NOT_STORED, repr=False)  # thresholds

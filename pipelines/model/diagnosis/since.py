@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,9 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.thresholds import Thresholds
 
-__all__ = ["Since", "since_reference"]
+__all__ = ["Known", "Since", "since_reference"]
+
+Known = tuple[Array, Mapping[tuple[str, int | None], float]]  # weights (joints,) and gains with these
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +47,13 @@ class Since:
     probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]]  # beside a final model: what limits are looked for with
 
 
-def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = ()) -> Since:
+def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = (),
+                    known: Known | None = None) -> Since:
     """Standing effects, the gate for changes, and causes that base parameters show.
 
     Args:
         before: effects that were taken out of the rows already.
+        known: what chance gives each cause on the same reference logs, where an earlier diagnosis has found it.
     """
     columns, fit = fit_nominal(reference, prepared.columns)
     arm = Exact.start(columns, fit).arm
@@ -67,7 +71,9 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
 
     floor = reference.rms(whole.left[~later])
-    chance = Chance.of(data, later, nominal, common, 1.0 / np.maximum(floor, 1e-12), arm)
+    weight, there = (1.0 / np.maximum(floor, 1e-12), {}) if known is None else known
+    chance = Chance.of(data, later, nominal, common, weight, arm,
+                       {family: there[family.cause, family.joint] for family in every if (family.cause, family.joint) in there})
 
     def changed(found: Refined, wanted: Sequence[bool]) -> tuple[Sequence[Screened], Thresholds]:
         return changes(data, later, nominal, common, _slopes(found, later), found.weight, every, wanted, arm, chance)

@@ -11,8 +11,9 @@ against the first, or some of them against the others, is what it has to exceed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,7 @@ import numpy.typing as npt
 from pipelines.fit.bootstrap import apart as apart_by_chance
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.calibration import CauseBound
 from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
@@ -137,28 +139,44 @@ class Chance:
 
     data: Data  # of the reference logs
     masks: tuple[Mask, ...]
-    fits: tuple[Fit, ...]  # each with the nominal model apart before and after, at the weights of the reference
+    nominal: Array  # (k, rows)
+    common: Array  # (m, rows)
+    weight: Array  # (joints,) by what is left of them
     arm: Arm
-    known: dict[Family, float] = field(default_factory=dict)
+    known: dict[Family, float]
 
     @classmethod
-    def of(cls, data: Data, later: Mask, nominal: Array, common: Array, weight: Array, arm: Arm) -> Chance:
-        """As in `changes`; `weight` (joints,) by what is left of the reference logs."""
+    def of(cls, data: Data, later: Mask, nominal: Array, common: Array, weight: Array, arm: Arm,
+           known: Mapping[Family, float]) -> Chance:
+        """As in `changes`.
+
+        Args:
+            known: of causes for which it was found earlier, with the same weights.
+        """
         rows = ~later
-        known = None if data.known is None else data.known[rows]
-        before = replace(data, logs=data.logs[:int(data.log_of[rows].max()) + 1], known=known)
+        subtracted = None if data.known is None else data.known[rows]
+        before = replace(data, logs=data.logs[:int(data.log_of[rows].max()) + 1], known=subtracted)
         masks = tuple(mask[rows] for mask in _nothing(data, rows))
-        fits = tuple(fit_columns(before, np.concatenate([apart(nominal[:, rows], mask), common[:, rows]]), data.y[rows], weight)
-                     for mask in masks)
-        return cls(before, masks, fits, arm)
+        return cls(before, masks, nominal[:, rows], common[:, rows], weight, arm, dict(known))
+
+    @cached_property
+    def fits(self) -> tuple[Fit, ...]:
+        """For each part the nominal model apart before and after."""
+        return tuple(fit_columns(self.data, np.concatenate([apart(self.nominal, mask), self.common]), self.data.y, self.weight)
+                     for mask in self.masks)
 
     def most(self, family: Family, weight: Array) -> float:
         """The most that any part gives it, with joints weighted by `weight`: a cause acts on its joint, or counts where most."""
         if family not in self.known:
             self.known[family] = (float(screen_event(self.data, self.fits[0], family, self.arm).gain.max()) if family.event
                                   else self._gained(family))
-        ratio = np.square(weight / self.fits[0].weight)
+        ratio = np.square(weight / self.weight)
         return self.known[family] * float(ratio.max() if family.joint is None else ratio[family.joint - 1])
+
+    @property
+    def bounds(self) -> tuple[CauseBound, ...]:
+        """All that was found, as it is stored."""
+        return tuple(CauseBound(family.cause, family.joint, np.nan, own) for family, own in self.known.items())
 
     def _gained(self, family: Family) -> float:
         most = 0.0

@@ -47,7 +47,7 @@ class Thresholds:
         place = np.array([(joint or 1) - 1 for joint in joints])
         gain = TIMES * np.max([own, np.where(once, 0.0, usual[place]), USELESS * left[place]], axis=0)
         wide = Wide.of_twin(fit, residuals, [f for f in families if f.joint is None], usual, left, arm)
-        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, wide).at(weight)
+        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, wide)
 
     def at(self, weight: Array) -> Thresholds:
         """The same with other weights: a cause acts on its joint; one of the whole arm is looked for anew, or counts where most."""

@@ -57,6 +57,7 @@ class Wide:
     usual: Array  # (joints,) what half the causes of a joint get
     rest: Array  # (joints,) squared weighted residual of the replicas
     causes: tuple[WideCause, ...]
+    longer: float = 1.0  # times as many rows, which give chance more to gain
 
     @classmethod
     def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], usual: Array, rest: Array, arm: Arm) -> Wide:
@@ -76,7 +77,7 @@ class Wide:
         events = np.array([one.event for one in self.causes], dtype=bool)
         common = max(median(own[~events]), float(np.median(ratio * self.usual)))
         useless = np.full(len(own), USELESS * float((ratio * self.rest).mean()))
-        return TIMES * np.max([own, np.where(events, 0.0, common), useless], axis=0), own
+        return self.longer * TIMES * np.max([own, np.where(events, 0.0, common), useless], axis=0), self.longer * own
 
 
 def median(values: Array) -> float:
@@ -109,7 +110,7 @@ def _event(family: Family, fit: Fit, residuals: Array, arm: Arm, rows: Sequence[
                 columns, seen, own = _sums(table, fit, residuals, rows)
                 parts.append(_best(WideCause(True, columns, seen, own * only), model, left))
     if not parts:
-        return WideCause(True, *(np.zeros((len(rows), 0, 1, size)) for size in (1, model.shape[1], len(residuals))))
+        return WideCause(True, *(np.zeros((len(rows), 1, 1, size)) for size in (1, model.shape[1], len(residuals))))
     return _best(WideCause(True, *(np.concatenate([getattr(one, name) for one in parts], axis=1)
                                    for name in ("columns", "model", "left"))), model, left)
 
