@@ -42,6 +42,10 @@ def batch(
     baseline: Annotated[str | None, typer.Option(help="model.json that is known: only what goes beyond it is found.")] = None,
 ) -> None:
     """Run the whole workflow, or one stage, on each of many folders of logs, in parallel."""
+    from pipelines.batch.server import warm_up
+
+    if backend == "local":
+        warm_up(f"pipelines.{stage.replace('-', '_')}")
     from pipelines.batch.batch import Wanted, run_batch
     from pipelines.batch.items import read_shard
     from pipelines.batch.plan import Options, Plan, load_stage, module_of

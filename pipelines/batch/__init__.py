@@ -3,7 +3,8 @@
     batch.py      the whole: what is done already, what is left, when to stop, the summary
     items.py      which folders are items          plan.py      the stage with its settings, as a text any process can read
     work.py       one item, in a warm process      record.py    what became of it, and the ledger
-    pool.py       processes of this machine        cluster.py   a Dask cluster, each worker with a child.py
+    pool.py       processes of this machine        server.py    what they are forked from
+    cluster.py    a Dask cluster                   child.py     the process that each of its workers keeps
     folder.py     what stands where in the output  lock.py, signals.py
     figures.py    what can be followed from item to item        drift.py, baseline.py    how it moved
     summary.py    the report and the table         result.py, junit.py

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import os
 import signal
-import sys
+import time
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.connection import Connection
 from typing import Any
 
 from pipelines.batch.items import Item
 from pipelines.batch.plan import Plan, plan_text
-from pipelines.batch.process import one_thread
 from pipelines.batch.record import Record
+from pipelines.batch.server import warm_up
 from pipelines.batch.work import attempt, begin, undone
 from pipelines.errors import EnvironmentFault
 
@@ -23,6 +24,7 @@ __all__ = ["crashed", "local", "timed_out"]
 _AHEAD = 2  # items handed out for each worker: the next one is there before the last one is done
 _SECONDS = 0.1  # between two looks at whether to stop
 _STARTS = 3  # of workers that end before they have done anything
+_LATE = 2.0  # [s] for the answer of a process that is no longer there
 
 
 def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
@@ -34,15 +36,13 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
     """
     from pebble import ProcessPool
 
-    one_thread()
-    # Forked from a clean server that has imported everything once: quick to replace, and no locks of our threads in it.
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["pipelines.batch.work", plan.module, *_main()])
+    context = warm_up(plan.module)
     waiting, starts, text = deque(items), 0, plan_text(plan)
     while waiting and not stopped():
-        pool: Any = ProcessPool(jobs, initializer=_begin, initargs=(text, key), context=context)
+        told, tell = context.Pipe(duplex=False)
+        pool: Any = ProcessPool(jobs, initializer=_begin, initargs=(text, key, tell), context=context)
         try:
-            for item, record in _through(pool, plan, key, waiting, jobs, stopped):
+            for item, record in _through(pool, _Watch(told), plan, key, waiting, jobs, stopped):
                 starts = 0
                 yield item, record
         except BrokenProcessPool:
@@ -53,21 +53,56 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
         finally:
             pool.stop()
             pool.join()
+            told.close()
+            tell.close()
 
 
-def _main() -> list[str]:
-    """What every worker imports again: the program that runs, where it is a file."""
-    # A module that was started by its name (python -m) would complain of having been imported before.
-    return ["__main__"] if getattr(sys.modules["__main__"], "__spec__", None) is None else []
-
-
-def _begin(text: str, key: str) -> None:
+def _begin(text: str, key: str, tell: Connection) -> None:
     """A worker ends at once when it is told to: what it was writing has not taken its place yet, and never will."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    _tell[:] = [tell]
     begin(text, key)
 
 
-def _through(pool: Any, plan: Plan, key: str, waiting: deque[Item], jobs: int,
+_tell: list[Connection] = []  # of a worker: the end of the pipe to its parent
+
+
+def _attempt(item: Item) -> Record:
+    """In a worker: say who is at the item, and do it."""
+    _tell[0].send((os.getpid(), item.slug))
+    return attempt(item)
+
+
+class _Watch:
+    """Which process is at which item: pebble waits for ever for the answer of one that ended with 0."""
+
+    def __init__(self, told: Connection) -> None:
+        self._told = told
+        self._at: dict[str, int] = {}  # slug -> process
+        self._gone: dict[Future[Record], float] = {}  # since when [s]
+
+    def lost(self, running: Mapping[Future[Record], Item]) -> list[Future[Record]]:
+        """Those of `running` whose process has gone, and whose answer has not come for a while."""
+        while self._told.poll():
+            process, place = self._told.recv()
+            self._at[place] = process
+        now = time.monotonic()
+        gone = {future for future, item in running.items() if not future.done() and not _there(self._at.get(item.slug))}
+        self._gone = {future: self._gone.get(future, now) for future in gone}
+        return [future for future, since in self._gone.items() if now - since > _LATE]
+
+
+def _there(process: int | None) -> bool:
+    """Whether the process still runs; one that has not said its number has not begun."""
+    try:
+        if process is not None:
+            os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def _through(pool: Any, watch: _Watch, plan: Plan, key: str, waiting: deque[Item], jobs: int,
              stopped: Callable[[], bool]) -> Generator[tuple[Item, Record], None, None]:
     """Hand out `waiting` until it is empty. What was handed out when the pool broke goes back to it."""
     running: dict[Future[Record], Item] = {}
@@ -75,7 +110,7 @@ def _through(pool: Any, plan: Plan, key: str, waiting: deque[Item], jobs: int,
         while (waiting or running) and not stopped():
             while waiting and len(running) < _AHEAD * jobs:
                 item = waiting.popleft()
-                running[pool.schedule(attempt, args=(item,), timeout=plan.options.timeout)] = item
+                running[pool.schedule(_attempt, args=(item,), timeout=plan.options.timeout)] = item
             for future in wait(running, timeout=_SECONDS, return_when=FIRST_COMPLETED).done:
                 if isinstance(future.exception(), BrokenProcessPool):
                     raise BrokenProcessPool
@@ -83,6 +118,9 @@ def _through(pool: Any, plan: Plan, key: str, waiting: deque[Item], jobs: int,
                     return
                 item = running.pop(future)
                 yield item, _outcome(future, item, plan, key)
+            for future in watch.lost(running):
+                item = running.pop(future)
+                yield item, undone(item, crashed(0), plan, key)
     except (BrokenProcessPool, RuntimeError):  # pebble says the latter of a pool that broke before
         waiting.extendleft(reversed(running.values()))
         raise BrokenProcessPool from None

@@ -40,6 +40,16 @@ def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
     assert len(cases) == 11
 
 
+@pytest.mark.row("P04")
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_process_that_leaves_without_a_word_costs_its_item(lay: Lay, jobs: int) -> None:
+    """P04: a library that ends its process with 0, no time limit given: the item has failed, the batch ends."""
+    outcome = obey(lay(GOOD | {"gone": "leave", "gone-too": "leave"}), jobs=jobs)
+    assert statuses(outcome) == dict.fromkeys(GOOD, "ok") | {"gone": "failed RRID-P04", "gone-too": "failed RRID-P04"}
+    said = {item["error"]["message"] for item in outcome.json["items"] if item["error"]}
+    assert said == {"crashed: its process ended with 0"}
+
+
 @pytest.mark.row("P11")
 def test_all_bad_is_exit_4_with_a_table(lay: Lay) -> None:
     """P11: nothing that could be used, and still every form of the summary."""

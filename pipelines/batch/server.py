@@ -1,0 +1,39 @@
+"""The process that the workers of a batch are forked from: it imports once what they all need.
+
+    context = warm_up("pipelines.inspect")      as soon as it is known that there will be workers of that stage
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+from multiprocessing.context import ForkServerContext
+from multiprocessing.forkserver import ensure_running
+from typing import Final
+
+from pipelines.batch.process import one_thread
+
+__all__ = ["warm_up"]
+
+_NEEDED: Final = ("pipelines.batch.work", "h5py")  # the latter is else imported by each worker, with its first log
+
+
+def warm_up(module: str) -> ForkServerContext:
+    """Start the process, if it is not there yet: it imports while this one still looks for work.
+
+    Workers that are forked from it are quick to replace, and have no locks of our threads in them.
+
+    Args:
+        module: of the stage: "pipelines.inspect"; one that does not exist is passed over.
+    """
+    one_thread()
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([*_NEEDED, module, *_main()])
+    ensure_running()
+    return context
+
+
+def _main() -> list[str]:
+    """What every worker imports again: the program that runs, where it is a file."""
+    # A module that was started by its name (python -m) would complain of having been imported before.
+    return ["__main__"] if getattr(sys.modules["__main__"], "__spec__", None) is None else []
