@@ -38,6 +38,7 @@ class Finding:
     damping: Known | None  # ratio, of the same
     parameters: Mapping[str, Known]  # as findings report them, SI
     seen_at: tuple[int, ...]  # joints
+    faint: bool = False  # its pairs are so small that they may be a trace of what another joint does
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,8 @@ def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int) ->
     measured = _mean([p.resonance.frequency for p in near])
     damping = _mean([p.resonance.damping for p in near])
     return Finding("base", None, words, "base_resonance", measured, damping,
-                   {"frequency": measured, "damping_ratio": damping, "inertia": inertia}, (joint,))
+                   {"frequency": measured, "damping_ratio": damping, "inertia": inertia}, (joint,),
+                   max(p.rise for p in near) < _TRACE)
 
 
 def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list[float], words: str) -> Finding:
@@ -238,17 +240,26 @@ def _many(values: Sequence[Known]) -> str:
 
 
 def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
-    """Where the base is known, what other joints show at its frequency is the base as well."""
-    bases = [one for one in sure if one.kind == "base"]
+    """Where the base is known, what other joints show at its frequency is the base as well.
+
+    A base turns under the first joint before any other. What shows at one further joint alone, faintly, while another bends on a
+    spring, may be that spring: its link swings against a motor that its own controller holds.
+    """
     rest = [one for one in sure if one.kind != "base"]
+    bent = [one for one in rest if one.kind == "joint"]
+    bases = [one for one in sure if one.kind == "base"]
     merged: list[Finding] = []
     for one in bases:
         same = next((k for k, m in enumerate(merged) if _same(m.frequency, one.frequency)), None)
         if same is None:
             merged.append(one)
         else:
-            merged[same] = replace(merged[same], seen_at=(*merged[same].seen_at, *one.seen_at))
+            both = merged[same]
+            merged[same] = replace(both, seen_at=(*both.seen_at, *one.seen_at), faint=both.faint and one.faint)
     left = []
+    for faint in [one for one in merged if one.faint and bent and len(one.seen_at) == 1 and one.seen_at != (1,)]:
+        merged.remove(faint)
+        left.append(_trace(faint, bent[0]))
     for question in unsure:
         place = next((k for k, m in enumerate(merged) if "base_resonance" in question.candidates
                       and _same(m.frequency, question.frequency)), None)
@@ -257,6 +268,13 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
         elif question.joint not in merged[place].seen_at:
             merged[place] = replace(merged[place], seen_at=(*merged[place].seen_at, question.joint))
     return (*merged, *rest), tuple(left)
+
+
+def _trace(base: Finding, spring: Finding) -> Open:
+    joint = base.seen_at[0]
+    return Open(joint, base.frequency, ("base_resonance", "joint_elasticity"),
+                f"{base.evidence} But the pair is small, the first joint does not show it, and it may be a trace of joint "
+                f"{spring.joint}, which bends.", f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again")
 
 
 def _same(a: Known | None, b: Known | None) -> bool:

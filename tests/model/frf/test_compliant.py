@@ -146,3 +146,23 @@ def test_the_base_is_known_again_at_other_joints() -> None:
     sure, left = seen_elsewhere([base], questions)
     assert sure[0].seen_at == (1, 2)
     assert [one.joint for one in left] == [3]
+
+
+@pytest.mark.parametrize(("seen_at", "faint", "spring", "named"), [
+    ((2,), True, True, ["joint"]),  # a trace of joint 1
+    ((1,), True, True, ["base", "joint"]), ((2,), False, True, ["base", "joint"]), ((2,), True, False, ["base"])])
+def test_a_faint_base_beside_a_spring_shows_at_the_first_joint(seen_at: tuple[int, ...], faint: bool, spring: bool,
+                                                               named: list[str]) -> None:
+    """A link that swings on a spring of joint 1 leaves a trace in joint 2's response that looks like a base; it is left open."""
+    base = Finding("base", None, "", "base_resonance", Known(58.0, 2.0), Known(0.3, 0.01), {}, seen_at, faint)
+    joint = Finding("joint", 1 if seen_at != (1,) else 2, "", "joint_elasticity", Known(46.0, 0.1), Known(0.03, 1e-3), {}, (1,))
+    sure, left = seen_elsewhere([base, joint] if spring else [base], [])
+    assert [one.kind for one in sure] == named
+    assert [one.joint for one in left] == ([] if "base" in named else [2])
+
+
+def test_a_small_pair_of_a_base_is_faint() -> None:
+    """A base of eight times the arm's inertia: the level rises by an eighth."""
+    found, _ = group_joint(2, [modes_of([base_under_arm(28.0, 8.0, j)], j) for j in (1.0, 1.2)], 1e-3)
+    heavy, _ = group_joint(2, [modes_of([base_under_arm(28.0, 2.0, j)], j) for j in (1.0, 1.2)], 1e-3)
+    assert [(one.kind, one.faint) for one in (*found, *heavy)] == [("base", True), ("base", False)]
