@@ -30,6 +30,8 @@ __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section
 
 _LEDGER = 40  # lines
 _WAY = {"injected": "hidden", "analytic": "worked out"}  # how a detection limit was found
+_FOUND = ("With 95 %, had it been there; nothing smaller can be excluded. Hidden: put into these logs and found; worked out: by a "
+          "formula. Cannot be seen: nothing that is physically likely would show.")
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
 
 
@@ -208,11 +210,8 @@ def _limits(result: Result) -> list[Section]:
     """What these logs can and cannot tell."""
     sections = []
     if result.detectable:
-        rows = tuple((title_of(one.cause), one.joint, one.parameter, *_smallest(one), _numbers_at(one), _WAY[one.way])
-                     for one in result.detectable)
-        sections.append(Section("What would have been found", ("With 95 %, had it been there; nothing smaller can be excluded. "
-                                                               "Cannot be seen: nothing that is physically likely would show. Hidden: "
-                                                               "put into these logs and found; worked out: by a formula.",),
+        rows = tuple((title_of(one.cause), one.joint, one.parameter, *_smallest(one)) for one in result.detectable)
+        sections.append(Section("What would have been found", (_FOUND,),
                                 (Table(("cause", "joint", "parameter", "smallest", "unit", "at", "by"), rows),)))
     if result.not_testable:
         hidden = tuple((title_of(one.cause), one.joint, one.reason, one.record) for one in result.not_testable)
@@ -226,13 +225,13 @@ def _numbers_at(one: Detectable) -> str:
     return ", ".join(f"{name} {told_value(value)} {format_unit(value.unit)}".strip() for name, value in one.at.items())
 
 
-def _smallest(one: Detectable) -> tuple[str, str]:
-    """Value and unit; words where even the largest that is to be expected in either direction would not show."""
+def _smallest(one: Detectable) -> tuple[str, ...]:
+    """Value, unit, for what it is, and how it is known; words where nothing that is to be expected in either direction would show."""
     value = one.smallest.value
     expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
     if isinstance(value, float) and expected and value >= min(expected):
-        return "cannot be seen", ""
-    return told_value(one.smallest), format_unit(one.smallest.unit)
+        return "cannot be seen", "", "", ""
+    return told_value(one.smallest), format_unit(one.smallest.unit), _numbers_at(one), _WAY[one.way]
 
 
 def _basis(result: Result) -> Section:
