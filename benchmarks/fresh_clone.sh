@@ -4,7 +4,7 @@
 #     benchmarks/fresh_clone.sh [TESTS...]        default: the whole suite, as README says
 #
 # HOME is empty during the installation and the first command, then a folder that nothing can be written to; there is no display, no
-# terminal, and after the installation no network (needs `unshare`, as root or with user namespaces). The reference material that the
+# terminal, and after the installation no network (needs `unshare` and `ip`, as root or with user namespaces). The reference material that the
 # tests compare with has to lie beside this checkout in ../shared.
 set -euo pipefail
 source=$(cd "$(dirname "$0")/.." && pwd)
@@ -26,8 +26,9 @@ bare() {
         setsid --wait "$@" </dev/null
 }
 mapfile -t pip_settings < <(env | grep '^PIP_' || true)
-# HOME is mounted read-only, for who may write everything: permissions do not stop the superuser.
-isolated='mount --bind "$0" "$0" && mount -o "remount,bind,$1" "$0" && shift && exec "$@"'
+# HOME is mounted read-only, for who may write everything: permissions do not stop the superuser. A machine without a network can
+# still speak to itself (the tests' cluster does).
+isolated='mount --bind "$0" "$0" && mount -o "remount,bind,$1" "$0" && ip link set lo up && shift && exec "$@"'
 without_network() { bare "$1" unshare --net --mount bash -c "$isolated" "$@"; }
 told() { printf '%-48s %5d s\n' "$1" "$((SECONDS - began))"; }
 

@@ -226,7 +226,7 @@ def _numbers_at(one: Detectable) -> str:
 
 
 def _smallest(one: Detectable) -> tuple[str, ...]:
-    """Value, unit, for what it is, and how it is known; words where nothing that is to be expected in either direction would show."""
+    """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
     value = one.smallest.value
     expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
     if isinstance(value, float) and expected and value >= min(expected):
