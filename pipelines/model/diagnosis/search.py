@@ -42,6 +42,7 @@ _PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
 _FALLS = 0.02  # of the held-out error, that a cause takes off at least where no floor says what is left to explain
+_DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
 
@@ -170,7 +171,30 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     great = [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0] and id(one) in asked]
     error = held_out(now, case) if great else np.nan
     tried = [_fitted(case, now, one, error) for one in great]
+    best = _fewest(sorted(tried, key=lambda one: one.rank))
+    tried = [_best_form(case, now, one, error) if one is best else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
+
+
+def _best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:
+    """The cause by the law that leaves decidedly less of its joint, fitted and held out, where it has more than one."""
+    if best.log is not None:
+        return best
+    chosen, least = best, _DECIDED * _left_at(case, best)
+    for form in best.effect.forms():
+        other = _refitted(case, now, best.screened, form, error)
+        if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < least:
+            chosen, least = other, left
+    return chosen
+
+
+def _left_at(case: Case, tried: Tried) -> float:
+    """Squared error at the cause's joint: the mean of fitted and held out by their product."""
+    joint, done = tried.effect.joint, tried.done
+    held = done.data if case.judge is None else case.judge
+    powers = [np.square(done.data.rms(done.left)), np.square(held.rms(held_out_left(done, case.judge, case.blocks)))]
+    each = np.sqrt(powers[0] * powers[1]) * np.square(done.weight)
+    return float(each.sum() if joint is None else each[joint - 1])
 
 
 def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
@@ -228,6 +252,10 @@ def _fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     effect = one.shape[0].full()
     if effect.fixed_amplitudes is not None:
         effect = _given(case, now, one, np.array(effect.fixed_amplitudes)).full()
+    return _refitted(case, now, one, effect, error)
+
+
+def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: float) -> Tried:
     table = _laid(case.data, effect, now.model.arm)
     start = (now.model.with_effect(effect, _amplitudes(now.fit, table)) if one.amplitude is None else
              beyond_first_order(now, effect, one.amplitude))

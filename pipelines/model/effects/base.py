@@ -21,6 +21,7 @@ What a search over effects asks, so that it need not know any of them:
 
     shapes, promising    a grid of non-linear numbers; the few of them that a residual speaks for, where the grid is large
     full                 the form a finding is refitted with: more harmonics, a cubic term. `shapes` are the screening form
+    forms                other laws of the same cause, in place of that form where they leave decidedly less
     free                 the non-linear numbers that an exact refit may move; the others are discrete, or follow from these
     fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
     possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
@@ -217,6 +218,10 @@ class Effect(ABC):
     def full(self) -> Self:
         """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
         return self
+
+    def forms(self) -> tuple[Self, ...]:
+        """Other laws of the same cause, each to be tried in place of this one, which is the most likely."""
+        return ()
 
     def again(self, motion: Motion) -> bool:
         """Whether it may act more than once at its place, in different shapes that this motion tells apart."""

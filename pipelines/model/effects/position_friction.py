@@ -14,17 +14,25 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["PositionFriction"]
 
+_TAILS = ("", "_2", "_3")
+_HIGHEST = 8.0  # order that is searched for
+
 
 @dataclass(frozen=True)
 class PositionFriction(Effect):
-    """τ = A sin(k q + φ) tanh(w v): Coulomb friction that varies along the turn.
+    """τ = Σ A_m sin(m k q + φ_m) tanh(w v), m = 1, 2, 3: Coulomb friction that varies along the turn.
 
-    The columns are sin(k q) tanh(w v) and cos(k q) tanh(w v); their amplitudes A cos φ and A sin φ. A turn tells k on a
-    robot's joint; on a prismatic one k counts waves in 2π metres.
+    Where it rubs in bands a wave is no sine, and its harmonics carry over to where one alone would not. The columns are
+    sin(m k q) tanh(w v) and cos(m k q) tanh(w v); their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks for m = 1 alone.
+    What turns with the joint repeats with it, so that k is whole; what turns behind a gear has a k of its own, and on a prismatic
+    joint k counts waves in 2π metres.
     """
 
     order: float = 1.0  # k [1/rev of the joint]
     sharpness: float = 100.0  # w [s/rad]
+    harmonics: int = 3  # how many m there are
+    most: int = 3  # how many a refit takes
+    whole: bool = False  # whether k is held as it is
 
     name = "position_friction"
     title = "Friction that depends on position"
@@ -33,6 +41,10 @@ class PositionFriction(Effect):
         Quantity("order", "1/rev", 0.25, 100.0, "waves in one turn of the joint", shape=True),
         Quantity("phase", "rad", -math.pi, math.pi, "angle of the wave at the joint's zero"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
+        Quantity("amplitude_2", "N m", 0.0, 20.0, "of the second harmonic"),
+        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic"),
+        Quantity("amplitude_3", "N m", 0.0, 20.0, "of the third harmonic"),
+        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic"),
     )
     signature = "Friction whose size changes with the angle of the joint, always against the motion."
     explanation = "A bent shaft, an uneven seal or bearing, cables that press in some postures."
@@ -42,23 +54,54 @@ class PositionFriction(Effect):
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        side, angle = np.tanh(self.sharpness * self.own(motion.dq)), self.order * self.own(motion.q)
-        return self.on_own_row(arm, side * np.sin(angle), side * np.cos(angle))
+        wave, once = np.tanh(self.sharpness * self.own(motion.dq)), np.exp(1j * self.order * self.own(motion.q))
+        parts: list[Array] = []
+        for _ in range(self.harmonics):
+            wave = wave * once
+            parts += (wave.imag, wave.real)
+        return self.on_own_row(arm, *parts)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Whole orders; also halves where the joint moves over more than a turn."""
-        step = 1.0 if np.ptp(self.own(motion.q)) < 2.0 * math.pi else 0.5
-        for order in np.arange(1.0, 8.0 + step, step).tolist():
-            yield replace(self, order=order)
+        """Whole orders; also halves where the joint moves over more than a turn. A slide has as many half waves in its travel.
+
+        A refit takes no more harmonics than half waves were travelled: more would be any curve there, and another one beyond.
+        """
+        travel = float(np.ptp(self.own(motion.q))) or 1.0
+        turns = arm.robot.revolute[self._index]
+        step = (1.0 if travel < 2.0 * math.pi else 0.5) if turns else math.pi / travel
+        first = 1.0 if turns else step
+        for k in range(round((_HIGHEST - 1.0) / step) + 1 if turns else int(_HIGHEST)):
+            order = first + k * step
+            yield replace(self, order=order, harmonics=1, most=int(np.clip(order * travel / math.pi, 1, 3)),
+                          whole=turns and order.is_integer())
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        return tuple(name for name in super().free if not (self.whole and name == "order"))
+
+    def full(self) -> Self:
+        return replace(self, harmonics=self.most)
+
+    def forms(self) -> tuple[Self, ...]:
+        """Behind a gear."""
+        return (replace(self, whole=False),) if self.whole else ()
 
     def own_load(self, values: Values) -> OwnLoad:
-        amplitude, order, phase, sharpness = (values[name] for name in ("amplitude", "order", "phase", "sharpness"))
-        return lambda angle, speed: amplitude * math.tanh(sharpness * speed) * math.sin(order * angle + phase)
+        shaped, sharpness = self.at(values), values["sharpness"]
+        waves = [(m * shaped.order, *pair) for m, pair in enumerate(np.reshape(shaped.amplitudes(values), (-1, 2)).tolist(), 1)]
+
+        def load(angle: float, speed: float) -> float:
+            return math.tanh(sharpness * speed) * sum(a * math.sin(k * angle) + b * math.cos(k * angle) for k, a, b in waves)
+
+        return load
 
     def amplitudes(self, values: Values) -> Array:
-        return values["amplitude"] * np.array([math.cos(values["phase"]), math.sin(values["phase"])])
+        waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in _TAILS[:self.harmonics]]
+        return np.array([part for wave in waves for part in (wave.real, wave.imag)])
 
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
-        sine, cosine = map(float, amplitudes)
-        return {"amplitude": math.hypot(sine, cosine), "order": self.order, "phase": math.atan2(cosine, sine),
-                "sharpness": self.sharpness}
+        pairs = [*np.reshape(np.asarray(amplitudes, dtype=float), (-1, 2)).tolist(), *[[0.0, 0.0]] * (3 - self.harmonics)]
+        found = {"order": self.order, "sharpness": self.sharpness}
+        for tail, (cosine, sine) in zip(_TAILS, pairs, strict=True):
+            found |= {f"amplitude{tail}": math.hypot(cosine, sine), f"phase{tail}": math.atan2(sine, cosine)}
+        return {q.name: found[q.name] for q in self.parameters}

@@ -2,36 +2,59 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Presliding"]
 
+_HALFWAY = 0.0  # elastic share from which a refit finds Dahl's -1 as well as Dupont's 0.5
+_OTHER = 0.8  # exponent from which a refit finds others than 1
+_ONE = 1e-6  # from an exponent of 1, within which it is 1
+_SLIDES = 1e-12  # of the largest bending
+_LEAST = 0.05  # exponent of elements: below, all slip as one
+_SLIPS = 12  # elements that slip one after the other
+
 
 @dataclass(frozen=True)
 class Presliding(Effect):
-    """τ = A (u + T_d du/dt), du/dt = (v - |v| u)/x_c: friction that turns over with travel, not with speed.
+    """τ = A (u + T_d du/dt): friction that turns over with travel, not with speed. It takes the place of as much Coulomb friction.
 
-    T_d = 0 is Dahl 1968; T_d = σ1/σ0 is LuGre with constant sliding friction (Canudas de Wit et al. 1995, eq. (1)-(3)), u its
-    bristles' bending in units of x_c, A = σ0 x_c. It takes the place of as much Coulomb friction. Between two reversals
-    u = s + (u_r - s) exp(-|q - q_r|/x_c) with s the direction: exact, and no speed is integrated.
+    Along a stroke in direction s, y = s u bends with travel x = |q|/d by
+
+        dy/dx = 1 up to y = e,  ((1 - y)/(1 - e))^n beyond
+
+    so that nothing slides up to e (Dupont, Hayward, Armstrong & Altpeter 2002, eq. (9)-(12), who take e from 0 to 1). e = -1 is
+    Dahl 1968 with his exponent n; with n = 1 and T_d = σ1/σ0 LuGre of constant sliding friction (Canudas de Wit et al. 1995,
+    eq. (1)-(3)). d is such that u is zero x_c ln 2 after a reversal while sliding, as with Dahl's n = 1 and distance x_c.
+
+    Bristles know no more than how far they bend. Where inner loops close, elements that slip one after the other stand in their
+    place (Iwan 1966; Al-Bender, Lampaert & Swevers 2005): u = Σ w_i z_i, dz_i = 2 dx/X_i within ±1, w_i and X_i such that a
+    reversal while sliding goes as above.
     """
 
     distance: float = 1e-2  # x_c [rad]
+    elastic: float = -1.0  # e
     damping_time: float = 0.0  # T_d [s]
+    exponent: float = 1.0  # n, held where it is 1
+    inner_loops: float = 0.0
 
     name = "presliding"
     title = "Presliding"
     parameters = (
         Quantity("amplitude", "N m", 0.0, 50.0, "friction that turns over with travel"),
         Quantity("distance", "rad", 1e-6, 0.2, "travel over which it turns over", shape=True),
+        Quantity("elastic", "1", -1.0, 0.9, "share of the largest bending up to which nothing slides", shape=True),
         Quantity("damping_time", "s", 0.0, 0.1, "damping of the bristles over their stiffness", shape=True),
+        Quantity("exponent", "1", 0.0, 3.0, "how gradually it begins to slide", shape=True),
+        Quantity("inner_loops", "1", 0.0, 1.0, "1 where a small loop inside a large one closes", shape=True, discrete=True),
     )
     signature = "After each reversal friction turns over along a loop against position, whatever the speed."
     explanation = "Contacts, seals and gears bend before they slide, and bend back after a reversal."
@@ -41,10 +64,11 @@ class Presliding(Effect):
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        v = self.own(motion.dq)
-        u = _bristles(self.own(motion.q), self.distance)
+        contact, unit = self._contact, self._unit
+        states = contact.along(self.own(motion.q) / unit)
+        u = contact.bent(states)
         if self.damping_time:
-            u = u + self.damping_time * (v - np.abs(v) * u) / self.distance
+            u = u + self.damping_time * contact.bent(contact.rate(states, self.own(motion.dq) / unit))
         return self.on_own_row(arm, u)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
@@ -53,41 +77,144 @@ class Presliding(Effect):
         for distance in np.geomspace(1e-3 * travel, 0.1 * travel, 9).tolist():
             yield replace(self, distance=float(np.clip(distance, 1e-6, 0.2)))
 
+    def full(self) -> Self:
+        return replace(self, elastic=_HALFWAY)
+
+    def forms(self) -> tuple[Self, ...]:
+        return replace(self, exponent=_OTHER), replace(self, exponent=_OTHER, inner_loops=1.0)
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        return tuple(name for name in super().free if name != "exponent" or self.exponent != 1.0)
+
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """What is left of it at constant speed: Coulomb friction."""
         return np.asarray(values["amplitude"] * np.sign(dq))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        amplitude, distance, time = (values[name] for name in ("amplitude", "distance", "damping_time"))
+        shaped, amplitude = self.at(values), values["amplitude"]
+        contact, unit, time = shaped._contact, shaped._unit, shaped.damping_time
 
         def rate(motion: Motion, _: Array, states: Array) -> Array:
-            v = self.own(motion.dq)
-            return np.asarray((v - np.abs(v) * states[:, 0])[:, None] / distance)
+            return contact.rate(states, self.own(motion.dq) / unit)
 
         def load(motion: Motion, states: Array) -> Array:
-            u = states[:, 0]
+            u = contact.bent(states)
             if time:
-                u = u + time * rate(motion, u, states)[:, 0]
+                u = u + time * contact.bent(rate(motion, u, states))
             return self.on_own_row(arm, amplitude * u)[..., 0]
 
-        return Hooks(load=load, states=1, rate=rate)
+        return Hooks(load=load, states=contact.states, rate=rate)
+
+    @property
+    def _contact(self) -> _Bristles | _Slips:
+        return _Slips(self.elastic, self.exponent) if self.inner_loops else _Bristles(self.elastic, self.exponent)
+
+    @property
+    def _unit(self) -> float:
+        """d [rad]: y(x) from -1 is zero at x = 1, or where e < 0 at 1 + e + (1 - e) ln(1 - e), for n = 1."""
+        e, n = self.elastic, self.exponent
+        one = (1.0 - e) * math.log(1.0 - e) if abs(n - 1.0) < _ONE else ((1.0 - e) - (1.0 - e) ** n) / (1.0 - n)
+        return self.distance * math.log(2.0) / (1.0 if e >= 0.0 else 1.0 + e + one)
 
 
-def _bristles(q: Array, distance: float) -> Array:
-    """u (samples,) along the travel `q` (samples,), relaxed at the start; exact between the samples where they keep direction."""
+@dataclass(frozen=True)
+class _Bristles:
+    """One state u. Positions and speeds are in units of d."""
+
+    elastic: float
+    exponent: float
+    states = 1
+
+    def along(self, q: Array) -> Array:
+        """(samples, states), relaxed at the start; exact between the samples where they keep direction."""
+        begin, side, which, travel = _strokes(q)
+        at, first = 0.0, np.empty(len(begin))
+        for k, (s, x) in enumerate(zip(side.tolist(), travel.tolist(), strict=True)):
+            first[k] = s * at
+            at = s * self._after(s * at, x)
+        room, rest = np.maximum(self.elastic - first, 0.0), np.maximum(1.0 - np.maximum(self.elastic, first), _SLIDES)
+        x = np.abs(q - q[begin[which]])
+        rest = self._rest(rest[which], np.maximum(x - room[which], 0.0))
+        bends = x < room[which]
+        return np.asarray(side[which] * np.where(bends, first[which] + x, 1.0 - rest))[:, None]
+
+    def _after(self, y: float, x: float) -> float:
+        room = max(self.elastic - y, 0.0)
+        return y + x if x < room else float(1.0 - self._rest(max(1.0 - max(y, self.elastic), _SLIDES), x - room))
+
+    def _rest(self, rest: Any, x: Any) -> Any:
+        """1 - y after sliding by `x`, a number or an array, from where it was `rest`."""
+        n, e = self.exponent, self.elastic
+        if abs(n - 1.0) < _ONE:
+            return rest * (math.exp(-x / (1.0 - e)) if isinstance(x, float) else np.exp(-x / (1.0 - e)))
+        power = rest ** (1.0 - n) - (1.0 - n) * x / (1.0 - e) ** n
+        return (max(power, 0.0) if isinstance(x, float) else np.maximum(power, 0.0)) ** (1.0 / (1.0 - n))
+
+    def rate(self, states: Array, v: Array) -> Array:
+        y = np.sign(v) * states[:, 0]
+        slides = (np.maximum(1.0 - y, _SLIDES) / (1.0 - self.elastic)) ** self.exponent
+        return np.asarray(v * np.where(y < self.elastic, 1.0, np.where(y < 1.0, slides, 1.0 - y)))[:, None]
+
+    def bent(self, states: Array) -> Array:
+        return np.asarray(states[:, 0])
+
+
+@dataclass(frozen=True)
+class _Slips:
+    """u = Σ w_i z_i, one state z_i an element.
+
+    y(x) = -1 + 2 Σ w_i min(x/X_i, 1) has the curvature of the bristles' y(x) if w(X) dX = -½ X y″(X) dX = ½ X dg, where the slope
+    g = y' falls from 1 to 0 along X = 1 + e + (1 - e)(1 - g^(1/n - 1))/(1 - n): one element for each of equal parts of g, at
+    their means of X.
+    """
+
+    elastic: float
+    exponent: float
+    states = _SLIPS
+
+    @property
+    def _travels(self) -> Array:
+        """X: from a reversal while sliding until it slides again."""
+        g, n = np.linspace(1.0, 0.0, _SLIPS + 1), max(self.exponent, _LEAST)
+        if abs(n - 1.0) < _ONE:
+            mean = -_SLIPS * np.diff(g * (1.0 - np.log(np.maximum(g, _SLIDES))))
+        else:
+            mean = (1.0 + _SLIPS * n * np.diff(g ** (1.0 / n))) / (1.0 - n)
+        return np.asarray(1.0 + self.elastic + (1.0 - self.elastic) * mean)
+
+    def along(self, q: Array) -> Array:
+        """(samples, states), relaxed at the start; exact between the samples where they keep direction."""
+        begin, side, which, travel = _strokes(q)
+        half = 0.5 * self._travels
+        at, first = np.zeros(_SLIPS), np.empty((len(begin), _SLIPS))
+        steps = (side * travel)[:, None] / half
+        for k, step in enumerate(steps):
+            first[k] = at
+            at = np.minimum(np.maximum(at + step, -1.0), 1.0)
+        return np.asarray(np.clip(first[which] + (q - q[begin[which]])[:, None] / half, -1.0, 1.0))
+
+    @property
+    def _weights(self) -> Array:
+        return 0.5 * self._travels / _SLIPS
+
+    def rate(self, states: Array, v: Array) -> Array:
+        """What a step went too far comes back with travel."""
+        s = np.sign(v)[:, None]
+        return np.asarray(np.abs(v)[:, None] * np.where(s * states < 1.0, s, s - states) * 2.0 / self._travels)
+
+    def bent(self, states: Array) -> Array:
+        return np.asarray(states @ self._weights)
+
+
+def _strokes(q: Array) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.intp], Array]:
+    """Of every stroke its first sample, direction and length; of every sample its stroke. One of length 0 where nothing moves."""
     step = np.diff(q)
     moved = np.flatnonzero(step)
     if not moved.size:
-        return np.zeros(len(q))
+        return np.zeros(1, dtype=np.intp), np.ones(1), np.zeros(len(q), dtype=np.intp), np.zeros(1)
     side = np.sign(step[moved])
     turns = np.concatenate(([0], np.flatnonzero(np.diff(side)) + 1))  # where in `moved` a direction begins
-    begin, s = moved[turns], side[turns]  # samples of the reversals
-    keep = np.exp(-np.abs(np.diff(q[np.append(begin, len(q) - 1)])) / distance)
-    at, bent = 0.0, np.empty(len(turns))
-    for k in range(len(turns)):
-        bent[k] = at
-        at = s[k] + (at - s[k]) * keep[k]
+    begin = moved[turns]
     which = np.maximum(np.searchsorted(begin, np.arange(len(q)), side="right") - 1, 0)
-    u = s[which] + (bent[which] - s[which]) * np.exp(-np.abs(q - q[begin[which]]) / distance)
-    u[:begin[0] + 1] = 0.0
-    return np.asarray(u)
+    return begin, side[turns], which, np.abs(np.diff(q[np.append(begin, len(q) - 1)]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -12,6 +14,8 @@ from pipelines.model.effects.position_friction import PositionFriction
 from pipelines.model.effects.presliding import Presliding
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
+
+DAHL = {"elastic": -1.0, "exponent": 1.0, "inner_loops": 0.0}
 
 
 def swinging(hz: float = 0.7, samples: int = 4001) -> Motion:
@@ -46,7 +50,7 @@ def test_presliding_solves_its_differential_equation(distance: float, time: floa
     u = bristles(motion, distance)
     v = motion.dq[:, 1]
     expected = 2.0 * (u + time * (v - np.abs(v) * u) / distance)
-    found = Presliding(2).torque(motion, arm, {"amplitude": 2.0, "distance": distance, "damping_time": time})[:, 1]
+    found = Presliding(2).torque(motion, arm, DAHL | {"amplitude": 2.0, "distance": distance, "damping_time": time})[:, 1]
     missed = 2.0 * np.abs(motion.ddq).max() * 1e-3**2 / 8.0 / distance
     assert np.abs(found - expected).max() < (missed + 1e-4) * np.abs(expected).max()
 
@@ -60,11 +64,13 @@ def test_presliding_starts_again_from_where_it_was() -> None:
     np.testing.assert_allclose(np.delete(halted, np.arange(1500, 1800)), whole, atol=1e-12)
 
 
-@pytest.mark.parametrize("time", [0.0, 1e-3])
-def test_presliding_simulates_as_it_fits(time: float) -> None:
+@pytest.mark.parametrize(("law", "time"), [
+    ({}, 0.0), ({}, 1e-3), ({"elastic": 0.5}, 0.0), ({"elastic": 0.5}, 1e-3), ({"elastic": 0.3, "exponent": 0.6}, 0.0),
+    ({"elastic": 0.2, "inner_loops": 1.0}, 0.0)], ids=["Dahl", "LuGre", "elastic", "elastic, damped", "abrupt", "slips"])
+def test_presliding_simulates_as_it_fits(law: dict[str, float], time: float) -> None:
     """The state of the forward simulation, stepped along the motion, gives the torque of the fit."""
     motion, arm = swinging(), synthetic_arm()
-    values = {"amplitude": 1.5, "distance": 0.05, "damping_time": time}
+    values = DAHL | {"amplitude": 1.5, "distance": 0.05, "damping_time": time} | law
     hooks = Presliding(2).simulate(arm, values)
     assert hooks.load is not None
     assert hooks.rate is not None
@@ -72,7 +78,11 @@ def test_presliding_simulates_as_it_fits(time: float) -> None:
     for k in range(len(motion.t)):
         now = Motion(motion.t[[k]], motion.q[[k]], motion.dq[[k]], motion.ddq[[k]])
         loads.append(hooks.load(now, z)[0, 1])
-        z = z + 1e-3 * hooks.rate(now, np.zeros((1, 3)), z)
+        ahead = motion.dq[[min(k + 1, len(motion.t) - 1)]]
+        for part in (0.125, 0.375, 0.625, 0.875):
+            between = replace(now, dq=(1.0 - part) * now.dq + part * ahead)
+            half = z + 1.25e-4 * hooks.rate(between, np.zeros((1, 3)), z)
+            z = z + 2.5e-4 * hooks.rate(between, np.zeros((1, 3)), half)
     assert np.abs(np.array(loads) - Presliding(2).torque(motion, arm, values)[:, 1]).max() < 0.04
 
 
@@ -88,11 +98,26 @@ def test_load_friction_of_the_simulation_is_that_of_the_log() -> None:
 
 
 def test_position_friction_is_a_wave_along_the_turn() -> None:
-    """Amplitude, order and phase mean A sin(k q + φ) against the direction of motion."""
+    """Amplitude, order and phase mean A sin(k q + φ) against the direction of motion, and likewise of its harmonics."""
     motion, arm = swinging(), synthetic_arm()
-    found = PositionFriction(2).torque(motion, arm, {"amplitude": 0.7, "order": 3.0, "phase": 0.4, "sharpness": 50.0})[:, 1]
-    expected = 0.7 * np.sin(3.0 * motion.q[:, 1] + 0.4) * np.tanh(50.0 * motion.dq[:, 1])
+    values = {"amplitude": 0.7, "order": 3.0, "phase": 0.4, "sharpness": 50.0, "amplitude_2": 0.2, "phase_2": -1.0,
+              "amplitude_3": 0.1, "phase_3": 2.0}
+    found, q = PositionFriction(2).torque(motion, arm, values)[:, 1], motion.q[:, 1]
+    waves = 0.7 * np.sin(3.0 * q + 0.4) + 0.2 * np.sin(6.0 * q - 1.0) + 0.1 * np.sin(9.0 * q + 2.0)
+    expected = waves * np.tanh(50.0 * motion.dq[:, 1])
     np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_a_wave_of_position_friction_is_held_where_it_is_whole() -> None:
+    """What turns with the joint repeats with it; a form behind a gear lets go of the order. A refit takes no more harmonics than
+    half waves were travelled."""
+    motion, arm = swinging(), synthetic_arm()
+    for shape in PositionFriction(2).shapes(motion, arm):
+        full = shape.full()
+        assert full.order.is_integer()
+        assert full.free == ("sharpness",)
+        assert [form.free for form in full.forms()] == [("order", "sharpness")]
+        assert full.harmonics == max(1, min(3, int(full.order * np.ptp(motion.q[:, 1]) / np.pi)))
 
 
 def test_asymmetric_friction_adds_half_to_each_side() -> None:

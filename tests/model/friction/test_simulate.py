@@ -65,11 +65,12 @@ def test_three_sigmoids() -> None:
 def test_friction_along_the_turn() -> None:
     law = law_named("position_friction")
     assert law is not None
-    fit = known(law, [0.8, 0.1, 0.3, -0.2], [50.0, 2.0])  # sharpness, order; sine and cosine of the wave
+    fit = known(law, [0.8, 0.1, 0.3, -0.2, 0.0, 0.1, 0.05, 0.0], [50.0, 2.0])  # sharpness, order; sine and cosine of each wave
 
     def rate(x: Array, u: float) -> list[float]:
         q, v = x
-        friction = (0.8 + 0.3 * np.sin(2 * q) - 0.2 * np.cos(2 * q)) * np.tanh(50 * v) + 0.1 * v
+        waves = 0.3 * np.sin(2 * q) - 0.2 * np.cos(2 * q) + 0.1 * np.cos(4 * q) + 0.05 * np.sin(6 * q)
+        friction = (0.8 + waves) * np.tanh(50 * v) + 0.1 * v
         return [v, (u - friction) / INERTIA]
 
     expected, found = integrated(rate), simulate_joint(stretch(), fit)
