@@ -4,8 +4,8 @@
 #     benchmarks/fresh_clone.sh [TESTS...]        default: the whole suite, as README says
 #
 # HOME is empty during the installation and the first command, then a folder that nothing can be written to; there is no display, no
-# terminal, and after the installation no network (needs `unshare` and `ip`, as root or with user namespaces). The reference material that the
-# tests compare with has to lie beside this checkout in ../shared.
+# terminal, and after the installation no network (needs `unshare` and `ip`, as root or with user namespaces). The reference
+# material that the tests compare with has to lie beside this checkout in ../shared.
 set -euo pipefail
 source=$(cd "$(dirname "$0")/.." && pwd)
 place=$(mktemp -d)
