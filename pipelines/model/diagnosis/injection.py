@@ -26,11 +26,11 @@ import numpy.typing as npt
 
 from pipelines.fit.bootstrap import apart_in, drawn
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.candidates import Family, Laid, lay_family, lay_one
+from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Refined, refine
 from pipelines.model.diagnosis.nominal import Fit
-from pipelines.model.diagnosis.screen import INVISIBLE, Products, products_of
+from pipelines.model.diagnosis.screen import INVISIBLE, Products, products_apart, products_of
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Hidden", "Probe", "smallest"]
@@ -176,10 +176,8 @@ def _quadratics(family: Family, probe: Probe, units: Array) -> list[tuple[Array,
     residuals = np.concatenate([probe.fit.residual[None], units])
     for laid in lay_family(probe.data, family, probe.final.model.arm):
         width = laid.table.shape[1]
-        table = laid.table
-        if probe.later is not None:  # a common column, and one of what has changed
-            table = np.concatenate([table, np.where(probe.later[laid.rows], table, 0.0)], axis=1)
-        products = products_of(Laid(laid.first, table, laid.rows), probe.fit, residuals)
+        products = (products_of(laid, probe.fit, residuals) if probe.later is None else  # a common column, and one of the change
+                    products_apart(laid, probe.fit, residuals, probe.later[laid.rows]))
         moment = np.concatenate([products.moment, products.moment[:, :, 1:] + products.moment[:, :, :1]], axis=2)
         every = Products(products.whole, products.gram, moment)
         gain = every.gains()[0]

@@ -10,19 +10,20 @@ A ‖c⊥‖ exceeds the root of the threshold by 1.65 of that. c⊥ is that of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.injection import Probe
+from pipelines.model.diagnosis.injection import Hidden, Probe
 from pipelines.model.diagnosis.injection import smallest as smallest_hidden
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
-from pipelines.model.diagnosis.screen import Screened
+from pipelines.model.diagnosis.screen import Screened, for_each
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
@@ -46,11 +47,12 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
     """
     found, beyond = [], []
     named = {(e.effect.name, e.effect.joint) for e in probe.final.model.effects} if probe is not None else set()
-    for one, bound, chance in zip(screened, thresholds.gain, thresholds.own, strict=True):
-        effect = one.family.shapes[0]
-        if one.best_visibility < _VISIBLE or effect.evidence != "residual" or (one.cause, one.joint) in named:
-            continue
-        hidden = None if probe is None else smallest_hidden(one.family, float(bound), probe)
+    asked = [(one, float(bound), chance) for one, bound, chance in zip(screened, thresholds.gain, thresholds.own, strict=True)
+             if not (one.best_visibility < _VISIBLE or one.family.shapes[0].evidence != "residual"
+                     or (one.cause, one.joint) in named)]
+    smallest = {} if probe is None else _smallest({one.family: bound for one, bound, _ in asked}, probe)
+    for one, bound, chance in asked:
+        effect, hidden = one.family.shapes[0], smallest.get(one.family)
         limit = None
         if hidden is not None:
             limit = _limit(hidden.effect, hidden.amplitudes, revolute, one.best_visibility, "injected")
@@ -68,6 +70,14 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
                if hidden is None or hidden.found else "hidden in these logs it was found at no strength")
         beyond.append(NotTestable(effect.name, effect.joint, why, effect.experiment))
     return tuple(found), tuple(beyond)
+
+
+def _smallest(bounds: Mapping[Family, float], probe: Probe) -> dict[Family, Hidden | None]:
+    """Of each family, by two processes."""
+    _ = probe.draws, probe.absorbing  # once, before there are two
+    found = for_each(probe.data, lambda family: smallest_hidden(family, bounds[family], probe), tuple(bounds),
+                     (probe.fit, probe.final.fit), probe.final.model.arm)
+    return dict(zip(bounds, found, strict=True))
 
 
 def _limit(effect: Effect, amplitudes: Array, revolute: tuple[bool, ...], visibility: float,

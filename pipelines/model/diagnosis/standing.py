@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.calibration import CauseBound
 from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
-from pipelines.model.diagnosis.screen import Screened, products_of, screen, screen_event
+from pipelines.model.diagnosis.screen import Screened, for_each, products_apart, screen, screen_event
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
@@ -167,11 +167,15 @@ class Chance:
 
     def most(self, family: Family, weight: Array) -> float:
         """The most that any part gives it, with joints weighted by `weight`: a cause acts on its joint, or counts where most."""
-        if family not in self.known:
-            self.known[family] = (float(screen_event(self.data, self.fits[0], family, self.arm).gain.max()) if family.event
-                                  else self._gained(family))
+        self.ask([family])
         ratio = np.square(weight / self.weight)
         return self.known[family] * float(ratio.max() if family.joint is None else ratio[family.joint - 1])
+
+    def ask(self, families: Sequence[Family]) -> None:
+        """Several at once."""
+        new = [family for family in families if family not in self.known]
+        if new:
+            self.known.update(zip(new, for_each(self.data, self._gained, new, self.fits, self.arm), strict=True))
 
     @property
     def bounds(self) -> tuple[CauseBound, ...]:
@@ -179,12 +183,13 @@ class Chance:
         return tuple(CauseBound(family.cause, family.joint, np.nan, own) for family, own in self.known.items())
 
     def _gained(self, family: Family) -> float:
+        if family.event:
+            return float(screen_event(self.data, self.fits[0], family, self.arm).gain.max())
         most = 0.0
         for laid in lay_family(self.data, family, self.arm):
             width = laid.table.shape[1]
             for mask, fit in zip(self.masks, self.fits, strict=True):
-                moved = np.where(mask[laid.rows], laid.table, 0.0)
-                products = products_of(replace(laid, table=np.concatenate([laid.table, moved], axis=1)), fit, fit.residual[None])
+                products = products_apart(laid, fit, fit.residual[None], mask[laid.rows])
                 most = max(most, float((products.gains()[0] - products.first(width).gains()[0]).max()))
         return most
 
@@ -201,14 +206,15 @@ def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array,
         weight: (joints,) before and after alike.
     """
     fit = fit_changed(data, later, nominal, common, more, weight)
-    found = []
-    for family, asked in zip(families, wanted, strict=True):
-        if family.event and asked:  # it happened to the later logs, or did not
-            found.append(screen_event(data, fit, family, arm, np.where(later, fit.residual, 0.0)[None]))
-        elif asked:
-            found.append(_screened(data, later, fit, family, arm))
-        else:
-            found.append(Screened(family, np.zeros(1), family.shapes[:1], np.ones(1), 1.0, 0.0, 1))
+    happened = np.where(later, fit.residual, 0.0)[None]  # to the later logs, or not at all
+
+    def one(family: Family) -> Screened:
+        return (screen_event(data, fit, family, arm, happened) if family.event else _screened(data, later, fit, family, arm)).lean
+
+    asked = [family for family, is_asked in zip(families, wanted, strict=True) if is_asked]
+    seen = dict(zip(asked, for_each(data, one, asked, (fit,), arm), strict=True))
+    found = [replace(seen[family], family=family) if family in seen else
+             Screened(family, np.zeros(1), family.shapes[:1], np.ones(1), 1.0, 0.0, 1) for family in families]
     return found, bounds(families, wanted, fit, later, chance)
 
 
@@ -232,10 +238,8 @@ def _nothing(data: Data, reference: Mask) -> list[Mask]:
 def _screened(data: Data, later: Mask, fit: Fit, family: Family, arm: Arm) -> Screened:
     gained, eta, width = [], [], 0
     for laid in lay_family(data, family, arm):
-        changed = np.where(later[laid.rows], laid.table, 0.0)
-        both = replace(laid, table=np.concatenate([laid.table, changed], axis=1))
         width = laid.table.shape[1]
-        products = products_of(both, fit, fit.residual[None])
+        products = products_apart(laid, fit, fit.residual[None], later[laid.rows])
         one, (two, seen, _) = products.first(width).gains()[0], products.gains()
         gained.append(two[:, 0] - one[:, 0])
         eta.append(seen)
@@ -246,6 +250,7 @@ def _screened(data: Data, later: Mask, fit: Fit, family: Family, arm: Arm) -> Sc
 
 def bounds(families: Sequence[Family], wanted: Sequence[bool], fit: Fit, later: Mask, chance: Chance) -> Thresholds:
     """What a change has to exceed: of those wanted; infinite for the others."""
+    chance.ask([family for family, asked in zip(families, wanted, strict=True) if asked])
     longer = max(1.0, float(later.sum()) / max(float((~later).sum()) / 2.0, 1.0))
     own = np.array([(1.0 if family.event else longer) * chance.most(family, fit.weight) if asked else np.inf
                     for family, asked in zip(families, wanted, strict=True)])
