@@ -1,0 +1,104 @@
+"""What is said to be detectable is: a little above its limit a cause that the MuJoCo plant hides is found, well below it is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from pipelines.bench import experiments
+from pipelines.bench.fault import Fault
+from pipelines.bench.faults import make
+from pipelines.bench.machine import Machine, draw_machine
+from pipelines.bench.session import record
+from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.injection import _last_root
+from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.result import Detectable, Diagnosis
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from tests.diagnose.sessions import but
+
+FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
+SECONDS = 5.0
+
+
+@lru_cache(maxsize=4)
+def machine(number: int) -> Machine:
+    return draw_machine(number, "fault")
+
+
+def logs(number: int, *faults: Fault) -> Logs:
+    plans = [replace(experiments.excitation(machine(number), 1 + k, SECONDS, 1), name=f"excitation-{k + 1}",
+                     role="validate" if k else "identify") for k in range(2)]
+    return Logs.by_role(tuple(record(machine(number), faults, plans, 1)))
+
+
+@lru_cache(maxsize=4)
+def healthy(number: int, without: tuple[str, ...]) -> Diagnosis:
+    return diagnose(logs(number), settings(without))
+
+
+def settings(without: tuple[str, ...]) -> DiagnosisSettings:
+    return DiagnosisSettings(without=without, replicas=4, evidence=False, most=2)
+
+
+def limit(number: int, cause: str, joint: int, without: tuple[str, ...]) -> Detectable:
+    return next(one for one in healthy(number, without).detectable if (one.cause, one.joint) == (cause, joint))
+
+
+def named(number: int, cause: str, joint: int, part: float, without: tuple[str, ...]) -> bool:
+    """Whether the cause is found at `part` of its limit."""
+    there = limit(number, cause, joint, without)
+    full = make(cause, machine(number), joint, 1)
+    size = full.parameters()[there.parameter]
+    assert isinstance(size, float)
+    assert isinstance(there.smallest.value, float)
+    fault = full.scaled(part * there.smallest.value / abs(size))
+    found = diagnose(logs(number, fault), replace(settings(without), limits=False),
+                     calibration=healthy(number, without).calibration)
+    return (cause, joint) in [(one.cause, one.joint) for one in found.findings]
+
+
+@pytest.mark.parametrize(("cause", "joint"), [("cogging", 2), ("torque_offset", 3)])
+def test_above_its_limit_a_cause_is_found(cause: str, joint: int) -> None:
+    """With and against what the arm in order leaves."""
+    assert limit(7, cause, joint, FEW).way == "injected"
+    assert named(7, cause, joint, 1.5, FEW)
+    assert named(7, cause, joint, -1.5, FEW)
+
+
+def test_well_below_its_limit_it_is_not() -> None:
+    """The limit covers both signs: at 0.7 of it the worse one is not found."""
+    assert not all(named(7, "torque_offset", 3, part, FEW) for part in (0.7, -0.7))
+    assert not named(7, "cogging", 2, 0.4, FEW)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [7, 11])
+@pytest.mark.parametrize(("cause", "joint"), [
+    ("cogging", 1), ("cogging", 3), ("torque_offset", 2), ("quadratic_drag", 1), ("asymmetric_friction", 2), ("torque_gain", 3),
+    ("encoder_eccentricity", 1)])
+def test_limits_hold_with_the_whole_library(number: int, cause: str, joint: int) -> None:
+    assert named(number, cause, joint, 1.5, ())
+    assert not named(number, cause, joint, 0.3, ())
+
+
+def test_a_cogging_limit_says_at_which_order() -> None:
+    there = limit(7, "cogging", 2, FEW)
+    assert set(there.at) == {"order"}
+    assert there.smallest.unit == "N m"
+    assert 0.0 < there.visibility <= 1.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_from_which_strength_on_a_gain_stays_above_its_bound(seed: int) -> None:
+    """Beside the roots of the polynomial."""
+    a, b, c = np.random.default_rng(seed).standard_normal((3, 20))
+    a = np.abs(a)
+    found = _last_root(a, b, c)
+    for one, *line in zip(found, a, b, c, strict=True):
+        roots = np.roots([line[0], 2.0 * line[1], line[2]])
+        real = roots[np.abs(roots.imag) < 1e-12].real
+        assert one == pytest.approx(max([0.0, *real]), abs=1e-9)

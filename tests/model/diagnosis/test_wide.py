@@ -1,0 +1,59 @@
+"""Thresholds of causes of the whole arm: what sums over the rows of each joint say is what replicas fitted anew show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import Family, families, whole_motion
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
+from pipelines.model.diagnosis.screen import screen
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.wide import Wide
+from tests.model.diagnosis.arms import hidden
+
+TRIED = ("gravity_tilt", "link_length", "base_resonance", "contact")
+
+
+@pytest.fixture(scope="module")
+def there() -> tuple[Fit, Array, tuple[Family, ...], Arm]:
+    """A nominal model, four replicas of noise on its rows [N m], and the causes of the whole arm."""
+    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    arm = Exact.start(columns, fit).nominal
+    every = families(columns.laws, whole_motion(prepared.data), arm)
+    noise = np.random.default_rng(3).standard_normal((4, prepared.data.rows)) * fit.rms[prepared.data.joint]
+    return fit, noise, tuple(one for one in every if one.cause in TRIED), arm
+
+
+def left(fit: Fit, noise: Array, weight: Array) -> tuple[Fit, Array]:
+    fits = [fit_columns(fit.data, fit.table, one, weight) for one in noise]
+    return fits[0], np.array([one.residual for one in fits])
+
+
+@pytest.mark.parametrize("ratio", [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.0, 0.3, 2.0), (0.5, 5.0, 0.8)])
+def test_any_weights_give_what_fitting_anew_gives(there: tuple[Fit, Array, tuple[Family, ...], Arm],
+                                                  ratio: tuple[float, float, float]) -> None:
+    """Of causes that act always to the last digit; of an event its shapes are those of some weights, and no more are found."""
+    fit, noise, every, arm = there
+    first, residuals = left(fit, noise, fit.weight)
+    wide = Wide.of_twin(first, residuals, every, np.zeros(3), np.zeros(3), arm)
+    weight = fit.weight * np.array(ratio)
+    now, anew = left(fit, noise, weight)
+    wanted = np.array([one.gain.max() for one in screen(fit.data, now, every, arm, anew)])
+    found = wide.at(weight)[1]
+    for family, one, other in zip(every, found, wanted, strict=True):
+        assert one == pytest.approx(other, rel=0.3 if family.event else 1e-6)
+
+
+def test_longer_logs_give_chance_more_to_gain(there: tuple[Fit, Array, tuple[Family, ...], Arm]) -> None:
+    fit, noise, every, arm = there
+    wide = Wide.of_twin(*left(fit, noise, fit.weight), every, np.ones(3), np.ones(3), arm)
+    for one, other in zip(wide.at(fit.weight), replace(wide, longer=2.0).at(fit.weight), strict=True):
+        np.testing.assert_allclose(2.0 * one, other)
