@@ -15,9 +15,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pipelines.batch.figures import fitted, residuals
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
+from pipelines.log.result_figures import fitted, residuals
 from pipelines.log.stored_result import StoredResult, read_result
 from pipelines.report.comparison_report import Answer, Comparison, Figure, Residual, comparison_report
 from pipelines.report.report import Report

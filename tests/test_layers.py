@@ -24,7 +24,6 @@ LAYERS = {
     "pipelines.stage": 7,
     "pipelines.recall": 8,  # what a run may take back of its stages
     "pipelines": 9,
-    "pipelines.batch.figures": 1,  # reads stored results, and imports nothing
     "pipelines.stored": 10,
     "pipelines.installation": 10,
     "pipelines.batch": 10,  # calls stages, and nothing but the command line calls it

@@ -6,8 +6,8 @@
     pool.py       processes of this machine        server.py    what they are forked from
     cluster.py    a Dask cluster                   child.py     the process that each of its workers keeps
     folder.py     what stands where in the output  lock.py, signals.py
-    figures.py    what can be followed from item to item        drift.py, baseline.py    how it moved
-    summary.py    the report and the table         result.py, junit.py
+    drift.py, baseline.py    how figures moved     summary.py     the report and the table
+    result.py, junit.py      the same for machines
 
 An item's result is what its own command gives, whoever works on it, in whatever order, and after whatever interruption.
 """

@@ -17,7 +17,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.batch.figures import fitted, residuals
 from pipelines.batch.items import Item
 from pipelines.batch.plan import Plan, load_stage, read_plan
 from pipelines.batch.process import economise
@@ -26,6 +25,7 @@ from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, Rr
 from pipelines.log.files import PROVENANCE, hash_file
 from pipelines.log.guard import die_with_parent
 from pipelines.log.places import renamed, tilde
+from pipelines.log.result_figures import fitted, residuals
 from pipelines.stage import Inputs, Outcome, Request, Stage, run_stage
 
 __all__ = ["attempt", "begin", "undone"]

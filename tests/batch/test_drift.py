@@ -12,10 +12,10 @@ import pytest
 
 from pipelines.batch.baseline import against
 from pipelines.batch.drift import drift_of, from_others
-from pipelines.batch.figures import fitted, residuals
 from pipelines.batch.record import Record
 from pipelines.batch.result import Result
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
+from pipelines.log.result_figures import fitted, residuals
 from pipelines.log.result_schema import result_schema
 from tests.batch.conftest import Lay, obey
 
