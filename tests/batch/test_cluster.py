@@ -69,6 +69,42 @@ def test_a_cluster_gives_the_same_bytes_and_bears_the_same_misfortunes(lay: Lay,
         place: text for place, text in contents(here.folder).items() if not place.startswith("crashes")}
 
 
+@pytest.mark.row("P06", "P07")
+@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_batch_and_leaves_the_cluster_free(lay: Lay, tmp_path: Path, cluster: Cluster, number: signal.Signals,
+                                                           exit_code: int) -> None:
+    """P06: a summary within 5 s while both workers are at long items, which are dropped; the next batch has the workers at once."""
+    begun = [tmp_path / "begun-2", tmp_path / "begun-3"]
+    root = lay({"0": "value 0 std 0.1", "1": "value 1 std 0.1", "2": f"started {begun[0]} sleep 60",
+                "3": f"started {begun[1]} sleep 60", "4": "value 4 std 0.1"})
+    program = ("import sys\nfrom pathlib import Path\nfrom tests.batch.conftest import obey\n"
+               "sys.exit(obey(Path(sys.argv[1]), backend=sys.argv[2]).exit_code)\n")
+    with subprocess.Popen([sys.executable, "-c", program, str(root), cluster.address], text=True, stderr=subprocess.PIPE,
+                          env=os.environ | QUIET | {"PYTHONPATH": str(REPO)}, start_new_session=True) as process:
+        deadline = time.monotonic() + 60.0
+        while not all(path.exists() for path in begun):
+            assert process.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        began = time.monotonic()
+        os.killpg(process.pid, number)
+        _, said = process.communicate(timeout=60)
+        lasted = time.monotonic() - began
+    assert process.returncode == exit_code, said
+    assert lasted < 5.0
+    assert "Traceback" not in said
+    assert not list((tmp_path / "out").rglob(".rrrid-*"))
+    items = json.loads((tmp_path / "out/result.json").read_text())["items"]
+    codes = {item["name"]: (item["error"] or {}).get("code") for item in items}
+    assert codes == {"0": None, "1": None, "2": "RRID-P06", "3": "RRID-P06", "4": "RRID-P06"}
+    lay({"2": "fine", "3": "fine"})
+    began = time.monotonic()
+    resumed = obey(root, backend=cluster.address, resume=True)
+    assert time.monotonic() - began < 20.0
+    assert json.loads((resumed.folder / "provenance.json").read_text())["kept"] == 2
+    assert contents(resumed.folder) == contents(obey(root, out=tmp_path / "whole").folder)
+
+
 def test_no_item_is_lost_with_its_worker(lay: Lay, tmp_path: Path, cluster: Cluster) -> None:
     """One of two workers is killed while it is at an item: that one and those that waited for it are done by the other."""
     root = lay({f"{i}": f"value {i} std 0.1 started {tmp_path / 'started'} sleep 0.4" for i in range(6)})
