@@ -1,0 +1,157 @@
+"""Thresholds are stored with where they come from, give the same answer again without a twin, and are refused for other logs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from pipelines import diagnose
+from pipelines.errors import InputRejected, RrridError, UsageError
+from pipelines.log.files import hash_file
+from pipelines.model.diagnosis.calibrated import refuse_unfit
+from pipelines.model.diagnosis.calibration import Calibration
+from pipelines.model.diagnosis.calibration_file import calibration_schema, read_calibration, write_calibration
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.stage import Inputs, Outcome, Request, run_stage
+from tests.diagnose.sessions import but, healthy_again, session, written
+
+FEW = but("cogging", "torque_offset", "gravity_tilt")
+
+
+def asked(folder: Path, out: Path, **settings: object) -> Outcome[diagnose.Result]:
+    chosen = diagnose.Settings(**({"without": FEW, "replicas": 2, "most": 1} | settings))  # type: ignore[arg-type]
+    return run_stage(diagnose.STAGE, Request((folder,), out=out, no_report=True), chosen)
+
+
+def without_origin(value: Any) -> Any:
+    """A result without the words of where its thresholds come from."""
+    if isinstance(value, dict):
+        return {key: without_origin(one) for key, one in value.items() if key not in ("origin", "calibrated_with")}
+    return [without_origin(one) for one in value] if isinstance(value, list) else value
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Logs of an arm with cogging at joint 2, and their diagnosis with a twin."""
+    place = tmp_path_factory.mktemp("calibration")
+    asked(written(place / "logs", session("cogging", 2)), place / "first")
+    return place
+
+
+def test_stored_thresholds_give_the_same_answer(place: Path) -> None:
+    """Every figure and every series, the origin apart; and the calibration is handed on as it is."""
+    again = asked(place / "logs", place / "again", calibration=str(place / "first"))
+    first, second = (json.loads((place / name / "result.json").read_text()) for name in ("first", "again"))
+    assert without_origin(first) == without_origin(second)
+    for name in ("result.h5", "calibration.json", "calibration.h5"):
+        assert hash_file(place / "first" / name) == hash_file(place / "again" / name)
+    assert again.result.calibrated_with == ("excitation-1",)
+    assert {one.origin for one in again.result.thresholds} == {"2 replicas of the twin, stored by an earlier diagnosis"}
+    said = [text for section in again.report.sections for text in section.text]
+    assert any("An earlier diagnosis has stored them" in text for text in said)
+
+
+def test_the_file_says_where_thresholds_come_from(place: Path) -> None:
+    """Logs by their digests, model, replicas, seed and versions; and it is what its schema says."""
+    stored = json.loads((place / "first/calibration.json").read_text())
+    jsonschema.validate(stored, calibration_schema())
+    origin = stored["origin"]
+    assert (origin["kind"], origin["replicas"], origin["seed"]) == ("twin", 2, 1)
+    assert [len(log["sha256"]) for log in origin["logs"]] == [64]
+    assert len(origin["model"]) == 64
+    assert {"version", "numpy", "without"} <= set(origin)
+    assert {one["cause"] for one in stored["causes"]} == {"cogging", "torque_offset", "gravity_tilt"}
+    provenance = json.loads((place / "first/provenance.json").read_text())
+    assert provenance["outputs"]["calibration.json"] == hash_file(place / "first/calibration.json")
+
+
+def test_reading_gives_back_what_was_written(place: Path, tmp_path: Path) -> None:
+    made = read_calibration(place / "first")
+    write_calibration(tmp_path, made)
+    assert (tmp_path / "calibration.json").read_bytes() == (place / "first/calibration.json").read_bytes()
+    assert made.wide is not None
+    assert [one.joint for one in made.causes].count(None) == len(made.wide.causes)
+
+
+def test_other_logs_of_the_arm_need_no_twin(place: Path, tmp_path: Path) -> None:
+    """A fault found with the thresholds of other logs: torque offset at joint 3, where the calibrated arm had cogging."""
+    folder = written(tmp_path / "logs", session("torque_offset", 3))
+    found = asked(folder, tmp_path / "out", calibration=str(place / "first/calibration.json")).result
+    assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 3)]
+
+
+def test_with_reference_logs_what_chance_gives_is_stored(tmp_path: Path) -> None:
+    """The same answer again; and it is refused where there are none."""
+    logs = session("cogging", 2)
+    folder = written(tmp_path / "logs", (*logs, *healthy_again(session(seed=5))))
+    asked(folder, tmp_path / "first")
+    asked(folder, tmp_path / "again", calibration=str(tmp_path / "first"))
+    first, second = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("first", "again"))
+    assert without_origin(first) == without_origin(second)
+    jsonschema.validate(json.loads((tmp_path / "first/calibration.json").read_text()), calibration_schema())
+    with pytest.raises(UsageError, match="made with reference logs"):
+        asked(written(tmp_path / "alone", logs), tmp_path / "out", calibration=str(tmp_path / "first"))
+
+
+@pytest.mark.parametrize(("changed", "words"), [
+    ({"robot": "0" * 64}, "another robot"), ({"controllers": ("0" * 64,)}, "another controller"),
+    ({"experiments": ("free",)}, "experiments excitation"), ({"sample_time": 2e-3}, "sampled every 1 ms"),
+    ({"cutoff_hz": 7.0}, "--filter 7"), ({"laws": ()}, "friction laws"), ({"row_time": 0.5}, "an equation every"),
+    ({"speed": np.full(3, 0.01)}, "speed of joint 1"), ({"acceleration": np.full(3, 1e4)}, "acceleration of joint 2"),
+    ({"span": np.full(3, 50.0)}, "span of joint 3")])
+def test_it_is_refused_for_other_logs(changed: dict[str, Any], words: str, place: Path) -> None:
+    """C02, and what differs is named."""
+    made = read_calibration(place / "first")
+    made = replace(made, conditions=replace(made.conditions, **changed))
+    prepared = prepare(Logs.by_role(session("cogging", 2)), DiagnosisSettings())
+    with pytest.raises(UsageError, match=words) as refused:
+        refuse_unfit(made, prepared, (), "twin")
+    assert refused.value.code == "RRID-C02"
+
+
+def test_a_cause_that_it_does_not_know_is_asked_to_be_left_out(place: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="does not know quadratic_drag"):
+        asked(place / "logs", tmp_path / "out", without=but("cogging", "quadratic_drag"), calibration=str(place / "first"))
+
+
+def test_within_a_run_it_is_refused(place: Path) -> None:
+    """A run reads logs alone."""
+    with pytest.raises(UsageError, match="a run makes its own thresholds"):
+        diagnose.compute(Inputs(), diagnose.Settings(calibration=str(place / "first")))
+
+
+@pytest.mark.parametrize(("spoil", "code", "words"), [
+    (lambda stored: "{", "RRID-S19", "not complete JSON"), (lambda stored: "[]", "RRID-S19", "format"),
+    (lambda stored: json.dumps(stored | {"format_version": 2}), "RRID-F11", "version 2"),
+    (lambda stored: json.dumps({key: value for key, value in stored.items() if key != "weight"}), "RRID-S19", "weight"),
+    (lambda stored: json.dumps(stored | {"weight": [1.0, -1.0, 1.0]}), "RRID-S19", "no positive numbers"),
+    (lambda stored: json.dumps(stored | {"floor": [1.0]}), "RRID-S19", "numbers of joints"),
+    (lambda stored: json.dumps(stored | {"wide": None}), "RRID-S19", "whole arm are missing"),
+    (lambda stored: json.dumps(stored | {"causes": [stored["causes"][0] | {"own": None}]}), "RRID-S19", "no number")])
+def test_what_is_no_calibration_is_rejected(spoil: Any, code: str, words: str, place: Path, tmp_path: Path) -> None:
+    stored = json.loads((place / "first/calibration.json").read_text())
+    (tmp_path / "calibration.json").write_text(spoil(stored))
+    (tmp_path / "calibration.h5").write_bytes((place / "first/calibration.h5").read_bytes())
+    with pytest.raises(InputRejected, match=words) as refused:
+        read_calibration(tmp_path)
+    assert refused.value.code == code
+
+
+def test_one_that_is_missing_or_was_changed_is_told(place: Path, tmp_path: Path) -> None:
+    with pytest.raises(RrridError) as missing:
+        read_calibration(tmp_path)
+    assert missing.value.code == "RRID-C04"
+    for name in ("calibration.json", "calibration.h5", "provenance.json"):
+        (tmp_path / name).write_bytes((place / "first" / name).read_bytes())
+    assert isinstance(read_calibration(tmp_path), Calibration)
+    (tmp_path / "calibration.json").write_text((place / "first/calibration.json").read_text() + "\n")
+    with pytest.raises(RrridError) as changed:
+        read_calibration(tmp_path)
+    assert changed.value.code == "RRID-F05"
