@@ -20,18 +20,22 @@ _MOST = 200  # orders on the grid
 _PEAKS = 24
 _ROUNDED = 1e-11  # difference of orders that is rounding
 _TURN = 0.98 * 2.0 * math.pi  # [rad]
+_APART = 0.25  # of what the range tells apart: nearer to a whole order it is 45 degrees off that at either end at most
 
 
 @dataclass(frozen=True)
 class Cogging(Effect):
     """τ = Σ A_m sin(m k q + φ_m), m = 1, 2, 3: the same at all speeds and in both directions.
 
-    The columns are sin mkq, cos mkq; their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks for m = 1 alone. The order k
-    need not be whole: a gear wheel may stand between motor and joint. On a prismatic joint it counts waves in 2π metres.
+    The columns are sin mkq, cos mkq; their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks for m = 1 alone. Magnets, slots
+    and teeth that turn with the joint are so many a turn: k is whole. What turns behind a gear has a k of its own; on a prismatic
+    joint it counts waves in 2π metres.
     """
 
     order: float = 12.0  # k [1/rev of the joint]
     harmonics: int = 3  # how many m there are
+    whole: bool = False  # whether k is held as it is
+    apart: float = 0.0  # how far a k that is not held is from a whole number at least
 
     name = "cogging"
     title = "Cogging"
@@ -75,13 +79,22 @@ class Cogging(Effect):
         return table
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """From the fewest waves in the range travelled, in steps of half of what it can tell apart: whole ones over many turns."""
+        """From the fewest waves in the range travelled, in steps of half of what it can tell apart: whole ones over many turns.
+
+        Where the joint closes its circle, whole orders are held: as long as waves of other orders are missing from the model, they
+        would pull a free one off its place. From one on, for what comes back to where it began is no spring.
+        """
         travel = max(float(np.ptp(self.own(motion.q))), 1e-3)
+        if travel > _TURN and arm.robot.revolute[self._index]:
+            step = 0.5 if travel < 4.0 * math.pi else 1.0
+            for order in np.arange(1.0, _HIGHEST, step).tolist():
+                whole = order.is_integer()
+                yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel * whole)
+            return
         lowest = max(1.0, _WAVES * 2.0 * math.pi / travel)
         step = max(math.pi / travel, (_HIGHEST - 1.0) / _MOST)
         highest = max(_HIGHEST, 4.0 * lowest)
-        start = lowest if travel < 4.0 * math.pi else 1.0
-        for order in np.arange(start, highest, step if travel < 4.0 * math.pi else 1.0).tolist():
+        for order in np.arange(lowest, highest, step).tolist():
             yield replace(self, order=order, harmonics=1)
 
     def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
@@ -105,8 +118,19 @@ class Cogging(Effect):
         """Magnets, teeth and poles each have their own order; a full turn tells them apart, on less any curve is a few waves."""
         return float(np.ptp(self.own(motion.q))) > _TURN
 
+    @property
+    def free(self) -> tuple[str, ...]:
+        return () if self.whole else super().free
+
     def full(self) -> Self:
         return replace(self, harmonics=3)
+
+    def forms(self) -> tuple[Self, ...]:
+        """Behind a gear."""
+        return (replace(self, whole=False),) if self.whole else ()
+
+    def possible(self, values: Values) -> bool:
+        return super().possible(values) and (self.whole or abs(self.order - round(self.order)) >= self.apart)
 
     def own_load(self, values: Values) -> OwnLoad:
         shaped = self.at(values)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import comb
 from typing import Self
 
 import numpy as np
@@ -15,6 +15,7 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["Spring"]
 
 _DEGREE = 5
+_TURN = 0.98 * 2.0 * math.pi  # [rad]
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth")  # of x, x², …
 
 
@@ -28,6 +29,7 @@ class Spring(Effect):
     """
 
     degree: int = _DEGREE
+    highest: int = _DEGREE  # of the form that a finding is refitted with
 
     name = "spring"
     title = "Spring"
@@ -51,10 +53,13 @@ class Spring(Effect):
         return self.on_own_row(arm, q, np.ones_like(q), *(q**power for power in range(2, self.degree + 1)))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        yield replace(self, degree=1)
+        """Straight alone where a joint without limits closes its circle: what comes back to where it began there is a wave."""
+        low, high = arm.robot.joints[self._index].position
+        closed = math.isinf(high - low) and float(np.ptp(self.own(motion.q))) > _TURN and arm.robot.revolute[self._index]
+        yield replace(self, degree=1, highest=1 if closed else self.highest)
 
     def full(self) -> Self:
-        return replace(self, degree=_DEGREE)
+        return replace(self, degree=self.highest)
 
     def own_load(self, values: Values) -> OwnLoad:
         slope, constant, *rest = self.amplitudes(values).tolist()
@@ -83,7 +88,7 @@ class Spring(Effect):
 def _about(polynomial: Sequence[float], point: float) -> list[float]:
     """Coefficients of the same polynomial in powers of q - point; both from the constant upwards."""
     size = len(polynomial)
-    return [sum(comb(i, m) * polynomial[i] * point**(i - m) for i in range(m, size)) for m in range(size)]
+    return [sum(math.comb(i, m) * polynomial[i] * point**(i - m) for i in range(m, size)) for m in range(size)]
 
 
 def _zero(polynomial: Sequence[float]) -> float:

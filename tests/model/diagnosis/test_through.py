@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
@@ -38,8 +40,12 @@ _FINE, _RATE, _SECONDS = 8000, 400, 10.0
 _LIBRARY = but("cogging", "torque_lag", "drive_lag", "time_delay", "torque_offset", "asymmetric_friction")
 
 
-def turned(seed: int) -> ExperimentLog:
-    """A rotor that turns once in ten seconds, unevenly: its torque, and what a low-pass of 0.1 s leaves of it in the log."""
+def turned(seed: int, waves: Mapping[float, float] = {_ORDER: 0.04}, lag: float = _LAG) -> ExperimentLog:
+    """A rotor that turns once in ten seconds, unevenly: its torque, and what a low-pass leaves of it in the log.
+
+    Args:
+        waves: amplitude [N m] of each order.
+    """
     rng = np.random.default_rng(seed)
     t = np.arange(int(_FINE * _SECONDS)) / _FINE
     rates, phases = 2.0 * np.pi * np.array([0.7, 1.6, 3.1, 5.3]), rng.uniform(0.0, 2.0 * np.pi, 4)
@@ -47,8 +53,9 @@ def turned(seed: int) -> ExperimentLog:
     q = 0.65 * t + sum(a / w * np.sin(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
     dq = 0.65 + sum(a * np.cos(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
     ddq = sum(-a * w * np.sin(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
-    tau = _INERTIA * ddq + 0.01 * np.tanh(30.0 * dq) + 0.004 * dq + 0.04 * np.sin(_ORDER * q + 0.4)
-    late = lsim(([1.0], [_LAG, 1.0]), tau, t, X0=[tau[0] * _LAG])[1]
+    tau = _INERTIA * ddq + 0.01 * np.tanh(30.0 * dq) + 0.004 * dq
+    tau += sum(amplitude * np.sin(order * q + 0.4) for order, amplitude in waves.items())
+    late = lsim(([1.0], [lag, 1.0]), tau, t, X0=[tau[0] * lag])[1] if lag else tau
     every = _FINE // _RATE
     seen = (t[::every], (q[::every] + rng.normal(0.0, 1e-6, len(t[::every])))[:, None],
             (late[::every] + rng.normal(0.0, 2e-5, len(t[::every])))[:, None])

@@ -1,0 +1,41 @@
+"""Waves on a closed circle are whole: a free order is pulled off its place by waves that are not found yet."""
+
+from __future__ import annotations
+
+from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.search import Case, Found, search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from tests.diagnose.sessions import but
+from tests.model.diagnosis.test_through import turned
+
+_LIBRARY = but("cogging", "spring", "torque_offset")
+
+
+def searched(waves: dict[float, float], most: int) -> Found:
+    prepared = prepare(Logs((turned(1, waves, 0.0), turned(2, waves, 0.0))), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    every = families(columns.laws, whole_motion(prepared.data), model.arm, _LIBRARY)
+    return search(Case(prepared.data, None, model, fit.weight, every, None), most)
+
+
+def orders(found: Found) -> list[float]:
+    return [one.values["order"] for one in found.final.model.effects]
+
+
+def test_an_order_stays_whole_while_its_neighbours_are_missing() -> None:
+    """Twelve slots and 14 magnets, the greater half of them found."""
+    assert orders(searched({12.0: 0.04, 13.0: 0.02, 14.0: 0.015}, 1)) == [12.0]
+
+
+def test_every_wave_of_a_turn_is_found() -> None:
+    """The first wave too: a joint without limits that has come round has no spring."""
+    assert sorted(orders(searched({1.0: 0.01, 7.0: 0.04, 12.0: 0.02}, 3))) == [1.0, 7.0, 12.0]
+
+
+def test_behind_a_gear_an_order_is_what_it_is() -> None:
+    found = searched({12.37: 0.04}, 1)
+    assert abs(orders(found)[0] - 12.37) < 0.01
