@@ -14,17 +14,22 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Stribeck"]
 
+_HELD = {"tail": 0.0, "exponent": 2.0}
+_NONE = 1e-6  # of a tail
+
 
 @dataclass(frozen=True)
 class Stribeck(Effect):
-    """τ = A exp(-(v/v_s)²) tanh(w v), beside Coulomb and viscous friction.
+    """τ = A (1 + (e^p - 1) |v/v_s|^n)^(-1/p) tanh(w v), beside Coulomb and viscous friction; 1/e of it is left at v_s.
 
-    Armstrong-Hélouvry, Dupont & Canudas de Wit 1994, eq. (7), with exponent 2. Three sigmoids of mixed signs have the same
-    hump, `three_sigmoid`.
+    As p goes to 0 it is A exp(-|v/v_s|^n) tanh(w v): Armstrong-Hélouvry, Dupont & Canudas de Wit 1994, eq. (7); n = 1 is
+    Tustin 1947. p = 1, n = 2 is Hess & Soom 1990. Three sigmoids of mixed signs have the same hump, `three_sigmoid`.
     """
 
     speed: float = 0.1  # v_s [rad/s]
     sharpness: float = 100.0  # w [s/rad]
+    tail: float = 0.0  # p, held where it is 0
+    exponent: float = 2.0  # n, held where it is 2
 
     name = "stribeck"
     title = "Stribeck friction"
@@ -32,6 +37,8 @@ class Stribeck(Effect):
         Quantity("amplitude", "N m", 0.0, 20.0, "friction at standstill above that at speed"),
         Quantity("speed", "rad/s", 1e-3, 5.0, "speed over which it falls", shape=True),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
+        Quantity("tail", "1", 0.0, 3.0, "how long it lasts beyond its speed: not at all, or as a power of speed", shape=True),
+        Quantity("exponent", "1", 0.0, 4.0, "how abruptly it falls at its speed", shape=True),
     )
     signature = "A hump of the friction curve at low speed, the same in both directions."
     explanation = "Below a certain speed the surfaces touch; above it a film of lubricant carries them."
@@ -43,7 +50,9 @@ class Stribeck(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)
-        return self.on_own_row(arm, np.exp(-np.square(v / self.speed)) * np.tanh(self.sharpness * v))
+        over = np.abs(v / self.speed) ** self.exponent
+        left = np.exp(-over) if self.tail < _NONE else (1.0 + math.expm1(self.tail) * over) ** (-1.0 / self.tail)
+        return self.on_own_row(arm, left * np.tanh(self.sharpness * v))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """v_s from the slowest speeds of the motion to a third of the fastest, always slower than where the sign has changed."""
@@ -51,6 +60,17 @@ class Stribeck(Effect):
         for speed in np.geomspace(2.0 / self.sharpness, max(fast / 3.0, 4.0 / self.sharpness), 8).tolist():
             yield replace(self, speed=float(np.clip(speed, 1e-3, 5.0)))
 
+    @property
+    def free(self) -> tuple[str, ...]:
+        return tuple(name for name in super().free if getattr(self, name) != _HELD.get(name))
+
+    def forms(self) -> tuple[Self, ...]:
+        return replace(self, tail=0.5), replace(self, exponent=1.5)
+
     def own_load(self, values: Values) -> OwnLoad:
-        amplitude, sharpness, narrow = self.amplitudes(values).item(), values["sharpness"], 1.0 / values["speed"] ** 2
-        return lambda angle, speed: amplitude * math.exp(-narrow * speed * speed) * math.tanh(sharpness * speed)
+        amplitude, sharpness, slow = self.amplitudes(values).item(), values["sharpness"], 1.0 / values["speed"]
+        p, n = values["tail"], values["exponent"]
+        if p < _NONE:
+            return lambda angle, speed: amplitude * math.exp(-abs(slow * speed) ** n) * math.tanh(sharpness * speed)
+        wide, power = math.expm1(p), -1.0 / p
+        return lambda angle, speed: amplitude * (1.0 + wide * abs(slow * speed) ** n) ** power * math.tanh(sharpness * speed)
