@@ -49,6 +49,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         if fitted is None and gain <= thresholds.gain[k] and len(rows) >= _SHOWN:
             continue
         reason = ("accepted" if accepted else "below its threshold" if gain <= thresholds.gain[k] else
+                  "comes again at other moments" if not one.stands_out else
                   "weaker than others" if fitted is None else
                   "impossible numbers" if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else "explains less than the one accepted")

@@ -25,6 +25,7 @@ from pipelines.model.diagnosis.kept import together
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.through import passed_through
 from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.body import Motion
 
 __all__ = ["INVISIBLE", "Screened", "for_each", "gains_of", "products_apart", "products_of", "screen", "screen_event",
            "screen_family"]
@@ -36,6 +37,7 @@ Mask = npt.NDArray[np.bool_]
 INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of rounding and interpolation
 _USUAL = 0.25  # of the shapes reach less
 _EVENTS = 3  # residuals that an event is looked for in
+_MOMENTS, _AGAIN = 2, 1.0 / 3.0  # that an event may have; of its gain, that any further moment gains at most
 _SPREAD = 1e-4  # of the largest: directions of c⊥ that are left alone
 
 
@@ -51,12 +53,18 @@ class Screened:
     reach: float  # what the first of its columns, one unit of it, adds to the residual: √ of the gain, in most shapes or more
     width: int  # columns of one shape
     logs: tuple[int | None, ...] = ()  # of an event: number of the log it happened in
+    again: float = 0.0  # of an event: what the third best moment gains of the first residual, as a share of the best
     amplitude: float | None = None  # of the first residual, where the whole model was fitted through the effect
 
     @property
     def lean(self) -> Screened:
         """Without its family, which has hundreds of shapes: what another process need not send."""
         return replace(self, family=Family(self.family.cause, self.family.joint, ()))
+
+    @property
+    def stands_out(self) -> bool:
+        """Of an event, whether it happened once or twice: what a law does not have to the last comes again at every reversal."""
+        return not self.family.event or self.again <= _AGAIN
 
     @property
     def cause(self) -> str:
@@ -89,6 +97,7 @@ def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arra
     """What happens once: looked for in each log apart, where the residual is largest."""
     wanted = fit.residual[None] if residuals is None else residuals[:_EVENTS]
     reach, width = [0.0], 0
+    moments: list[tuple[float, float, float]] = []  # gain, start and end [s], of the first residual
     best: list[tuple[float, Effect, float, int | None]] = [(0.0, family.shapes[0], 1.0, None)] * len(wanted)
     for k, residual in enumerate(wanted):
         left = list(data.split(residual / fit.weights))
@@ -104,12 +113,30 @@ def screen_event(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Arra
                 gains, seen, size = gains_of(replace(laid, rows=start + laid.rows), fit, residual[None])
                 reach.append(float(np.median(size)))
                 width = laid.table.shape[1]
+                if k == 0:
+                    moments += [(float(gain), *_when(shapes[laid.first + i], one.motion)) for i, gain in enumerate(gains[:, 0])]
                 top = int(np.argmax(gains[:, 0]))
                 if gains[top, 0] > best[k][0]:
                     best[k] = (float(gains[top, 0]), shapes[laid.first + top], float(seen[top]), data.first + place)
     eta = [one[2] for one in best]
     return Screened(family, np.array([one[0] for one in best]), tuple(one[1] for one in best), np.array(eta), max(eta),
-                    float(np.median(reach)), width, tuple(one[3] for one in best))
+                    float(np.median(reach)), width, tuple(one[3] for one in best), _again(moments))
+
+
+def _when(effect: Effect, motion: Motion) -> tuple[float, float]:
+    """When it acts [s], from the start of its log."""
+    acting = effect.acting(motion)
+    t = motion.t if acting is None else motion.t[acting]
+    return (float(t[0] - motion.t[0]), float(t[-1] - motion.t[0])) if len(t) else (0.0, 0.0)
+
+
+def _again(moments: Sequence[tuple[float, float, float]]) -> float:
+    """What the third best moment gains, as a share of the best; the same time in several logs is one moment."""
+    apart: list[tuple[float, float, float]] = []
+    for gain, start, end in sorted(moments, reverse=True):
+        if all(end <= first or start >= last for _, first, last in apart):
+            apart.append((gain, start, end))
+    return apart[_MOMENTS][0] / max(apart[0][0], 1e-300) if len(apart) > _MOMENTS else 0.0
 
 
 def screen_family(data: Data, fit: Fit, family: Family, arm: Arm, residuals: Array | None = None) -> Screened:

@@ -166,7 +166,7 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
             or (case.again and one.shape[0].again(case.data.logs[0].motion))]
     order = sorted((one for one in able if one.gain[0] >= _LEAST * now.rss), key=lambda one: -one.gain[0])
-    able = [one for one in order if one.family.shapes[0].evidence in case.nameable]
+    able = [one for one in order if one.family.shapes[0].evidence in case.nameable and one.stands_out]
     asked = {id(one) for one in wanted}
     great = [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0] and id(one) in asked]
     error = held_out(now, case) if great else np.nan
@@ -204,7 +204,8 @@ def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
         judged, thresholds = case.changed(now, [bool(one.gain[0] >= _CLOSE**2 * most) for one in screened])
     else:
         thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
-    passed = tuple(one for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True) if seen.gain[0] > bound)
+    passed = tuple(one for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True)
+                   if seen.gain[0] > bound and one.stands_out)
     return _Gate(judged, thresholds, passed)
 
 
