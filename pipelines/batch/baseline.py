@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pipelines.batch.drift import LIMIT
@@ -42,38 +42,54 @@ def _robot(baseline: ModelFile) -> str:
     return str(tomllib.loads(baseline.robot).get("name", ""))
 
 
-def known_figures(baseline: ModelFile) -> dict[str, tuple[float, float]]:
-    """Name of a figure, as records have it -> (value, std) of the baseline."""
-    known = {p.name: (p.value, p.std) for p in baseline.base_parameters if p.std is not None and p.visible}
+def known_figures(baseline: ModelFile, names: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """Those of `names`, which are of figures as records have them, that the baseline knows -> its (value, std).
+
+    Of a run, which has a figure from stage after stage, the last one counts: what `extend` fitted has the causes in it, which
+    those before it lack.
+    """
+    known = _spelled(baseline)
+    last: dict[int, tuple[str, tuple[float, float]]] = {}
+    for name in names:
+        words = name.split(" ")
+        place = next((known[end] for k in range(len(words)) if (end := " ".join(words[k:])) in known), None)
+        if place is not None:
+            last[place[0]] = name, place[1]
+    return dict(last.values())
+
+
+def _spelled(baseline: ModelFile) -> dict[str, tuple[int, tuple[float, float]]]:
+    """Every way in which results name a figure of the baseline, before which the stage may stand -> its number, (value, std)."""
+    known = {p.name: (i, (p.value, p.std)) for i, p in enumerate(baseline.base_parameters) if p.std is not None and p.visible}
+    number = len(baseline.base_parameters)
     for effect in (*baseline.friction, *baseline.effects):
         for name, stored in effect.parameters.items():
+            number += 1
             if stored.std is not None:
-                known[_figure(effect.effect, effect.joint, name)] = (stored.value, stored.std)
+                beside = "" if effect.joint is None else f"{effect.joint}:"
+                in_words = "" if effect.joint is None else f"joint {effect.joint} "
+                for spelling in (f"{effect.effect}:{beside}{name}", f"{effect.effect} {in_words}{name.replace('_', ' ')}"):
+                    known[spelling] = number, (stored.value, stored.std)
     return known
-
-
-def _figure(effect: str, joint: int | None, parameter: str) -> str:
-    place = "" if joint is None else f"{joint}:"
-    return f"{effect}:{place}{parameter}"
 
 
 def _moved(record: Record, baseline: ModelFile) -> Iterator[str]:
     """The figures beyond the baseline's, in words."""
-    known = known_figures(baseline)
-    # Of a run's stages the last one counts: what `extend` fitted has the causes in it, which those before it lack.
-    last = {place: name for name in record.figures if (place := _place(name, known)) is not None}
-    shared = [(name, *known[place]) for place, name in last.items()]
-    limit = _limit(len(shared))
-    for name, value, std in shared:
+    # The causes that were found are held against the baseline one by one, below.
+    found = [f"{finding['cause']} joint {finding['joint']} " for finding in record.findings]
+    known = {name: figure for name, figure in known_figures(baseline, record.figures).items()
+             if not any(cause in name for cause in found)}
+    limit = _limit(len(known))
+    for name, (value, std) in known.items():
         new, own, unit = record.figures[name]
-        away = (new - value) / math.hypot(own, std)
+        away = _change(name, unit, new, value) / math.hypot(own, std)
         if abs(away) > limit:
             yield f"{name} {new:.4g} {unit}, {value:.4g} before ({away:+.1f} std)"
 
 
-def _place(name: str, known: Mapping[str, Any]) -> str | None:
-    """The baseline's name for a record's figure: of a run, the stage's name stands before it."""
-    return next((place for place in (name, name.rpartition(" ")[2]) if place in known), None)
+def _change(name: str, unit: str, new: float, old: float) -> float:
+    """How far a figure moved; a phase comes back to where it was after a whole turn."""
+    return math.remainder(new - old, 2.0 * math.pi) if unit == "rad" and "phase" in name else new - old
 
 
 def _limit(numbers: int) -> float:
@@ -105,7 +121,7 @@ def _otherwise(place: str, parameters: Mapping[str, Any], known: StoredEffect) -
     for name, stored in shared:
         new = parameters[name]
         std = math.hypot(new["std"] or 0.0, stored.std or 0.0)
-        change = new["value"] - stored.value
+        change = _change(name, new["unit"], new["value"], stored.value)
         if abs(change) > limit * std:
             yield f"{place} {name} {new['value']:.4g} {new['unit']}, {stored.value:.4g} before"
 

@@ -119,6 +119,33 @@ def test_a_baseline_accepts_what_is_known() -> None:
     assert against(_found(0.5, joint=3), other) == _found(0.5, joint=3)
 
 
+def test_friction_is_held_against_the_baseline_by_any_name() -> None:
+    """A run says "extend model viscous joint 1 …", estimate-bps "viscous:1:…": moved, it is found, and told once."""
+    viscous = StoredEffect("viscous", 1, {"coefficient_2": StoredValue(0.6, 0.01, "N m s/rad", "fitted")})
+    baseline = dataclasses.replace(_baseline(), friction=(viscous,))
+    for name in ("viscous:1:coefficient_2", "extend model viscous joint 1 coefficient 2"):
+        for value, status in ((0.61, "ok"), (0.9, "found")):
+            record = Record("a", "a", "ok", 0, figures={"estimate-bps p1": (9.0, STD, ""), "extend p1": (1.0, STD, "kg m^2"),
+                                                        name: (value, 0.01, "N m s/rad")})
+            judged = against(record, baseline)
+            assert judged.status == status
+            assert judged.verdict.count("coefficient") == (status == "found")
+    stronger = _found(0.6)
+    told = dataclasses.replace(stronger, figures={**stronger.figures, "extend model cogging joint 2 amplitude": (0.6, 0.01, "N m")})
+    assert against(told, baseline).verdict.count("amplitude") == 1
+
+
+def test_a_phase_is_the_same_after_a_whole_turn() -> None:
+    """3.1 rad and -3.1 rad are 0.08 rad apart."""
+    effect = StoredEffect("cogging", 2, {"phase": StoredValue(3.1, 0.05, "rad", "fitted")})
+    finding = {"cause": "cogging", "joint": 2, "parameters": {"phase": {"value": -3.1, "std": 0.05, "unit": "rad"}}}
+    record = Record("a", "a", "found", 1, findings=(finding,), accepts=True)
+    baseline = dataclasses.replace(_baseline(), effects=(effect,))
+    assert against(record, baseline).status == "ok"
+    other = {"cause": "cogging", "joint": 2, "parameters": {"phase": {"value": -2.0, "std": 0.05, "unit": "rad"}}}
+    assert against(dataclasses.replace(record, findings=(other,)), baseline).status == "found"
+
+
 def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Path) -> None:
     """--check with --baseline: 0 while every figure is within its uncertainty, 1 when one item's is beyond."""
     from pipelines.log.model_file import write_model
