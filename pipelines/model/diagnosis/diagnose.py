@@ -25,13 +25,14 @@ from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.compliance import Compliance, untold
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import evidence, floors_of
-from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import Settled, settled, unnamed
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, Rejected, ResidualRms, Threshold
 from pipelines.model.diagnosis.search import Case, Explored, Step, clean, gap_first, gives_way, held_out_left, provisional, search

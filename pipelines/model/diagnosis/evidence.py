@@ -13,7 +13,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.calibration import Floors
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Refined
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Curve, Evidence, Proof, Spectrum
 from pipelines.model.diagnosis.signals import binned, signals
 from pipelines.signal.spectra import welch

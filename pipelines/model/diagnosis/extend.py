@@ -23,11 +23,12 @@ from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.beside import Held, acted, judged
 from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
 from pipelines.model.diagnosis.carried import carried
-from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, sure
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.search import Case, Found, held_out_left, search

@@ -12,11 +12,11 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.beside import Part
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
-from pipelines.model.diagnosis.exact import Refined
 from pipelines.model.diagnosis.gains import Simulation, gain_of, torque_gain, worse_log
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.joined import once_each
 from pipelines.model.diagnosis.numbers import acting, parameters
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Value
 from pipelines.model.diagnosis.search import Found, Step, Tried, held_out_left
 from pipelines.model.diagnosis.verdict import Ruling, explained

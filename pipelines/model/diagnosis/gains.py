@@ -20,7 +20,7 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Refined
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import BeforeAfter, Gain, TipError, TorqueGain
 from pipelines.model.diagnosis.search import held_out_left
 from pipelines.model.estimation.logs import Motions

@@ -28,8 +28,8 @@ from pipelines.fit.bootstrap import apart_in, drawn
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Refined, refine
 from pipelines.model.diagnosis.nominal import Fit
+from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.screen import INVISIBLE, Products, products_apart, products_of
 from pipelines.model.effects.base import Effect
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.diagnosis.exact import Refined
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.thresholds import Thresholds

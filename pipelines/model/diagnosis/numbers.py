@@ -12,7 +12,8 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.exact import Named, Refined, number_moved
+from pipelines.model.diagnosis.exact import Named, number_moved
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Value
 
 __all__ = ["acting", "parameters", "standard_deviations"]

@@ -20,9 +20,10 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Exact, Refined, refine
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import Fit, orthonormal
+from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import INVISIBLE, Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin

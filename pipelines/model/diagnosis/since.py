@@ -18,10 +18,11 @@ from pipelines.model.diagnosis.absorbed import Absorbed, absorbed
 from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.candidates import families, lay_one, whole_motion
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import fit_columns, fit_nominal, law_slopes, rows_of
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Standing, Value
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Case

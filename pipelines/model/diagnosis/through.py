@@ -13,9 +13,10 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Exact, Refined
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.nominal import Fit, orthonormal
 from pipelines.model.diagnosis.record import passed_rows
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.effects.base import Effect
 
 __all__ = ["beyond_first_order", "passed_through"]

@@ -1,0 +1,134 @@
+"""Fit an exact model: every number at once.
+
+    done = refine(model, data, weight)                    Gauss-Newton over everything
+    done.residual, done.fit.basis                         what is left, and what the model can imitate
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.linear import covariance, solved, visibility
+from pipelines.model.diagnosis.nominal import Fit, rigid_rows
+from pipelines.model.diagnosis.slopes import Which, slopes_of
+
+__all__ = ["Refined", "refine"]
+
+_STEPS = 8
+_SHARES = (1.0, 0.4, 0.1)  # of a step, until one leaves less
+_RIDGES = (0.0, 1e-4, 1e-2)  # of unit columns: two numbers that do nearly the same would be moved far apart
+_GAIN = 1e-5  # of the squared residual: less is no progress
+_INVISIBLE = 1e-3  # η below which a number is one that the others are as well
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A model fitted exactly."""
+
+    model: Exact
+    data: Data
+    weight: Array  # (joints,)
+    left: Array  # (rows,) [N m]
+    slopes: Array  # (numbers, rows) unweighted
+    names: tuple[Which, ...]  # of the slopes behind those of the base
+
+    @cached_property
+    def weights(self) -> Array:
+        return np.asarray(self.weight[self.data.joint])
+
+    @property
+    def residual(self) -> Array:
+        """(rows,) weighted."""
+        return np.asarray(self.left * self.weights)
+
+    @cached_property
+    def fit(self) -> Fit:
+        """As a linear fit around the solution: what is orthogonal to it, the model cannot imitate by moving a little."""
+        return Fit(self.data, self.slopes, self.left, self.weight, np.zeros(len(self.slopes)), self.data.y - self.left)
+
+    @cached_property
+    def rss(self) -> float:
+        return float(self.residual @ self.residual)
+
+    @property
+    def rms(self) -> Array:
+        return self.data.rms(self.left)
+
+    def of_effect(self, place: int) -> list[int]:
+        """Which slopes belong to effect number `place`."""
+        first = len(self.model.beta)
+        return [first + k for k, (kind, which, _) in enumerate(self.names) if kind == 1 and which == place]
+
+    def covariance(self) -> Array:
+        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for."""
+        return covariance(self.slopes * self.weights, self.residual)
+
+
+def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target: Array | None = None) -> Refined:
+    """Gauss-Newton with halved steps until the squared weighted residual no longer falls."""
+    with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
+        return _refined(model, data, weight, steps, data.y if target is None else target)
+
+
+def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
+    weights = weight[data.joint]
+    rigid = rigid_rows(data, model.columns)
+    left = y - model.torque(data)
+    now = float(np.sum(np.square(left * weights)))
+    slopes, names = slopes_of(model, data, rigid)
+    for _ in range(steps):
+        better = False
+        for ridge in _RIDGES:
+            shift = _within(model, names, slopes * weights, left * weights, ridge)
+            for share in _SHARES:
+                there = model.moved(share * shift, names)
+                other = y - there.torque(data)
+                power = float(np.sum(np.square(other * weights)))
+                if power < now:
+                    better = True
+                    break
+            if better:
+                break
+        if not better:
+            break
+        gained, model, left, now = 1.0 - power / now, there, other, power
+        slopes, names = slopes_of(model, data, rigid)
+        if gained < _GAIN:
+            break
+    return Refined(model, data, weight, left, slopes, tuple(names))
+
+
+def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float) -> Array:
+    """The step for every number; the others do without one that would leave its range, and stays at its end, and without one of
+    an effect that the rest of the model does as well: rounding would move it anywhere."""
+    first = len(model.beta)
+    own = [first + k for k, (kind, _, _) in enumerate(names) if kind == 1]
+    stuck = [k for k, eta in zip(own, visibility(table, own), strict=True) if eta < _INVISIBLE]
+    shift = _without(table, y, ridge, stuck)
+    beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
+    return _without(table, y, ridge, [*stuck, *beyond]) if beyond else shift
+
+
+def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
+    free = np.ones(len(table), dtype=bool)
+    free[stuck] = False
+    shift = np.zeros(len(table))
+    shift[free] = solved(table[free], y, ridge)
+    return shift
+
+
+def _beyond(model: Exact, which: Which, by: float) -> bool:
+    """Whether a shape stands at the end of its range, and `by` points out of it."""
+    kind, place, name = which
+    if name.isdigit():
+        return False
+    effect = model.columns.laws[place] if kind == 0 else model.effects[place].effect
+    quantity = next(q for q in effect.parameters if q.name == name)
+    here = float(getattr(effect, name))
+    return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)

@@ -1,0 +1,98 @@
+"""Slopes of an exact model's torque by every number of it.
+
+    slopes, names = slopes_of(model, data, rigid)
+
+Those by what is linear are columns: of the nominal model, and of effects that only add theirs. Those by any other number of an
+effect are differences of the torque.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact, Named, number_moved
+from pipelines.model.diagnosis.nominal import law_rows, law_slopes
+from pipelines.model.diagnosis.record import recorded
+from pipelines.model.rigid.body import Motion
+
+__all__ = ["Which", "slopes_of"]
+
+Which = tuple[int, int, str]  # 0 a law, 1 an effect; its place; the number of an amplitude, or the name of a shape
+
+_DIFFERENCE = 1e-3  # of a number
+
+
+def slopes_of(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[Which]]:
+    """(numbers, rows) slopes of the torque by every number, those of `rigid` columns first; and which they are behind the base."""
+    if any(one.effect.passing for one in model.effects):
+        return _slopes_through(model, data)
+    laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
+    bent, which = law_slopes(data, model.columns, model.beta)
+    names = [(0, place, name) for place, name in which]
+    more, core = list(bent), model.core
+    here = model.core_torque(data, core) if core else np.zeros(0)
+    for place, one in enumerate(model.effects):
+        own = model.columns_of(data, one) if place >= core else None
+        alone = here if own is None else one.effect.amplitudes(one.values) @ own
+        for name, step in _steps(one):
+            names.append((1, place, name))
+            if own is not None and name.isdigit():  # it is linear in its amplitudes
+                more.append(own[int(name)][None])
+                continue
+            moved = number_moved(one, name, step)
+            if own is not None:
+                there = model.added(data, moved)
+            else:
+                effects = (*model.effects[:place], moved, *model.effects[place + 1:core])
+                there = replace(model, effects=effects).core_torque(data, core)
+            more.append((there - alone)[None] / step)
+    return np.concatenate([rigid, *laws, *more]), names
+
+
+def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
+    """The same where all torque passes through an effect, a lag of the record: what is linear passes as well."""
+    columns, arm, kept = model.columns, model.arm, list(model.columns.kept)
+
+    def linear(motion: Motion) -> Array:
+        rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
+        return recorded(arm, np.concatenate([rigid, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion)
+
+    def alone(one: Named) -> Array:
+        return data.lay_each(lambda log, motion: recorded(
+            arm, one.effect.at(one.values).columns(motion, model.nominal) @ np.array(one.amplitudes), motion)
+            if one.log in (None, log) else np.zeros_like(motion.q))
+
+    here, more = model.torque(data), []
+    names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
+    for place, _, name in names:
+        step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])
+        more.append((model.moved(step, [(0, place, name)]).torque(data) - here)[None] / _DIFFERENCE)
+    for place, one in enumerate(model.effects):
+        for name, size in _steps(one):
+            names.append((1, place, name))
+            there = number_moved(one, name, size)
+            if one.effect.adds:
+                more.append((alone(there) - alone(one))[None] / size)
+            else:
+                effects = (*model.effects[:place], there, *model.effects[place + 1:])
+                more.append((replace(model, effects=effects).torque(data) - here)[None] / size)
+    return np.concatenate([data.lay(linear), *more]), names
+
+
+def _steps(one: Named) -> list[tuple[str, float]]:
+    """Numbers of an effect and how far each is moved for its slope."""
+    found = []
+    if one.free_amplitudes:
+        size = max((abs(a) for a in one.amplitudes), default=0.0) or 1e-3
+        found = [(str(k), _DIFFERENCE * max(abs(a), 0.1 * size)) for k, a in enumerate(one.amplitudes)]
+    for q in one.free_shapes:
+        here = abs(float(getattr(one.effect, q.name)))
+        wide = min(q.high - q.low, 1e2)
+        step = _DIFFERENCE if q.low > 0.0 else _DIFFERENCE * max(here, 1e-2 * wide)
+        top = float(getattr(one.effect, q.name)) >= q.high
+        found.append((q.name, -step if top else step))
+    return found
