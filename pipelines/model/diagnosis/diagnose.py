@@ -189,7 +189,7 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     parts = responded.parts
     held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
     named = _strongest((*held, *findings(found, ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks,
-                                         chosen.evidence)))
+                                         chosen.evidence, case.beside)))
     if held:
         ruling = replace(ruling, verdict="cause")
     thresholds = last.thresholds

@@ -8,11 +8,12 @@ from typing import Literal
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.arm import Arm
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.beside import Part
+from pipelines.model.diagnosis.chain import gains
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
-from pipelines.model.diagnosis.gains import Simulation, gain_of, torque_gain, worse_log
+from pipelines.model.diagnosis.gains import Simulation, torque_gain, worse_log
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.joined import once_each
 from pipelines.model.diagnosis.numbers import acting, parameters
@@ -30,22 +31,21 @@ _TELLS = 9.0  # times its variance, that the power of the predicted part must ha
 
 
 def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prepared: Prepared, nominal: Array, floor: Array,
-             blocks: int, draw: bool) -> tuple[Finding, ...]:
+             blocks: int, draw: bool, beside: Sequence[Acting] = ()) -> tuple[Finding, ...]:
     """Each named cause, the one that explains most first; the final model holds them, in the order of their steps.
 
     Args:
         simulated: the nominal arm and that after each step.
         nominal: (joints,) [N m] what the nominal model leaves.
+        beside: effects that the rows are without.
     """
     covariance = found.final.covariance()
-    out = []
-    for place, k in enumerate(ruling.named):
-        step = found.steps[k]
-        if step.best is None:
-            continue
-        gain = gain_of(torque_gain(step.before, step.best.done, prepared.judge, blocks), simulated[k], simulated[k + 1])
-        out.append(_finding(found, step, step.best, place, covariance, nominal, floor, gain, draw))
-    return once_each(sorted(out, key=lambda one: -one.explained))
+    steps = [found.steps[k] for k in ruling.named]
+    taken = [explained(step.before.rms, step.best.done.rms, nominal, floor) if step.best else 0.0 for step in steps]
+    order = sorted(range(len(steps)), key=lambda place: -taken[place])
+    worth = gains(found, ruling.named, order, simulated, prepared, beside, blocks) if order else []
+    return once_each(_finding(found, steps[place], best, place, covariance, nominal, floor, gain, draw)
+                     for place, gain in zip(order, worth, strict=True) if (best := steps[place].best) is not None)
 
 
 def held_finding(part: Part, nominal: Array, floor: Array, draw: bool) -> Finding:

@@ -1,0 +1,48 @@
+"""What each cause is worth in the order in which causes are told: each refitted with those before it, the last with all.
+
+    gains(found, named, order, simulated, prepared, beside, blocks)        of the causes in `order`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from pipelines.model.arm import Acting
+from pipelines.model.diagnosis.beside import acted
+from pipelines.model.diagnosis.gains import Simulation, gain_of, simulation_errors, torque_gain
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.refit import Refined, refine
+from pipelines.model.diagnosis.result import Gain
+from pipelines.model.diagnosis.search import Found
+
+__all__ = ["gains"]
+
+
+def gains(found: Found, named: Sequence[int], order: Sequence[int], simulated: Sequence[Simulation], prepared: Prepared,
+          beside: Sequence[Acting], blocks: int) -> list[Gain]:
+    """One a cause, in `order`.
+
+    Args:
+        named: numbers of the steps whose causes the final model holds.
+        order: places in `named`, as they are told.
+        simulated: the nominal arm and that after each step: simulated anew only where the order is another, or a step was dropped.
+        beside: effects that the rows are without, and the arms that are simulated are not.
+    """
+    as_found = list(range(len(order)))
+    if list(order) == as_found == list(named):
+        models = [found.nominal, *(found.steps[k + 1].before for k in as_found[:-1]), found.final]
+        runs = list(simulated[:len(models)])
+    else:
+        models = [found.nominal, *(_with(found, order[:count]) for count in range(1, len(order))), found.final]
+        runs = simulation_errors([acted(one.model.arm, beside) for one in models], prepared.judging or prepared.motions)
+    torques = [torque_gain(before, after, prepared.judge, blocks) for before, after in pairwise(models)]
+    return [gain_of(torque, before, after) for torque, (before, after) in zip(torques, pairwise(runs), strict=True)]
+
+
+def _with(found: Found, places: Sequence[int]) -> Refined:
+    """The final model with some of its effects only, in the order in which they act, fitted anew."""
+    final = found.final
+    model = replace(final.model, effects=tuple(final.model.effects[place] for place in sorted(places)))
+    return refine(model, final.data, final.weight)
