@@ -9,6 +9,7 @@ The numbers are the base parameters, amplitudes and shapes of the friction laws,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -22,7 +23,7 @@ from pipelines.model.diagnosis.nominal import Fit, effect_rows, law_rows, nomina
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 
-__all__ = ["Exact", "Named", "number_moved"]
+__all__ = ["Exact", "Named", "law_of", "number_moved"]
 
 _FARTHEST = 0.5  # of ln shape, a step
 
@@ -34,6 +35,7 @@ class Named:
     effect: Effect
     amplitudes: tuple[float, ...]
     log: int | None = None  # number of the log it belongs to, where it happened once; None: it acts in all
+    tied: tuple[str, ...] = ()  # shapes that are those of the friction at its joint
 
     @property
     def values(self) -> dict[str, float]:
@@ -41,7 +43,7 @@ class Named:
 
     @property
     def free_shapes(self) -> list[Quantity]:
-        return [q for q in self.effect.parameters if q.name in self.effect.free]
+        return [q for q in self.effect.parameters if q.name in self.effect.free and q.name not in self.tied]
 
     @property
     def free_amplitudes(self) -> bool:
@@ -73,7 +75,8 @@ class Exact:
 
     def with_effect(self, effect: Effect, amplitudes: Array, log: int | None = None) -> Exact:
         given = amplitudes if effect.fixed_amplitudes is None else effect.fixed_amplitudes
-        return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log)))
+        tied = tuple(name for name in effect.shared if law_of(self.columns.laws, effect, name) is not None)
+        return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log, tied)))
 
     def without(self, place: int) -> Exact:
         return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
@@ -140,7 +143,21 @@ class Exact:
                 laws[place] = _shape_moved(laws[place], name, by)
             else:
                 effects[place] = number_moved(effects[place], name, by)
+        effects = [_following(one, laws) for one in effects]
         return Exact(replace(self.columns, laws=tuple(laws)), self.beta + shift[:first], tuple(effects))
+
+
+def law_of(laws: Sequence[Effect], effect: Effect, name: str) -> int | None:
+    """Which of the laws at the joint of `effect` has a shape `name`."""
+    return next((k for k, law in enumerate(laws) if law.joint == effect.joint
+                 and any(q.shape and q.name == name for q in law.parameters)), None)
+
+
+def _following(one: Named, laws: Sequence[Effect]) -> Named:
+    """The effect with what it shares with the friction at its joint."""
+    at = {name: law_of(laws, one.effect, name) for name in one.tied}
+    shape: dict[str, Any] = {name: getattr(laws[k], name) for name, k in at.items() if k is not None}
+    return replace(one, effect=replace(one.effect, **shape)) if shape else one
 
 
 def _shape_moved(effect: Effect, name: str, by: float) -> Effect:

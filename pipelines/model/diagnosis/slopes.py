@@ -14,7 +14,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Exact, Named, number_moved
+from pipelines.model.diagnosis.exact import Exact, Named, law_of, number_moved
 from pipelines.model.diagnosis.nominal import law_rows, law_slopes
 from pipelines.model.diagnosis.record import recorded
 from pipelines.model.rigid.body import Motion
@@ -50,6 +50,13 @@ def slopes_of(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[Which
                 effects = (*model.effects[:place], moved, *model.effects[place + 1:core])
                 there = replace(model, effects=effects).core_torque(data, core)
             more.append((there - alone)[None] / step)
+        for name in one.tied:  # it moves with the friction at its joint
+            law = (0, law_of(model.columns.laws, one.effect, name), name)
+            moved = number_moved(one, name, _DIFFERENCE)
+            if law in names:
+                there = model.added(data, moved) if own is not None else replace(
+                    model, effects=(*model.effects[:place], moved, *model.effects[place + 1:core])).core_torque(data, core)
+                more[names.index(law)] = more[names.index(law)] + (there - alone)[None] / _DIFFERENCE
     return np.concatenate([rigid, *laws, *more]), names
 
 

@@ -36,6 +36,7 @@ class AsymmetricFriction(Effect):
     remedy = "Look at preload and seals; what stays, compensate with coefficients of its own in each direction."
     experiment = "Hold still for two seconds in several positions, then move at several equal speeds in both directions."
     twins = ("torque_offset", "spring")
+    shared = ("sharpness",)
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

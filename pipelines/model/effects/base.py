@@ -23,6 +23,7 @@ What a search over effects asks, so that it need not know any of them:
     full                 the form a finding is refitted with: more harmonics, a cubic term. `shapes` are the screening form
     forms                other laws of the same cause, in place of that form where they leave decidedly less
     free                 the non-linear numbers that an exact refit may move; the others are discrete, or follow from these
+    shared               non-linear numbers that are those of the friction at its joint: one surface changes sign over one speed
     fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
     possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
     per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
@@ -185,6 +186,7 @@ class Effect(ABC):
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
     evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
+    shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
     from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
     last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
     passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it

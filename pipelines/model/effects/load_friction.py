@@ -31,6 +31,7 @@ class LoadFriction(Effect):
     remedy = "Check the lubrication of the gear; compensate it with the predicted torque."
     experiment = "Move the joint at one speed in both directions under three loads: three postures, or payloads."
     twins = ("torque_gain", "position_friction")
+    shared = ("sharpness",)
     friction = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -51,6 +51,7 @@ class PositionFriction(Effect):
     remedy = "Look for wear, a bent shaft or cables that rub; compensate it with the angle."
     experiment = "Turn the joint slowly through its whole range in both directions, at two speeds."
     twins = ("cogging", "load_friction", "viscous_drift")
+    shared = ("sharpness",)
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

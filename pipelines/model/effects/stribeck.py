@@ -45,6 +45,7 @@ class Stribeck(Effect):
     remedy = "Compensate it in the feed-forward, and avoid slow motion; another lubricant moves the hump."
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
     twins = ("quadratic_drag", "three_sigmoid", "concave_friction", "presliding")
+    shared = ("sharpness",)
     friction = True
     from_motion = True
 
