@@ -36,19 +36,22 @@ from pipelines.model.diagnosis.thresholds import Thresholds
 __all__ = ["bounds_of", "conditions_of", "origin_of", "refuse_unfit", "thresholds_of"]
 
 _ALIKE = 1.5  # times the speed, acceleration or range of a joint
+_OTHER = 1.5  # times the thresholds, for other logs: of four excitations of one arm nine of ten were less than 1.8 times another's
 _SAME = 0.02  # of the rate of rows and of the low-pass
 _AGAIN = "diagnose without --calibration, which makes one for these logs"
 
 
-def thresholds_of(made: Calibration, families: Sequence[Family], data: Data, given: bool) -> Thresholds:
+def thresholds_of(made: Calibration, families: Sequence[Family], prepared: Prepared, given: bool) -> Thresholds:
     """For these families; longer logs give chance more to gain, shorter ones are taken to give as much.
 
     Args:
-        given: whether the calibration is that of earlier logs.
+        given: whether the calibration was stored; for other logs than its own it is taken with care.
     """
     there = {(one.cause, one.joint): one for one in made.causes}
     own = [there[family.cause, family.joint] for family in families]
-    longer = np.maximum(1.0, _rows(data) / made.conditions.rows)
+    longer = np.maximum(1.0, _rows(prepared.data) / made.conditions.rows)
+    if given and not {one.sha256 for one in made.origin.logs} <= {digest_of(recording(log)) for log, _ in prepared.motions}:
+        longer = _OTHER * longer
     scale = np.array([longer.max() if one.joint is None else longer[one.joint - 1] for one in families])
     wide = made.wide and replace(made.wide, longer=float(longer.max()))
     origin = f"{made.origin.replicas} replicas of the twin{', stored by an earlier diagnosis' if given else ''}"

@@ -119,7 +119,7 @@ def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen
     made = _calibrated(prepared, case, rough, chosen) if given is None else given
     if made is None:
         return _Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None)
-    return _Floored(made.floor, "twin", thresholds_of(made, case.families, prepared.data, given is not None), made)
+    return _Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made)
 
 
 def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> Calibration | None:

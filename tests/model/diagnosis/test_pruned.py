@@ -1,0 +1,110 @@
+"""What is dropped again after a search, on made-up numbers: mended shapes, causes that others do as well, held-out alarms."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis import pruned
+from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
+
+FLOOR = np.array([0.01, 0.01, 0.01])
+
+
+def left(*rms: float) -> Any:
+    return SimpleNamespace(rms=np.array(rms))
+
+
+def searched(nominal: Any, *causes: tuple[Effect, Any]) -> Any:
+    """A search that accepted these causes, with what each left."""
+    before, steps = nominal, []
+    for effect, after in causes:
+        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=after, effect=effect)))
+        before = after
+    model = SimpleNamespace(effects=tuple(SimpleNamespace(effect=effect, log=None) for effect, _ in causes))
+    return SimpleNamespace(nominal=nominal, steps=steps, final=SimpleNamespace(rms=before.rms, model=model))
+
+
+def effect(name: str, joint: int) -> Effect:
+    return find_effect(name)(joint=joint)
+
+
+def twins() -> tuple[str, str]:
+    """Two causes that can be mistaken for each other at one joint, whichever they are."""
+    from pipelines.model.effects import all_effects
+
+    named = {kind.name: kind for kind in all_effects() if kind.scope == "joint"}
+    return next((one, other) for one in sorted(named) for other in named[one].twins if other in named)
+
+
+def test_what_only_mends_the_shape_of_an_earlier_cause_is_no_cause() -> None:
+    """The second takes off a hundredth of what the nominal model leaves, and is a twin of the first at its joint."""
+    one, other = twins()
+    found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.05, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
+    assert pruned._apart(found, [0, 1]) == [0]
+
+
+def test_a_twin_that_takes_off_much_is_one_of_its_own() -> None:
+    one, other = twins()
+    found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.3, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
+    assert pruned._apart(found, [0, 1]) == [0, 1]
+
+
+def test_the_same_at_another_joint_is_no_twin() -> None:
+    one, other = twins()
+    found = searched(left(0.5, 0.05, 0.01), (effect(one, 1), left(0.01, 0.05, 0.01)), (effect(other, 2), left(0.01, 0.01, 0.01)))
+    assert pruned._apart(found, [0, 1]) == [0, 1]
+
+
+@pytest.mark.parametrize(("held_out", "verdict"), [((0.011, 0.012, 0.01), "nothing-wrong"), ((0.01, 0.2, 0.01), "unknown")])
+def test_nothing_wrong_is_not_said_where_held_out_logs_show_something(held_out: tuple[float, ...], verdict: str,
+                                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    """Six times the floor at joint 2 is far above it; a fifth above it is other motion."""
+    monkeypatch.setattr(pruned, "held_out_left", lambda done, judge, blocks: np.array(held_out))
+    judge = SimpleNamespace(rms=lambda rms: rms)
+    case: Any = SimpleNamespace(judge=judge, changed=None, blocks=10)
+    ruling = pruned._elsewhere(Ruling("nothing-wrong", (), ""), searched(left(0.01, 0.01, 0.01)), case, FLOOR, True)
+    assert ruling.verdict == verdict
+    assert ("joint 2" in ruling.reason) == (verdict == "unknown")
+
+
+@pytest.mark.parametrize(("judge", "changed", "known"), [
+    (None, None, True),  # blocks of the fitted logs: the same motion
+    (object(), object(), True),  # what has changed
+    (object(), None, False)])  # nobody knows the floor
+def test_held_out_motion_is_asked_only_where_it_can_tell(judge: Any, changed: Any, known: bool) -> None:
+    case: Any = SimpleNamespace(judge=judge, changed=changed, blocks=10)
+    said = Ruling("nothing-wrong", (), "")
+    assert pruned._elsewhere(said, searched(left(0.01, 0.01, 0.01)), case, FLOOR, known) is said
+
+
+def test_the_cause_that_is_missed_least_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the first the residual grows by ten thresholds, without the second by half of one: the second is idle."""
+    found = searched(left(0.5, 0.05, 0.01), (effect("cogging", 1), left(0.01, 0.05, 0.01)),
+                     (effect("torque_offset", 2), left(0.01, 0.01, 0.01)))
+    final: Any = SimpleNamespace(rss=100.0, weight=np.ones(3))
+    without = {(1,): SimpleNamespace(rss=200.0), (0,): SimpleNamespace(rss=105.0)}
+    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last: without[tuple(kept)])
+    monkeypatch.setattr(pruned, "held_out", lambda done, case: done.rss)
+    families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="torque_offset", joint=2))
+    thresholds = SimpleNamespace(at=lambda weight: SimpleNamespace(gain=np.array([10.0, 10.0])))
+    case: Any = SimpleNamespace(families=families, thresholds=thresholds)
+    assert pruned._idle(found, [0, 1], case, final) == 1
+    thresholds.at = lambda weight: SimpleNamespace(gain=np.array([10.0, 1.0]))
+    assert pruned._idle(found, [0, 1], case, final) is None
+
+
+def test_a_cause_that_brings_nothing_held_out_is_idle_however_much_it_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = searched(left(0.5, 0.05, 0.01), (effect("cogging", 1), left(0.01, 0.05, 0.01)),
+                     (effect("torque_offset", 2), left(0.01, 0.01, 0.01)))
+    final: Any = SimpleNamespace(rss=100.0, weight=np.ones(3))
+    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last: SimpleNamespace(rss=1000.0, kept=kept))
+    monkeypatch.setattr(pruned, "held_out", lambda done, case: 2.0 if getattr(done, "kept", None) == [1] else 1.0)
+    families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="torque_offset", joint=2))
+    case: Any = SimpleNamespace(families=families, thresholds=None)
+    assert pruned._idle(found, [0, 1], case, final) == 1
