@@ -9,8 +9,6 @@ Source   Kostić et al. 2004, Section IV.C.3, eq. (22), Figs. 8 and 9; Swevers e
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,11 +22,12 @@ from pipelines.log.files import write_log
 from pipelines.log.model_file import read_model
 from pipelines.log.recording.controller_side import controller_table, write_controller_table
 from pipelines.log.recording.recipe import Recipe
-from pipelines.log.results import json_text
+from pipelines.log.results import json_text, stored_result
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
+from pipelines.model.excitation.allowed import refuse_strange
 from pipelines.model.excitation.apart import Pair, told_apart
 from pipelines.model.excitation.bounds import parse_bounds
 from pipelines.model.excitation.design import Design, Effort, design
@@ -122,7 +121,7 @@ def read(request: Request, settings: Settings) -> Inputs:
         path = find_recipe(settings.recipe)
         recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)
         sources.append(path)
-    modes = tuple(found for path in request.paths if (found := _frf_result(path)) is not None)
+    modes = tuple(found for path in request.paths if (found := stored_result(path, "frf")) is not None)
     logs = _earlier(request, settings, robot)
     bounds = None
     if settings.bounds is not None:
@@ -149,18 +148,6 @@ def _arm(model: str | None, robot: RobotDescription) -> Arm | None:
     return Arm.from_links(robot) if all(joint.link is not None for joint in robot.joints) else None
 
 
-def _frf_result(path: Path) -> Mapping[str, Any] | None:
-    """result.json of `frf`, named itself or in the folder named."""
-    file = path / "result.json" if path.is_dir() else path
-    if file.name != "result.json" or not file.is_file():
-        return None
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except ValueError:
-        return None
-    return found if isinstance(found, dict) and found.get("command") == "frf" else None
-
-
 def _earlier(request: Request, settings: Settings, robot: RobotDescription) -> Inputs:
     """The logs among the paths; a folder that holds none may hold a result of frf."""
     paths = tuple(path for path in request.paths if path.name != "result.json")
@@ -169,7 +156,7 @@ def _earlier(request: Request, settings: Settings, robot: RobotDescription) -> I
     try:
         found = read_logs(replace(request, paths=paths, robot=None), settings)
     except NothingMatched:
-        if any(_frf_result(path) is not None for path in paths):
+        if any(stored_result(path, "frf") is not None for path in paths):
             return Inputs()
         raise
     for opened in found.logs:
@@ -191,7 +178,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                          remedy=f"one of: {', '.join(PURPOSES)}; the writing task comes with its own command")
     if len(settings.keep_out) % 2:
         raise UsageError("C02", "bands to stay out of are pairs of frequencies", where="--keep-out", remedy="write 5,8 [Hz]")
-    _refuse_strange(settings)
+    refuse_strange(settings)
     pair = _pair(settings, given.robot)
     mode = first_mode(given.modes)
     wishes = replace(settings.wishes, top_hz=None if mode is None else mode / settings.mode_factor)
@@ -225,26 +212,6 @@ def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
                          remedy="leave it out")
     (a, first), (b, second) = (wanted_cause(text, robot.revolute, "--tell-apart") for text in settings.tell_apart)
     return Pair(a, b, (first, second))
-
-
-def _refuse_strange(settings: Settings) -> None:
-    """C02 for a number that no design can have."""
-    positive = (("--seconds", settings.seconds), ("--evaluations", settings.evaluations), ("--cond-max", settings.cond_max),
-                ("--periods", settings.periods), ("--tip-speed", settings.tip_speed), ("sample_time", settings.sample_time),
-                ("torque_share", settings.torque_share), ("mode_factor", settings.mode_factor),
-                *(("noise", value) for value in settings.noise or ()))
-    for where, value in positive:
-        if value is not None and not 0.0 < value < math.inf:
-            raise UsageError("C02", f"{value:g} is not positive and finite", where=where, remedy="give a positive number")
-    if not all(map(math.isfinite, (*(settings.home or ()), *(settings.tip_box or ()), *settings.keep_out))):
-        raise UsageError("C02", "a number is not finite", where="--home, --tip-box, --keep-out", remedy="give finite numbers")
-    if any(low > high for low, high in zip(settings.keep_out[::2], settings.keep_out[1::2], strict=False)):
-        raise UsageError("C02", "a band ends below where it begins", where="--keep-out", remedy="write 5,8 [Hz]")
-    if settings.torque_share > 1.0:
-        raise UsageError("C02", f"{settings.torque_share:g} of the torque limits is more than there is", where="torque_share",
-                         remedy="give 1 at most")
-    if settings.seed < 0:
-        raise UsageError("C02", f"the seed {settings.seed} is negative", where="--seed", remedy="give 0 or more")
 
 
 def _result(task: Task, found: Design, settings: Settings, given: Material, after: tuple[str, ...], mode: float | None) -> Result:

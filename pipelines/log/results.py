@@ -26,7 +26,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.chunks import store
 from pipelines.log.experiment import Array
 
-__all__ = ["FLAT", "NOT_STORED", "decode", "encode", "json_text", "read_foreign_series", "read_series",
+__all__ = ["FLAT", "NOT_STORED", "decode", "encode", "json_text", "read_foreign_series", "read_series", "stored_result",
            "write_series"]
 
 NOT_STORED: Final[Mapping[str, object]] = {"stored": False}
@@ -49,6 +49,18 @@ def json_text(value: Any) -> str:
     text (C07) become question marks."""
     text = json.dumps(value, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def stored_result(path: Path, command: str) -> Mapping[str, Any] | None:
+    """The object of the result.json of `command`, named itself or in the folder named; None where there is none."""
+    file = path / "result.json" if path.is_dir() else path
+    if file.name != "result.json" or not file.is_file():
+        return None
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) and found.get("command") == command else None
 
 
 def _encode(value: Any, path: str, series: dict[str, Array]) -> Any:
