@@ -21,7 +21,8 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.calibration_file import calibration_files, read_calibration, write_calibration
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.gates import examined, logs_of_roles
+from pipelines.model.diagnosis.gates import logs_of_roles
+from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.simulated import with_simulation
@@ -105,16 +106,17 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has "
                          f"{chosen.identify[0].n_joints}", where="--model", remedy="give a model of this robot")
     given.tell("examining the logs")
-    said = examined((*chosen.identify, *chosen.validate, *chosen.reference, *chosen.frf), settings.allow_mismatch)
+    memory = Memory()
+    said = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
                                settings.decimate, settings.min_speed, settings.seed)
-    found = diagnose(chosen, engine, given.arm, given.tell, given.calibration)
+    found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)
     given.tell("simulating what was found")
     found = with_simulation(found, (*chosen.validate, *chosen.identify))
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
-                  without=settings.without, doctor=said,
+                  without=settings.without, doctor=said, memory=memory,
                   calibrated_with=() if given.calibration is None else tuple(one.name for one in given.calibration.origin.logs))
 
 

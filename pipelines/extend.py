@@ -24,7 +24,8 @@ from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.extend import Extended, Wanted, extend
-from pipelines.model.diagnosis.gates import examined, logs_of_roles
+from pipelines.model.diagnosis.gates import logs_of_roles
+from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.settings import DiagnosisSettings
@@ -100,10 +101,11 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     wanted = [*_kept(given.arm), *(Wanted(*wanted_cause(text, robot.revolute)) for text in settings.causes)]
     if isinstance(inputs.material, Diagnosed) and not settings.causes:
         wanted = _found(inputs.material, inputs.label)
-    said = examined((*chosen.identify, *chosen.validate, *chosen.reference, *chosen.frf), settings.allow_mismatch)
+    memory = (inputs.material.memory if isinstance(inputs.material, Diagnosed) else None) or Memory()  # none of one taken back
+    said = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
                                min_speed=settings.min_speed)
-    found = extend(chosen, tuple({one.place: one for one in wanted}.values()), engine, given.arm, given.tell)
+    found = extend(chosen, tuple({one.place: one for one in wanted}.values()), engine, given.arm, given.tell, memory)
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),

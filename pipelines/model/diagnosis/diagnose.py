@@ -28,8 +28,9 @@ from pipelines.model.diagnosis.evidence import evidence, floors_of
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.injection import Probe
-from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
+from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.limits import detectable, not_testable
+from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import Settled, settled, unnamed
 from pipelines.model.diagnosis.refit import Refined
@@ -48,27 +49,29 @@ Tell = Callable[[str], None]
 
 
 def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None,
-             calibration: Calibration | None = None) -> Diagnosis:
+             calibration: Calibration | None = None, memory: Memory | None = None) -> Diagnosis:
     """What the nominal model of an arm gets wrong in `logs`, and why.
 
     Args:
         arm: whose friction laws the nominal model takes, fitted anew; Coulomb and viscous friction where left out.
         tell: progress, in words.
         calibration: thresholds that an earlier diagnosis has stored, instead of a twin.
+        memory: of what was worked out of these logs, for an extension after it.
 
     Raises:
         InputRejected: no log can be fitted (S01, T04, T08).
         UsageError: C02, the calibration is not for these logs.
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
-    prepared = prepare(logs, chosen, arm)
+    memory = memory or Memory()
+    prepared = memory.prepared(logs, chosen, arm)
     plain = _case(prepared, chosen)
     if logs.frf:
         say("looking at the frequency responses")
     first = responding(plain, prepared, chosen.without)
     if first.held.prepared.reference is not None:
         say("comparing with the reference logs")
-        return _changed(first, first.held.prepared.reference, chosen, calibration)
+        return _changed(first, first.held.prepared.reference, chosen, calibration, memory)
     case, prepared = _nameable(first.held.case, first.stiff), first.held.prepared
     say("looking for the greatest causes")
     rough = provisional(case)
@@ -143,13 +146,16 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
         floors_of(twin.data, twin.fits[0].left) if chosen.evidence else ())
 
 
-def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given: Calibration | None) -> Diagnosis:
+def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given: Calibration | None,
+             memory: Memory) -> Diagnosis:
     """What is different since the reference logs."""
     logs = [log for log, _ in first.held.prepared.referring]
     if given is not None:
         refuse_unfit(given, first.held.prepared, first.held.case.families, "reference logs", logs)
     known = None if given is None else (given.weight, {(one.cause, one.joint): one.own for one in given.causes})
-    since = since_reference(first.held.prepared, reference, chosen, first.held.case.beside, known)
+    taken = first.held.case.beside
+    since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else
+             memory.since(first.held.prepared, chosen))
     case = _nameable(since.case, first.stiff)
     now = replace(first.held.prepared, data=case.data, judge=case.judge)
     first = replace(first, held=replace(first.held, prepared=now))

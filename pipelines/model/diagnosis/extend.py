@@ -26,7 +26,8 @@ from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, sure
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
-from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed, prepare
+from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
+from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
@@ -75,22 +76,24 @@ class Extended:
 
 
 def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | None = None, arm: Arm | None = None,
-           tell: Callable[[str], None] | None = None) -> Extended:
+           tell: Callable[[str], None] | None = None, memory: Memory | None = None) -> Extended:
     """The nominal model with the wanted causes, as far as the held-out logs bear them out.
 
     Args:
         arm: whose friction laws the nominal model takes, fitted anew; Coulomb and viscous friction where left out.
+        memory: of what a diagnosis of these logs has worked out of them.
 
     Raises:
         InputRejected: no log can be fitted (S01, T04, T08).
         UsageError: C02, a cause that no model of these logs can take up.
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
-    prepared = prepare(logs, chosen, arm)
+    memory = memory or Memory()
+    prepared = memory.prepared(logs, chosen, arm)
     if any(one.effect.evidence == "reversals" for one in wanted):
         prepared = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
     first = _responding(prepared, wanted, chosen)
-    case, prepared, moved = _case(first, chosen)
+    case, prepared, moved = _case(first, chosen, memory)
     given = {one.place for one in case.beside}
     rest = [one for one in wanted if one.place not in given]
     moved = moved if moved is not None and any(_is(one, moved) for one in rest) else None
@@ -120,12 +123,12 @@ def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisS
     return responding(plain, prepared, only=places)
 
 
-def _case(first: Responding, chosen: DiagnosisSettings) -> tuple[Case, Prepared, Absorbed | None]:
+def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory) -> tuple[Case, Prepared, Absorbed | None]:
     """The nominal model on these logs, beside what the reference logs show as well; and what base parameters took in since."""
     case, prepared = first.held.case, first.held.prepared
     if prepared.reference is None:
         return case, prepared, None
-    since = since_reference(prepared, prepared.reference, chosen, case.beside)
+    since = since_reference(prepared, prepared.reference, chosen, case.beside) if case.beside else memory.since(prepared, chosen)
     case = replace(since.case, changed=None, nameable=_ALL)
     return case, replace(prepared, data=case.data, judge=case.judge), since.absorbed
 

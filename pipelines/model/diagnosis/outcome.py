@@ -9,6 +9,7 @@ from pipelines.errors import Check
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
+from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
 
 __all__ = ["Extension", "Result"]
@@ -24,6 +25,7 @@ class Result(Diagnosis):
     without: tuple[str, ...] = ()  # causes that were left out
     doctor: tuple[Check, ...] = ()
     calibrated_with: tuple[str, ...] = ()  # logs of an earlier diagnosis, whose thresholds were taken; none: its own
+    memory: Memory | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)
 
 
 @dataclass(frozen=True)

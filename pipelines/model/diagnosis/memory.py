@@ -1,0 +1,55 @@
+"""What was worked out of some logs, for whoever asks the same of them again: the extension after a diagnosis.
+
+    memory.of("rows", logs, settings, work)       what `work()` makes, made once for the same logs and settings
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any, TypeVar
+
+from pipelines.errors import Check
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.gates import examined
+from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.since import Since, since_reference
+
+__all__ = ["Memory"]
+
+A = TypeVar("A")
+
+
+class Memory:
+    """Of one process; nothing of it is stored."""
+
+    def __init__(self) -> None:
+        self._known: list[tuple[str, tuple[object, ...], Hashable, Any]] = []
+
+    def of(self, what: str, things: Sequence[object], settings: Hashable, work: Callable[[], A]) -> A:
+        """`things` are the very same objects, `settings` equal ones."""
+        for name, others, asked, found in self._known:
+            if (name, asked, len(others)) == (what, settings, len(things)) and all(
+                    a is b for a, b in zip(things, others, strict=True)):
+                answer: A = found
+                return answer
+        made = work()
+        self._known.append((what, tuple(things), settings, made))
+        return made
+
+    def prepared(self, logs: Logs, chosen: DiagnosisSettings, arm: Arm | None) -> Prepared:
+        """As `prepare`."""
+        parts = (logs.identify, logs.validate, logs.reference, logs.frf, logs.frf_before)
+        settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed)
+        return self.of("rows", (arm, *(log for part in parts for log in part)), settings, lambda: prepare(logs, chosen, arm))
+
+    def examined(self, logs: Logs, allow_mismatch: bool) -> tuple[Check, ...]:
+        """As `examined` of all that a diagnosis looks at."""
+        every = (*logs.identify, *logs.validate, *logs.reference, *logs.frf)
+        return self.of("said", every, allow_mismatch, lambda: examined(every, allow_mismatch))
+
+    def since(self, prepared: Prepared, chosen: DiagnosisSettings) -> Since:
+        """As `since_reference` of rows that nothing was taken out of."""
+        reference = prepared.reference
+        assert reference is not None  # who has none does not ask
+        return self.of("since", (prepared,), (chosen.blocks, chosen.without), lambda: since_reference(prepared, reference, chosen))
