@@ -180,7 +180,6 @@ class Effect(ABC):
     remedy: ClassVar[str]  # what to do about it
     experiment: ClassVar[str]  # what to record to be sure
     twins: ClassVar[tuple[str, ...]] = ()  # effects it can be mistaken for
-    absorbed_by: ClassVar[tuple[str, ...]] = ()  # base parameters that hide it
     needs: ClassVar[tuple[str, ...]] = ()  # what beyond position and torque it takes to see it: "reference log"
     fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm

@@ -43,7 +43,6 @@ class BaseResonance(Effect):
     experiment = "Measure the frequency response of the first joint in two postures with different inertia."
     evidence = "frequency responses"
     twins = ("joint_elasticity",)
-    absorbed_by = ("inertia of the first joint at low frequency",)
     needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -45,7 +45,6 @@ class JointElasticity(Effect):
     experiment = "Measure the frequency response of this joint in two postures with different inertia."
     evidence = "frequency responses"
     twins = ("base_resonance", "backlash")
-    absorbed_by = ("inertia of the joint at low frequency",)
     needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -41,7 +41,6 @@ class Payload(Effect):
     experiment = "Repeat the same experiment without the load."
     evidence = "base parameters"
     twins = ("link_length",)
-    absorbed_by = ("base parameters of the last links",)
     needs = ("a reference log without the load",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
