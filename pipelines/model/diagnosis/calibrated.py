@@ -36,7 +36,8 @@ from pipelines.model.diagnosis.thresholds import Thresholds
 __all__ = ["bounds_of", "conditions_of", "origin_of", "refuse_unfit", "thresholds_of"]
 
 _ALIKE = 1.5  # times the speed, acceleration or range of a joint
-_OTHER = 1.5  # times the thresholds, for other logs: of four excitations of one arm nine of ten were less than 1.8 times another's
+_OTHER = 1.5  # times the thresholds, for other motion: of four excitations nine of ten were less than 1.8 times the first's
+_AGAIN_SAME = 1.05  # times speed, acceleration and range of a joint, within which a motion is the same again
 _SAME = 0.02  # of the rate of rows and of the low-pass
 _AGAIN = "diagnose without --calibration, which makes one for these logs"
 
@@ -45,18 +46,23 @@ def thresholds_of(made: Calibration, families: Sequence[Family], prepared: Prepa
     """For these families; longer logs give chance more to gain, shorter ones are taken to give as much.
 
     Args:
-        given: whether the calibration was stored; for other logs than its own it is taken with care.
+        given: whether the calibration was stored; for another motion than its own it is taken with care.
     """
     there = {(one.cause, one.joint): one for one in made.causes}
     own = [there[family.cause, family.joint] for family in families]
     longer = np.maximum(1.0, _rows(prepared.data) / made.conditions.rows)
-    if given and not {one.sha256 for one in made.origin.logs} <= {digest_of(recording(log)) for log, _ in prepared.motions}:
+    if given and not _same_motion(made.conditions, conditions_of(prepared)):
         longer = _OTHER * longer
     scale = np.array([longer.max() if one.joint is None else longer[one.joint - 1] for one in families])
     wide = made.wide and replace(made.wide, longer=float(longer.max()))
     origin = f"{made.origin.replicas} replicas of the twin{', stored by an earlier diagnosis' if given else ''}"
     return Thresholds(scale * [one.gain for one in own], scale * [one.own for one in own], origin, made.weight,
                       tuple(family.joint for family in families), wide)
+
+
+def _same_motion(one: Conditions, other: Conditions) -> bool:
+    ratios = np.array([getattr(one, name) / getattr(other, name) for name in ("speed", "acceleration", "span")])
+    return bool((np.maximum(ratios, 1.0 / ratios) <= _AGAIN_SAME).all())
 
 
 def bounds_of(families: Sequence[Family], gain: Array, own: Array) -> tuple[CauseBound, ...]:
