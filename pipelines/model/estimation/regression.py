@@ -34,6 +34,7 @@ _SEED = 20040509
 _BLOCK = 32768  # samples of the log worked on at once
 _SETTLE = 10.0  # periods of the cut-off after which a fourth-order low-pass has forgotten to 1e-10
 _TOUCHED = 1.0  # periods of the cut-off to either side over which one bad sample spreads
+_LOST = 3.0  # times the usual standard deviation of a position, beyond which it is not known
 _MEMORY = 0.05  # [s] of the smoother, where no low-pass has a longer one
 
 
@@ -247,6 +248,16 @@ class LogEquations:
         kept, motion = self.found.good.kept, self.found.motion
         return np.asarray(~np.isfinite(motion.q + motion.dq + motion.ddq)[kept] | self.found.vague[kept])
 
+    @cached_property
+    def _lost(self) -> npt.NDArray[np.bool_]:
+        """(samples, joints) of the mended log where the position is not known either."""
+        found, kept = self.found, self.found.good.kept
+        lost = ~np.isfinite(found.motion.q)[kept]
+        if found.std is None:
+            return np.ones_like(lost)
+        std = found.std[0][kept]
+        return np.asarray(lost | ~(std <= _LOST * np.nanmedian(std, axis=0)))
+
     def stretch(self, wide: slice) -> tuple[Motion, Array]:
         """Motion and torque with what is spoilt bridged by straight lines."""
         good, motion = self.found.good, _part(self.found, wide)
@@ -255,7 +266,9 @@ class LogEquations:
         unknown = self._unknown[wide]
         if not (spoilt | unknown).any():
             return motion, tau
-        q, dq, ddq = (_bridged(x, unknown) for x in (motion.q, motion.dq, motion.ddq))
+        # Where the acceleration is vague the position need not be: friction with a memory starts from where the joint was.
+        q = _bridged(motion.q, unknown & self._lost[wide])
+        dq, ddq = (_bridged(x, unknown) for x in (motion.dq, motion.ddq))
         return Motion(motion.t, q, dq, ddq), _bridged(tau, spoilt)
 
 
