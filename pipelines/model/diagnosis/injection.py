@@ -18,7 +18,7 @@ torque exactly, and its strength raised until it passes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -129,7 +129,9 @@ def smallest(family: Family, bound: float, probe: Probe) -> Hidden | None:
     every = sorted(worst.values(), key=lambda one: one.strength)
     chosen = every[int(np.ceil(_RANK * len(every))) - 1]
     strength = chosen.strength
-    for factor in (_exactly(chosen, family, bound, probe), _held_out(chosen, probe)):
+    against = [one for one in (chosen, replace(chosen, direction=-chosen.direction)) if not np.isfinite(strength)
+               or one.effect.possible(one.effect.values(strength * one.direction))]
+    for factor in (_exactly(chosen, family, bound, probe), *(_held_out(one, probe) for one in against)):
         strength = _raised(factor, strength)
     found = bool(np.isfinite(strength))
     return Hidden(chosen.effect, (strength if found else 1.0) * chosen.direction, found)
@@ -241,8 +243,12 @@ def _held_out(one: _Draw, probe: Probe) -> Callable[[float], float]:
     after, place = held.left - found @ seen, data.blocks(_BLOCKS)
     joints = [joint for joint in range(data.n_joints) if seen[:, data.joint == joint].any()]
 
+    weights = final.weight[data.joint]
+
     def factor(strength: float) -> float:
         before = held.left + strength * (one.direction @ seen)
+        if np.linalg.norm(after * weights) >= np.linalg.norm(before * weights):
+            return _RAISED
         for joint in joints:
             own = (data.joint == joint) & data.counts
             sums = [np.asarray(np.bincount(place[own], values, minlength=probe.draws.shape[1]), dtype=np.float64)
