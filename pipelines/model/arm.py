@@ -215,9 +215,12 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
     if stored.joint not in (range(1, len(revolute) + 1) if effect.scope == "joint" else (None,)):
         raise InputRejected("S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where,
                             remedy=f"it belongs to one {effect.scope}, and the arm has {len(revolute)} joints")
-    _same_names(stored.parameters, [q.name for q in effect.parameters], f"{kind}, {stored.effect}", where)
     kind_of_joint = stored.joint is None or revolute[stored.joint - 1]
-    given = [(q, q.unit_at(kind_of_joint), stored.parameters[q.name]) for q in effect.parameters]
+    unsaid = {q.name: StoredValue(q.unsaid, None, q.unit_at(kind_of_joint), "assumed") for q in effect.parameters
+              if q.unsaid is not None}
+    said = {**unsaid, **stored.parameters}
+    _same_names(said, [q.name for q in effect.parameters], f"{kind}, {stored.effect}", where)
+    given = [(q, q.unit_at(kind_of_joint), said[q.name]) for q in effect.parameters]
     parameters = tuple(Parameter(q.name, v.value, v.std, v.unit, (q.low, q.high), v.origin) for q, _, v in given)
     if wrong := [f"{q.name} in {v.unit}, not {unit}" for q, unit, v in given if v.unit != unit]:
         raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(wrong)}", where=where,

@@ -155,6 +155,22 @@ def test_a_model_that_fits_nothing_is_refused(arm: Arm, fault: dict[str, Any], m
         Arm.from_model(model)
 
 
+def test_a_file_from_before_a_number_was_known_keeps_its_law(arm: Arm, motion: Motion) -> None:
+    """Dahl 1968 as an earlier version wrote him: u = s (1 - 2 exp(-|q - q_r|/x_c)) after a reversal while sliding."""
+    stored = StoredEffect("presliding", 2, {"amplitude": StoredValue(1.5, None, "N m", "fitted"),
+                                            "distance": StoredValue(0.01, None, "rad", "fitted"),
+                                            "damping_time": StoredValue(0.0, None, "s", "fitted")})
+    model = replace(arm.to_model(), effects=(stored,))
+    back = Arm.from_model(parse_model(model_text(model)))
+    q = np.zeros((500, 3))
+    q[:, 1] = np.concatenate([np.linspace(0.0, 0.3, 300), np.linspace(0.3, 0.25, 200)])
+    dq = np.zeros_like(q)
+    dq[:300, 1], dq[300:, 1] = 0.1, -0.1
+    there = Motion(np.arange(500) * 1e-2, q, dq, np.zeros_like(q))
+    more = back.torque(there) - replace(back, effects=()).torque(there)
+    np.testing.assert_allclose(more[300:, 1], -1.5 * (1.0 - 2.0 * np.exp(-(0.3 - q[300:, 1]) / 0.01)), atol=1e-6)
+
+
 def test_units_follow_the_kind_of_joint() -> None:
     """A prismatic joint has N where a revolute one has N m."""
     assert Quantity("b", "N m s/rad", 0, 1, "").unit_at(revolute=False) == "N s/m"

@@ -41,10 +41,10 @@ class PositionFriction(Effect):
         Quantity("order", "1/rev", 0.25, 100.0, "waves in one turn of the joint", shape=True),
         Quantity("phase", "rad", -math.pi, math.pi, "angle of the wave at the joint's zero"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
-        Quantity("amplitude_2", "N m", 0.0, 20.0, "of the second harmonic"),
-        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic"),
-        Quantity("amplitude_3", "N m", 0.0, 20.0, "of the third harmonic"),
-        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic"),
+        Quantity("amplitude_2", "N m", 0.0, 20.0, "of the second harmonic", unsaid=0.0),
+        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", unsaid=0.0),
+        Quantity("amplitude_3", "N m", 0.0, 20.0, "of the third harmonic", unsaid=0.0),
+        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", unsaid=0.0),
     )
     signature = "Friction whose size changes with the angle of the joint, always against the motion."
     explanation = "A bent shaft, an uneven seal or bearing, cables that press in some postures."

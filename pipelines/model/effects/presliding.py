@@ -51,10 +51,11 @@ class Presliding(Effect):
     parameters = (
         Quantity("amplitude", "N m", 0.0, 50.0, "friction that turns over with travel"),
         Quantity("distance", "rad", 1e-6, 0.2, "travel over which it turns over", shape=True),
-        Quantity("elastic", "1", -1.0, 0.9, "share of the largest bending up to which nothing slides", shape=True),
+        Quantity("elastic", "1", -1.0, 0.9, "share of the largest bending up to which nothing slides", shape=True, unsaid=-1.0),
         Quantity("damping_time", "s", 0.0, 0.1, "damping of the bristles over their stiffness", shape=True),
-        Quantity("exponent", "1", 0.0, 3.0, "how gradually it begins to slide", shape=True),
-        Quantity("inner_loops", "1", 0.0, 1.0, "1 where a small loop inside a large one closes", shape=True, discrete=True),
+        Quantity("exponent", "1", 0.0, 3.0, "how gradually it begins to slide", shape=True, unsaid=1.0),
+        Quantity("inner_loops", "1", 0.0, 1.0, "1 where a small loop inside a large one closes", shape=True, discrete=True,
+                 unsaid=0.0),
     )
     signature = "After each reversal friction turns over along a loop against position, whatever the speed."
     explanation = "Contacts, seals and gears bend before they slide, and bend back after a reversal."

@@ -37,8 +37,9 @@ class Stribeck(Effect):
         Quantity("amplitude", "N m", 0.0, 20.0, "friction at standstill above that at speed"),
         Quantity("speed", "rad/s", 1e-3, 5.0, "speed over which it falls", shape=True),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
-        Quantity("tail", "1", 0.0, 3.0, "how long it lasts beyond its speed: not at all, or as a power of speed", shape=True),
-        Quantity("exponent", "1", 0.0, 4.0, "how abruptly it falls at its speed", shape=True),
+        Quantity("tail", "1", 0.0, 3.0, "how long it lasts beyond its speed: not at all, or as a power of speed", shape=True,
+                 unsaid=0.0),
+        Quantity("exponent", "1", 0.0, 4.0, "how abruptly it falls at its speed", shape=True, unsaid=2.0),
     )
     signature = "A hump of the friction curve at low speed, the same in both directions."
     explanation = "Below a certain speed the surfaces touch; above it a film of lubricant carries them."
