@@ -6,13 +6,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.dissipation import dissipating, driving
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.linear import covariance, solved, visibility
 from pipelines.model.diagnosis.nominal import Fit, rigid_rows
@@ -79,6 +80,7 @@ def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target:
 def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
     weights = weight[data.joint]
     rigid = rigid_rows(data, model.columns)
+    model = replace(model, beta=dissipating(model.beta, model.columns.laws))
     left = y - model.torque(data)
     now = float(np.sum(np.square(left * weights)))
     slopes, names = slopes_of(model, data, rigid)
@@ -105,14 +107,19 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
 
 
 def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float) -> Array:
-    """The step for every number; the others do without one that would leave its range, and stays at its end, and without one of
-    an effect that the rest of the model does as well: rounding would move it anywhere."""
+    """The step for every number. The others do without one that would leave its range, and stays at its end; without friction that
+    would drive its joint; and without one of an effect that the rest of the model does as well: rounding would move it anywhere."""
     first = len(model.beta)
     own = [first + k for k, (kind, _, _) in enumerate(names) if kind == 1]
     stuck = [k for k, eta in zip(own, visibility(table, own), strict=True) if eta < _INVISIBLE]
     shift = _without(table, y, ridge, stuck)
     beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
-    return _without(table, y, ridge, [*stuck, *beyond]) if beyond else shift
+    held = driving(model.beta, shift, model.columns.laws)
+    if not beyond and not held:
+        return shift
+    shift = _without(table, y + model.beta[held] @ table[held], ridge, [*stuck, *beyond, *held])
+    shift[held] = -model.beta[held]
+    return shift
 
 
 def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
