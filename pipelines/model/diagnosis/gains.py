@@ -108,7 +108,12 @@ def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str
 
 
 def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
-    """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else."""
+    """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else.
+
+    Without logs nothing is simulated.
+    """
+    if not motions:
+        return [Simulation.none(arm.n_joints) for arm in arms]
     logs = motions[:_LOGS]
     soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
     for closed in (True, False):

@@ -343,8 +343,12 @@ def held_out_left(done: Refined, judge: Data | None, blocks: int) -> Array:
 
 
 def cross_validated(done: Refined, blocks: int) -> Array:
-    """(rows,) [N m] what is left of every stretch of time by the numbers that the rest asks for, to first order."""
-    table, residual = done.slopes * done.weights, done.residual
+    """(rows,) [N m] what is left of every stretch of time by the numbers that the rest asks for, to first order.
+
+    What happened once, no other time asks for: the numbers of an event stay as they are.
+    """
+    once = {k for where, one in enumerate(done.model.effects) if one.log is not None for k in done.of_effect(where)}
+    table, residual = np.delete(done.slopes, sorted(once), axis=0) * done.weights, done.residual
     size = np.linalg.norm(table, axis=1)
     unit = table / np.where(size > 0.0, size, 1.0)[:, None]
     place = done.data.blocks(blocks)
