@@ -5,7 +5,7 @@
     python -m benchmarks.recorded_diagnosis --data FOLDER         where tx40/ and odrive/ lie; $RRRID_RECORDED, or ../shared/real
 
 TX40: Butterworth 4 at 100 Hz, 50 Hz, slow samples left out, as published. Time is cut into blocks; each is held out once, and the
-whole search, which effects there are included, is done without it: the error over all of them is nobody's choice.
+whole search, and the choice of what is kept of it, is done without it: the error over all of them is nobody's choice.
 ODrive: two runs at 0.1 rev/s are fitted, blocks of them choose; a third one, and one at 0.03 rev/s, only judge.
 """
 
@@ -29,8 +29,11 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.search import Case, Found, search
+from pipelines.model.diagnosis.pruned import settled
+from pipelines.model.diagnosis.search import Case, Found, clean, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.twin import white
+from pipelines.model.diagnosis.verdict import rule
 from pipelines.stage import Request, run_stage
 
 __all__ = ["TX40", "Judged", "Step", "fold", "imported", "judged_odrive", "judged_tx40", "main", "searched"]
@@ -55,7 +58,9 @@ class Judged:
 
     what: str
     power: float  # squared torque [N^2 m^2] of what judged
-    steps: tuple[Step, ...]
+    steps: tuple[Step, ...]  # of the search
+    kept: Step  # the model that `diagnose` keeps of it
+    causes: tuple[str, ...]  # in that
     seconds: float  # of CPU
 
     @property
@@ -82,23 +87,31 @@ def fold(data: Data, number: int, count: int) -> tuple[Data, Data]:
 
 
 def searched(prepared: Prepared, settings: DiagnosisSettings) -> Found:
-    """The search of `diagnose` where no floor is known: no twin, no reference logs."""
+    """The search of `diagnose` where no floor is known, no twin and no reference logs, and what it keeps of it.
+
+    Without simulated windows: they would run through the time that is held out.
+    """
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     model = Exact.start(columns, fit)
     every = families(columns.laws, whole_motion(prepared.data), model.arm, settings.without)
-    return search(Case(prepared.data, None, model, fit.weight, every, None, settings.blocks), settings.most)
+    case = Case(prepared.data, None, model, fit.weight, every, None, settings.blocks)
+    rough = provisional(case)
+    floor = white(prepared.data, clean(rough[-1]))
+    found = search(case, settings.most, rough)
+    return settled(found, rule(found, floor, False), case, replace(prepared, motions=(), judging=()), floor, False).found
 
 
 def judged(what: str, found: Found, judge: Data, seconds: float) -> Judged:
-    """Every step of a search on `judge`."""
+    """Every step of a search on `judge`, and what is kept of it."""
     models = [("nominal", found.nominal.model)]
     models += [(place(step.best.effect.name, step.best.effect.joint), step.best.done.model) for step in found.steps if step.best]
     steps = []
-    for name, model in models:
+    for name, model in (*models, ("kept", found.final.model)):
         left = np.where(judge.counts, judge.y - model.torque(judge), 0.0)
         own = tuple(float(np.sum(left[judge.joint == j] ** 2)) for j in range(judge.n_joints))
         steps.append(Step(name, float(left @ left), own))
-    return Judged(what, float(np.sum(np.where(judge.counts, judge.y, 0.0) ** 2)), tuple(steps), seconds)
+    causes = tuple(place(one.effect.name, one.effect.joint) for one in found.final.model.effects)
+    return Judged(what, float(np.sum(np.where(judge.counts, judge.y, 0.0) ** 2)), tuple(steps[:-1]), steps[-1], causes, seconds)
 
 
 def place(cause: str, joint: int | None) -> str:
@@ -169,6 +182,8 @@ def _print_tx40(data: Path, count: int) -> None:
     folds = judged_tx40(data, range(count), count)
     before, after, joints = nested_error(folds)
     print(f"  relative torque error held out: nominal {100 * before:.2f} %, extended {100 * after:.2f} % (bar 5.0, aim 4.5)")
+    kept = np.sqrt(sum(one.kept.left for one in folds) / sum(one.power for one in folds))
+    print(f"  what diagnose keeps of it: {100 * kept:.2f} %;", "; ".join(", ".join(one.causes) for one in folds))
     print("  share of each joint:", ", ".join(f"{100 * x:.2f} %" for x in joints))
     for name, (times, taken) in sorted(payoff(folds).items(), key=lambda item: -item[1][1]):
         print(f"  {name:28s} named in {times} of {count}, takes {100 * taken:6.2f} % off the squared error held out")
