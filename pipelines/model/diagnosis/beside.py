@@ -17,15 +17,16 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of, worse_log
+from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.numbers import standard_deviations
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Gain
-from pipelines.model.diagnosis.search import Case, held_out_left
 from pipelines.model.parameter import Parameter
 
 __all__ = ["Held", "Judged", "Part", "acted", "beside", "judged", "less", "torque_of"]

@@ -18,11 +18,11 @@ from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of, worse_log
+from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import rigid_rows
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Finding
-from pipelines.model.diagnosis.search import held_out_left
 
 __all__ = ["Carried", "carried"]
 

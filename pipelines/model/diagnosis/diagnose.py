@@ -22,11 +22,13 @@ from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origi
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.carried import carried
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import Compliance, untold
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import evidence, floors_of
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
+from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.limits import detectable, not_testable
@@ -36,7 +38,7 @@ from pipelines.model.diagnosis.pruned import Settled, settled, unnamed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, Rejected, ResidualRms, Threshold
-from pipelines.model.diagnosis.search import Case, Explored, Step, clean, gap_first, gives_way, held_out_left, provisional, search
+from pipelines.model.diagnosis.search import Explored, Step, clean, gap_first, gives_way, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds

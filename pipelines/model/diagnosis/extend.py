@@ -23,16 +23,18 @@ from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.beside import Held, acted, judged
 from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
 from pipelines.model.diagnosis.carried import carried
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, sure
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
+from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
-from pipelines.model.diagnosis.search import Case, Found, held_out_left, search
+from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds

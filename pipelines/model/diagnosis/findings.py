@@ -14,12 +14,14 @@ from pipelines.model.diagnosis.chain import gains
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.gains import Simulation, torque_gain, worse_log
+from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.joined import once_each
+from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.numbers import acting, parameters
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Value
-from pipelines.model.diagnosis.search import Found, Step, Tried, held_out_left
+from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
 __all__ = ["agreement", "extended_arm", "findings", "held_finding", "rejected", "sure"]

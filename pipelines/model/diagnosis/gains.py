@@ -20,9 +20,9 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import BeforeAfter, Gain, TipError, TorqueGain
-from pipelines.model.diagnosis.search import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.simulation import Experiment, Plant, choose_step, simulate, simulate_windows

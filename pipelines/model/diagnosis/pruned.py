@@ -8,12 +8,14 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.beside import acted
+from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import sure
 from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
+from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.search import Case, Found, held_out, held_out_left
+from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 

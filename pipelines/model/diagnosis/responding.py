@@ -15,6 +15,7 @@ import numpy as np
 
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.beside import Held, beside, less, torque_of
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import Compliance, compared, compliance
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
@@ -22,7 +23,6 @@ from pipelines.model.diagnosis.inputs import Prepared, narrowed
 from pipelines.model.diagnosis.linear import deviations
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
 from pipelines.model.diagnosis.result import NotTestable, Standing, Value
-from pipelines.model.diagnosis.search import Case
 
 __all__ = ["BELOW", "Responding", "responding"]
 

@@ -11,27 +11,22 @@ out. Rivals are ranked by the error they leave on held-out rows; of those that l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.candidates import Family, lay_family
-from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.case import Case, held_out
+from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole
 from pipelines.model.diagnosis.ledger import Tried, ledger
-from pipelines.model.diagnosis.nominal import Fit, orthonormal
+from pipelines.model.diagnosis.nominal import orthonormal
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
-from pipelines.model.diagnosis.screen import INVISIBLE, Screened, screen
+from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
-from pipelines.model.diagnosis.through import beyond_first_order
-from pipelines.model.effects.base import Effect
 
-__all__ = ["Case", "Explored", "Found", "Step", "Tried", "clean", "cross_validated", "gap_first", "gives_way",
-           "held_out", "held_out_left", "provisional", "search"]
+__all__ = ["Explored", "Found", "Step", "clean", "gap_first", "gives_way", "provisional", "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
@@ -41,31 +36,9 @@ _WORTH = 0.05  # of the squared residual of its joint
 _MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
-_CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
 _FALLS = 0.02  # of the held-out error, that a cause takes off at least where no floor says what is left to explain
-_DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
-
-
-Changed = Callable[[Refined, Sequence[bool]], tuple[Sequence[Screened], Thresholds]]
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """What is diagnosed."""
-
-    data: Data  # that is fitted
-    judge: Data | None  # that judges; None: blocks of the fitted
-    model: Exact  # nominal
-    weight: Array  # (joints,)
-    families: tuple[Family, ...]
-    thresholds: Thresholds | None  # None: a share of the residual
-    blocks: int = 10
-    nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
-    changed: Changed | None = None  # what has changed since the reference logs
-    again: bool = True  # a cause that may act more than once at its place may be found more than once
-    beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,31 +144,10 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     asked = {id(one) for one in wanted}
     great = [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0] and id(one) in asked]
     error = held_out(now, case) if great else np.nan
-    tried = [_fitted(case, now, one, error) for one in great]
+    tried = [fitted(case, now, one, error) for one in great]
     best = _fewest(sorted(tried, key=lambda one: one.rank))
-    tried = [_best_form(case, now, one, error) if one is best else one for one in tried]
+    tried = [best_form(case, now, one, error) if one is best else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
-
-
-def _best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:
-    """The cause by the law that leaves decidedly less of its joint, fitted and held out, where it has more than one."""
-    if best.log is not None:
-        return best
-    chosen, least = best, _DECIDED * _left_at(case, best)
-    for form in best.effect.forms():
-        other = _refitted(case, now, best.screened, form, error)
-        if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < least:
-            chosen, least = other, left
-    return chosen
-
-
-def _left_at(case: Case, tried: Tried) -> float:
-    """Squared error at the cause's joint: the mean of fitted and held out by their product."""
-    joint, done = tried.effect.joint, tried.done
-    held = done.data if case.judge is None else case.judge
-    powers = [np.square(done.data.rms(done.left)), np.square(held.rms(held_out_left(done, case.judge, case.blocks)))]
-    each = np.sqrt(powers[0] * powers[1]) * np.square(done.weight)
-    return float(each.sum() if joint is None else each[joint - 1])
 
 
 def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
@@ -247,60 +199,6 @@ def _fewest(tried: Sequence[Tried]) -> Tried | None:
     return min(near, key=lambda one: (one.done.model.effects[-1].count, one.rank))
 
 
-def _fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
-    """A cause fitted exactly beside everything that was found before; `error` is what was left held out without it."""
-    if one.family.event:
-        return _happened(case, now, one, error)
-    effect = one.shape[0].full()
-    if effect.fixed_amplitudes is not None:
-        effect = _given(case, now, one, np.array(effect.fixed_amplitudes)).full()
-    return _refitted(case, now, one, effect, error)
-
-
-def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: float) -> Tried:
-    table = _laid(case.data, effect, now.model.arm)
-    start = (now.model.with_effect(effect, _amplitudes(now.fit, table)) if one.amplitude is None else
-             beyond_first_order(now, effect, one.amplitude))
-    done = refine(start, case.data, now.weight)
-    left = held_out(done, case) / error
-    rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
-    return Tried(one, effect, None, done, left, rank, _visibility(now, table))
-
-
-def _given(case: Case, now: Refined, one: Screened, amplitudes: Array) -> Effect:
-    """The shape that leaves least with the amplitudes that physics gives; screening, which fits them, takes half of a gap twice as
-    wide for the same."""
-    best, least = one.shape[0], np.inf
-    for laid in lay_family(case.data, one.family, now.model.arm):
-        for k, table in enumerate(laid.table):
-            column = np.zeros(case.data.rows)
-            column[laid.rows] = amplitudes @ table
-            left = float(np.sum(np.square(now.fit.residual - now.fit.project(column))))
-            if left < least:
-                best, least = one.family.shapes[laid.first + k], left
-    return best
-
-
-def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:
-    """An event: in one log, which no other can confirm; or in all at the same time, where the held-out ones do."""
-    log, effect = one.logs[0], one.shape[0].full()
-    whole = _laid(case.data, effect, now.model.arm)
-    table = whole if log is None else np.where(case.data.log_of == log - case.data.first, whole, 0.0)
-    once = refine(now.model.with_effect(effect, _amplitudes(now.fit, table), log), case.data, now.weight)
-    tried = Tried(one, effect, log, once, once.rss / now.rss, once.rss / now.rss, _visibility(now, table))
-    if case.judge is None or log is None:
-        return tried
-    named = once.model.effects[-1]
-    always = refine(now.model.with_effect(named.effect, np.array(named.amplitudes)), case.data, now.weight)
-    seen = held_out(always, case) / error
-    rank = float(np.sqrt(seen * always.rss / now.rss))
-    return Tried(one, effect, None, always, seen, rank, tried.visibility) if seen < _CONFIRMED else tried
-
-
-def _visibility(now: Refined, table: Array) -> float:
-    return float(np.linalg.norm(now.fit.project(table))) / max(float(np.linalg.norm(table * now.weights)), 1e-300)
-
-
 def clean(explored: Explored, most: int = 8) -> Array:
     """(rows,) [N m] what is left when everything that the most promising causes could explain is taken away, right or wrong.
 
@@ -308,58 +206,10 @@ def clean(explored: Explored, most: int = 8) -> Array:
     """
     now, fit = explored.before, explored.before.fit
     best = sorted((one for one in explored.screened if not one.family.event), key=lambda one: -one.gain[0])[:most]
-    tables = [_laid(now.data, one.shape[0].full(), now.model.arm) for one in best]
+    tables = [laid_whole(now.data, one.shape[0].full(), now.model.arm) for one in best]
     basis = orthonormal(np.concatenate([fit.project(table) for table in tables]))
     residual = fit.residual - (basis @ fit.residual) @ basis
     return np.asarray(residual / fit.weights)
-
-
-def _laid(data: Data, effect: Effect, arm: Arm) -> Array:
-    laid = next(iter(lay_family(data, Family(effect.name, effect.joint, (effect,)), arm)))
-    out = np.zeros((laid.table.shape[1], data.rows))
-    out[:, laid.rows] = laid.table[0]
-    return out
-
-
-def _amplitudes(fit: Fit, table: Array) -> Array:
-    """Zero for a column that the model has already: what is left of it is rounding, and would be blown up."""
-    c = fit.project(table)
-    size = np.linalg.norm(c, axis=1)
-    size = np.where(size > INVISIBLE * np.linalg.norm(table * fit.weights, axis=1), size, np.inf)
-    unit = c / size[:, None]
-    solved, *_ = np.linalg.lstsq(unit @ unit.T, unit @ fit.residual, rcond=1e-8)
-    return np.asarray(solved / size)
-
-
-def held_out(done: Refined, case: Case) -> float:
-    """Squared weighted error on what the model was not fitted to."""
-    data = done.data if case.judge is None else case.judge
-    return float(np.sum(np.square(held_out_left(done, case.judge, case.blocks) * done.weight[data.joint])))
-
-
-def held_out_left(done: Refined, judge: Data | None, blocks: int) -> Array:
-    """(rows,) [N m] of the judging logs; of the fitted ones, block by block, where there are none."""
-    return cross_validated(done, blocks) if judge is None else judge.y - done.model.torque(judge)
-
-
-def cross_validated(done: Refined, blocks: int) -> Array:
-    """(rows,) [N m] what is left of every stretch of time by the numbers that the rest asks for, to first order.
-
-    What happened once, no other time asks for: the numbers of an event stay as they are.
-    """
-    once = {k for where, one in enumerate(done.model.effects) if one.log is not None for k in done.of_effect(where)}
-    table, residual = np.delete(done.slopes, sorted(once), axis=0) * done.weights, done.residual
-    size = np.linalg.norm(table, axis=1)
-    unit = table / np.where(size > 0.0, size, 1.0)[:, None]
-    place = done.data.blocks(blocks)
-    left, gram, moment = np.empty_like(residual), unit @ unit.T, unit @ residual
-    ridge = 1e-9 * np.eye(len(gram))
-    for block in range(int(place.max()) + 1):
-        held = place == block
-        own = unit[:, held]
-        shift = np.linalg.solve(gram - own @ own.T + ridge, moment - own @ residual[held])
-        left[held] = residual[held] - shift @ own
-    return left / done.weights
 
 
 def _reweighted(done: Refined) -> Refined:

@@ -17,6 +17,7 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.absorbed import Absorbed, absorbed
 from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.candidates import families, lay_one, whole_motion
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.injection import Probe
@@ -25,7 +26,6 @@ from pipelines.model.diagnosis.nominal import fit_columns, fit_nominal, law_slop
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Standing, Value
 from pipelines.model.diagnosis.screen import Screened
-from pipelines.model.diagnosis.search import Case
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.thresholds import Thresholds

@@ -7,12 +7,14 @@ import pytest
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.held_out import cross_validated
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.screen import Screened, screen
-from pipelines.model.diagnosis.search import Case, cross_validated, search
+from pipelines.model.diagnosis.search import search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import all_effects
 from pipelines.model.rigid.body import Motion

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from pipelines.model.diagnosis.candidates import Family, families, whole_motion
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.screen import screen, screen_family
-from pipelines.model.diagnosis.search import Case, search
+from pipelines.model.diagnosis.search import search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.rigid.body import Motion

@@ -11,11 +11,12 @@ from scipy.signal import lsim
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
-from pipelines.model.diagnosis.search import Case, Found, search
+from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.torque_lag import TorqueLag

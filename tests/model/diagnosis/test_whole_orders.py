@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.search import Case, Found, search
+from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from tests.diagnose.sessions import but
 from tests.model.diagnosis.test_through import turned

@@ -1,0 +1,45 @@
+"""What is diagnosed: the rows, those that judge, the nominal model on them, and every cause that is looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting
+from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.held_out import held_out_left
+from pipelines.model.diagnosis.refit import Refined
+from pipelines.model.diagnosis.screen import Screened
+from pipelines.model.diagnosis.thresholds import Thresholds
+
+__all__ = ["Case", "Changed", "held_out"]
+
+Changed = Callable[[Refined, Sequence[bool]], tuple[Sequence[Screened], Thresholds]]
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is diagnosed."""
+
+    data: Data  # that is fitted
+    judge: Data | None  # that judges; None: blocks of the fitted
+    model: Exact  # nominal
+    weight: Array  # (joints,)
+    families: tuple[Family, ...]
+    thresholds: Thresholds | None  # None: a share of the residual
+    blocks: int = 10
+    nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
+    changed: Changed | None = None  # what has changed since the reference logs
+    again: bool = True  # a cause that may act more than once at its place may be found more than once
+    beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
+
+
+def held_out(done: Refined, case: Case) -> float:
+    """Squared weighted error on what the model was not fitted to."""
+    data = done.data if case.judge is None else case.judge
+    return float(np.sum(np.square(held_out_left(done, case.judge, case.blocks) * done.weight[data.joint])))

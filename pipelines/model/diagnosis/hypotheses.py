@@ -1,0 +1,115 @@
+"""One cause fitted exactly beside all that was found before it, by each of its laws; an event in the log it happened in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.candidates import Family, lay_family
+from pipelines.model.diagnosis.case import Case, held_out
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.held_out import held_out_left
+from pipelines.model.diagnosis.ledger import Tried
+from pipelines.model.diagnosis.nominal import Fit
+from pipelines.model.diagnosis.refit import Refined, refine
+from pipelines.model.diagnosis.screen import INVISIBLE, Screened
+from pipelines.model.diagnosis.through import beyond_first_order
+from pipelines.model.effects.base import Effect
+
+__all__ = ["best_form", "fitted", "laid_whole"]
+
+_CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
+_DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
+
+
+def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
+    """A cause fitted exactly beside everything that was found before; `error` is what was left held out without it."""
+    if one.family.event:
+        return _happened(case, now, one, error)
+    effect = one.shape[0].full()
+    if effect.fixed_amplitudes is not None:
+        effect = _given(case, now, one, np.array(effect.fixed_amplitudes)).full()
+    return _refitted(case, now, one, effect, error)
+
+
+def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: float) -> Tried:
+    table = laid_whole(case.data, effect, now.model.arm)
+    start = (now.model.with_effect(effect, _amplitudes(now.fit, table)) if one.amplitude is None else
+             beyond_first_order(now, effect, one.amplitude))
+    done = refine(start, case.data, now.weight)
+    left = held_out(done, case) / error
+    rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
+    return Tried(one, effect, None, done, left, rank, _visibility(now, table))
+
+
+def best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:
+    """The cause by the law that leaves decidedly less of its joint, fitted and held out, where it has more than one."""
+    if best.log is not None:
+        return best
+    chosen, least = best, _DECIDED * _left_at(case, best)
+    for form in best.effect.forms():
+        other = _refitted(case, now, best.screened, form, error)
+        if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < least:
+            chosen, least = other, left
+    return chosen
+
+
+def _left_at(case: Case, tried: Tried) -> float:
+    """Squared error at the cause's joint: the mean of fitted and held out by their product."""
+    joint, done = tried.effect.joint, tried.done
+    held = done.data if case.judge is None else case.judge
+    powers = [np.square(done.data.rms(done.left)), np.square(held.rms(held_out_left(done, case.judge, case.blocks)))]
+    each = np.sqrt(powers[0] * powers[1]) * np.square(done.weight)
+    return float(each.sum() if joint is None else each[joint - 1])
+
+
+def _given(case: Case, now: Refined, one: Screened, amplitudes: Array) -> Effect:
+    """The shape that leaves least with the amplitudes that physics gives; screening, which fits them, takes half of a gap twice as
+    wide for the same."""
+    best, least = one.shape[0], np.inf
+    for laid in lay_family(case.data, one.family, now.model.arm):
+        for k, table in enumerate(laid.table):
+            column = np.zeros(case.data.rows)
+            column[laid.rows] = amplitudes @ table
+            left = float(np.sum(np.square(now.fit.residual - now.fit.project(column))))
+            if left < least:
+                best, least = one.family.shapes[laid.first + k], left
+    return best
+
+
+def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:
+    """An event: in one log, which no other can confirm; or in all at the same time, where the held-out ones do."""
+    log, effect = one.logs[0], one.shape[0].full()
+    whole = laid_whole(case.data, effect, now.model.arm)
+    table = whole if log is None else np.where(case.data.log_of == log - case.data.first, whole, 0.0)
+    once = refine(now.model.with_effect(effect, _amplitudes(now.fit, table), log), case.data, now.weight)
+    tried = Tried(one, effect, log, once, once.rss / now.rss, once.rss / now.rss, _visibility(now, table))
+    if case.judge is None or log is None:
+        return tried
+    named = once.model.effects[-1]
+    always = refine(now.model.with_effect(named.effect, np.array(named.amplitudes)), case.data, now.weight)
+    seen = held_out(always, case) / error
+    rank = float(np.sqrt(seen * always.rss / now.rss))
+    return Tried(one, effect, None, always, seen, rank, tried.visibility) if seen < _CONFIRMED else tried
+
+
+def _visibility(now: Refined, table: Array) -> float:
+    return float(np.linalg.norm(now.fit.project(table))) / max(float(np.linalg.norm(table * now.weights)), 1e-300)
+
+
+def laid_whole(data: Data, effect: Effect, arm: Arm) -> Array:
+    laid = next(iter(lay_family(data, Family(effect.name, effect.joint, (effect,)), arm)))
+    out = np.zeros((laid.table.shape[1], data.rows))
+    out[:, laid.rows] = laid.table[0]
+    return out
+
+
+def _amplitudes(fit: Fit, table: Array) -> Array:
+    """Zero for a column that the model has already: what is left of it is rounding, and would be blown up."""
+    c = fit.project(table)
+    size = np.linalg.norm(c, axis=1)
+    size = np.where(size > INVISIBLE * np.linalg.norm(table * fit.weights, axis=1), size, np.inf)
+    unit = c / size[:, None]
+    solved, *_ = np.linalg.lstsq(unit @ unit.T, unit @ fit.residual, rcond=1e-8)
+    return np.asarray(solved / size)
