@@ -256,7 +256,8 @@ class LogEquations:
         if found.std is None:
             return np.ones_like(lost)
         std = found.std[0][kept]
-        return np.asarray(lost | ~(std <= _LOST * np.nanmedian(std, axis=0)))
+        usual = np.array([median(column[~np.isnan(column)]) for column in std.T])
+        return np.asarray(lost | ~(std <= _LOST * usual))
 
     def stretch(self, wide: slice) -> tuple[Motion, Array]:
         """Motion and torque with what is spoilt bridged by straight lines."""
