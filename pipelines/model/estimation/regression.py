@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.equations import Block
+from pipelines.log.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.estimation.conditioning import Conditioning
 from pipelines.model.motion import Reconstructed
