@@ -14,7 +14,7 @@ from pipelines.model.row_fit import Row, Sampled, relative_residual, row_fits
 
 __all__ = ["Evidence"]
 
-_HELD = 0.05  # of the travel of the joint that moves most, a metre taken for a radian
+_HELD = 0.1  # of the travel of the joint that moves most, a metre taken for a radian
 
 
 @dataclass(frozen=True, eq=False)
