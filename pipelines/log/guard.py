@@ -21,7 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from pipelines.errors import InputRejected, RrridError
+from pipelines.errors import InputRejected
 from pipelines.log.guard_child import Answer, Child, Lost, die_with_parent, shared_file
 
 __all__ = ["Answer", "Guard", "die_with_parent", "guarded", "shared_file"]
@@ -81,8 +81,8 @@ class Guard(threading.local):
         if child is not None:
             try:
                 return child.ask(words, path, _PATIENCE * limit, budget)
-            except (Lost, RrridError):
-                pass  # it may be a trace of an earlier file: a fresh child decides
+            except Exception:
+                pass  # it may be a trace of an earlier file: a fresh child decides, and tells
         self._child = Child(self._work)
         try:
             return self._child.ask(words, path, limit - (time.monotonic() - began), budget)

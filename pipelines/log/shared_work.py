@@ -48,7 +48,7 @@ def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[]
     found: dict[int, A] = {}
     try:
         found.update((k, work(pieces[k])) for k in _next(places))
-        with contextlib.suppress(EOFError):  # it came to grief: its pieces are done here, where an error can be told
+        with contextlib.suppress(EOFError, OSError, MemoryError):  # it came to grief: its pieces are done here
             answers, words = other.answer()
             found.update(answers)
             take(words)

@@ -32,6 +32,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.wide import WideCause
 
 __all__ = ["bounds_of", "conditions_of", "origin_of", "refuse_unfit", "thresholds_of"]
 
@@ -54,15 +55,23 @@ def thresholds_of(made: Calibration, families: Sequence[Family], prepared: Prepa
     if given and not _same_motion(made.conditions, conditions_of(prepared)):
         longer = _OTHER * longer
     scale = np.array([longer.max() if one.joint is None else longer[one.joint - 1] for one in families])
-    wide = made.wide and replace(made.wide, longer=float(longer.max()))
+    wide = made.wide and replace(made.wide, longer=float(longer.max()), causes=_wide_causes(made, families))
     origin = f"{made.origin.replicas} replicas of the twin{', stored by an earlier diagnosis' if given else ''}"
     return Thresholds(scale * [one.gain for one in own], scale * [one.own for one in own], origin, made.weight,
                       tuple(family.joint for family in families), wide)
 
 
+def _wide_causes(made: Calibration, families: Sequence[Family]) -> tuple[WideCause, ...]:
+    """Of the causes of the whole arm that are among `families`, in their order: some may be left out since."""
+    assert made.wide is not None
+    whole = [one.cause for one in made.causes if one.joint is None]
+    return tuple(made.wide.causes[whole.index(family.cause)] for family in families if family.joint is None)
+
+
 def _same_motion(one: Conditions, other: Conditions) -> bool:
-    ratios = np.array([getattr(one, name) / getattr(other, name) for name in ("speed", "acceleration", "span")])
-    return bool((np.maximum(ratios, 1.0 / ratios) <= _AGAIN_SAME).all())
+    sizes = (np.array([getattr(each, name) for name in ("speed", "acceleration", "span")]) for each in (one, other))
+    before, after = sizes
+    return bool(((before <= _AGAIN_SAME * after) & (after <= _AGAIN_SAME * before)).all())
 
 
 def bounds_of(families: Sequence[Family], gain: Array, own: Array) -> tuple[CauseBound, ...]:
@@ -144,7 +153,7 @@ def _differing(then: Conditions, now: Conditions, moved: bool) -> Iterator[str]:
     if not np.isclose(then.sample_time, now.sample_time, rtol=1e-6, atol=0.0):
         yield f"sampled every {1e3 * now.sample_time:g} ms, it is of {1e3 * then.sample_time:g} ms"
     before, after = (np.inf if one.cutoff_hz is None else one.cutoff_hz for one in (then, now))
-    if not (before == after or abs(before - after) <= _SAME * before):
+    if not (before == after or (np.isfinite(before) and abs(before - after) <= _SAME * before)):
         yield f"low-pass at {after:g} Hz, its own is at {before:g} Hz (--filter {before:g})"
     elif abs(now.row_time / then.row_time - 1.0) > _SAME:
         yield f"an equation every {1e3 * now.row_time:.3g} ms, its own {1e3 * then.row_time:.3g} ms (--decimate)"

@@ -115,10 +115,13 @@ def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: flo
     shift = _without(table, y, ridge, stuck)
     beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
     held = driving(model.beta, shift, model.columns.laws)
-    if not beyond and not held:
-        return shift
-    shift = _without(table, y + model.beta[held] @ table[held], ridge, [*stuck, *beyond, *held])
-    shift[held] = -model.beta[held]
+    while beyond or held:
+        shift = _without(table, y + model.beta[held] @ table[held], ridge, [*stuck, *beyond, *held])
+        shift[held] = -model.beta[held]
+        more = driving(model.beta, shift, model.columns.laws)  # of those that were free until then
+        if not more:
+            break
+        held = sorted({*held, *more})
     return shift
 
 
