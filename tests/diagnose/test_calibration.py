@@ -58,6 +58,15 @@ def test_stored_thresholds_give_the_same_answer(place: Path) -> None:
     assert any("An earlier diagnosis has stored them" in text for text in said)
 
 
+def test_a_cause_of_the_whole_arm_may_be_left_out_later(place: Path) -> None:
+    """The others are held against what they were held against with it."""
+    fewer = asked(place / "logs", place / "fewer", calibration=str(place / "first"), without=(*FEW, "gravity_tilt"))
+    whole = asked(place / "logs", place / "with", calibration=str(place / "first"))
+    kept = {(one.cause, one.joint): one.gain for one in whole.result.thresholds if one.cause != "gravity_tilt"}
+    assert {(one.cause, one.joint): one.gain for one in fewer.result.thresholds} == kept
+    assert [one.cause for one in fewer.result.findings] == ["cogging"]
+
+
 def test_the_file_says_where_thresholds_come_from(place: Path) -> None:
     """Logs by their digests, model, replicas, seed and versions; and it is what its schema says."""
     stored = json.loads((place / "first/calibration.json").read_text())
