@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.log import files
+from pipelines.log.log_reader import end_reader
 
 _REPO = Path(__file__).resolve().parents[1]
 
@@ -16,7 +16,7 @@ _REPO = Path(__file__).resolve().parents[1]
 @pytest.fixture(autouse=True)
 def _fresh_reader() -> None:
     """Each test begins as a program does: what it changes in this process, the child that reads logs has as well."""
-    files._guard.let_go()
+    end_reader()
 
 
 @pytest.fixture(scope="session")

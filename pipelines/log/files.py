@@ -16,14 +16,12 @@ import stat
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pipelines.errors import Check, EnvironmentFault, InputRejected, NothingMatched, UsageError
-from pipelines.log import canonical
 from pipelines.log.atomic import environment_faults, fault_of, write_file
 from pipelines.log.experiment import ExperimentLog
-from pipelines.log.guard import Answer, Guard
 from pipelines.log.joints import chosen
+from pipelines.log.log_reader import read_guarded
 from pipelines.log.robot import RobotDescription
 from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_format
 
@@ -32,7 +30,6 @@ __all__ = ["ENDINGS", "PROVENANCE", "Opened", "entries", "expanded", "find_logs"
 
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
-_READS_IT = {"hdf5": "h5py", "parquet": "pyarrow.parquet"}
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _PARQUET_MAGIC = b"PAR1"
 _ARCHIVES = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ")
@@ -96,18 +93,7 @@ def _open(path: Path, assume_units: bool, only: Collection[str] | None, joints: 
         sha256 = hash_file(path)
         container, checks = _container(path, os.pread(handle, 8, 0), status.st_size)
         _against_manifest(path, sha256)
-        answer = _guard.ask([str(path), container, None if only is None else sorted(only)], path, _READS_IT[container])
-        after = os.fstat(handle)
-        now = path.stat()
-        if any((s.st_size, s.st_mtime_ns, s.st_ino) != (status.st_size, status.st_mtime_ns, status.st_ino) for s in (after, now)):
-            raise InputRejected("F14", "was modified while it was read", where=path, remedy="wait until the recording is finished")
-    log = canonical.parse_log_text(answer.about["text"], answer.arrays, where=str(path))
-    digest = answer.about["digest"]
-    if only is None and digest is not None:
-        if digest != canonical.digest_of(log):
-            raise InputRejected("F04", "checksum mismatch: the content does not fit its digest", where=path,
-                                remedy="copy the file again from where it was recorded")
-        _guard.vouch()
+        log, digest = read_guarded(path, container, only, lambda: _refuse_modified(path, handle, status))
     if digest is None:
         checks.append(Check.of("F05", "warn", "no integrity data: nothing would notice a flipped bit", where=path,
                                remedy="'rrrid convert' writes a copy that has them"))
@@ -117,18 +103,11 @@ def _open(path: Path, assume_units: bool, only: Collection[str] | None, joints: 
     return Opened(path, sha256, conformed, (*checks, *choice, *changes), container)
 
 
-def _read(words: Any) -> Answer:
-    """In the guarded child: the log of `words`, [path, container, the signals to read or null for all]."""
-    path, container, only = Path(words[0]), words[1], words[2]
-    if container == "hdf5":
-        from pipelines.log.hdf5 import read_parts
-    else:
-        from pipelines.log.parquet import read_parts
-    log, digest = read_parts(path, None if only is None else {"t", "q", "tau", *only})
-    return Answer({"text": canonical.log_text(log), "digest": digest}, {name: s.values for name, s in log.signals.items()})
-
-
-_guard = Guard(_read)
+def _refuse_modified(path: Path, handle: int, before: os.stat_result) -> None:
+    """F14: the open file, or what now stands under its name, is not what it was."""
+    for now in (os.fstat(handle), path.stat()):
+        if (now.st_size, now.st_mtime_ns, now.st_ino) != (before.st_size, before.st_mtime_ns, before.st_ino):
+            raise InputRejected("F14", "was modified while it was read", where=path, remedy="wait until the recording is finished")
 
 
 def regular_file(path: Path, *, what: str = "a log, or a folder of logs", empty: bool = False) -> os.stat_result:

@@ -3,12 +3,11 @@
     answer = guarded(work, path)         a child for this file alone
 
     guard = Guard(work)                  a child that may stay for the next file:
-    answer = guard.ask(words, path)
-    guard.vouch()                        only where its answer has been verified
+    thing = guard.ask(words, path, needs, take)
 
 HDF5 and Parquet are read by large C libraries; a damaged file has sent them into a crash or an endless loop before. A file that is
 read without harm may still have left something broken behind: a child is kept only after a file whose content was verified, and
-what a kept child says against a file counts only when a fresh one says it again.
+what a kept child says against a file, or says wrongly of it, counts only when a fresh one says it again.
 """
 
 from __future__ import annotations
@@ -19,12 +18,14 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from pipelines.errors import InputRejected
 from pipelines.log.guard_child import Answer, Child, Lost, die_with_parent, shared_file
 
 __all__ = ["Answer", "Guard", "die_with_parent", "guarded", "shared_file"]
+
+T = TypeVar("T")
 
 _SECONDS: Final = 10.0  # a healthy file of 20 MB takes a tenth of it
 _BYTES_A_SECOND: Final = 5e6
@@ -64,15 +65,17 @@ class Guard(threading.local):
         if threading.current_thread() is threading.main_thread():
             atexit.register(self.let_go)
 
-    def ask(self, words: Any, path: Path, needs: str) -> Answer:
-        """The answer to `words` about the file `path`, in the time and the memory that `guarded` gives it.
+    def ask(self, words: Any, path: Path, needs: str, take: Callable[[Answer], tuple[T, bool]]) -> T:
+        """What `take` makes of the answer to `words` about the file `path`, in the time and the memory that `guarded` gives it.
 
         Args:
             path: a relative one is always read by a fresh child: a kept one may stand in another folder.
             needs: the module that reads it, imported already: a child that was made without it is replaced.
+            take: gives what is asked for, and whether the answer was verified: the child may be kept then. It raises where
+                the answer cannot be right.
 
         Raises:
-            RrridError: what the work raised.
+            RrridError: what the work raised, or `take`.
             InputRejected: F03 where the library crashed or hung on the file.
         """
         limit, budget = _limits(path)
@@ -80,18 +83,19 @@ class Guard(threading.local):
         child = self._kept(needs, path)
         if child is not None:
             try:
-                return child.ask(words, path, _PATIENCE * limit, budget)
+                return self._taken(child.ask(words, path, _PATIENCE * limit, budget), take)
             except Exception:
-                pass  # it may be a trace of an earlier file: a fresh child decides, and tells
+                self.let_go()  # it may be a trace of an earlier file: a fresh child decides, and tells
         self._child = Child(self._work)
         try:
-            return self._child.ask(words, path, limit - (time.monotonic() - began), budget)
+            answer = self._child.ask(words, path, limit - (time.monotonic() - began), budget)
         except Lost as lost:
             raise _told(lost, path, limit) from None
+        return self._taken(answer, take)
 
-    def vouch(self) -> None:
-        """The last answer was verified: the child that gave it may be asked again."""
-        self._vouched = True
+    def _taken(self, answer: Answer, take: Callable[[Answer], tuple[T, bool]]) -> T:
+        thing, self._vouched = take(answer)
+        return thing
 
     def _kept(self, needs: str, path: Path) -> Child | None:
         """The child of the last file, where it may be asked for this one."""

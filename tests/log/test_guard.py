@@ -14,11 +14,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.log import files
+from pipelines.log import log_reader
 from pipelines.log.files import open_log, write_log
 from pipelines.log.guard import Answer, Guard
 from tests.cli.commands import REPO
@@ -41,6 +42,8 @@ class _Served:
             time.sleep(60.0)
         if words == "refuse later" and self.count > 1:
             raise InputRejected("F02", "damaged", where="", remedy="copy it again")
+        if words == "stumble" or (words == "stumble later" and self.count > 1):
+            raise KeyError("a fault of its own")
         if words == "leave":
             os._exit(3)
         return Answer({"pid": os.getpid(), "count": self.count}, {"x": np.arange(3.0) + self.count})
@@ -48,15 +51,12 @@ class _Served:
 
 @pytest.fixture
 def ask(tmp_path: Path) -> Iterator[Ask]:
-    """Ask a guard about a file; its answer is vouched for unless said otherwise."""
+    """Ask a guard about a file; its answer is verified unless said otherwise."""
     guard, path = Guard(_Served()), tmp_path / "a"
     path.write_bytes(b"x")
 
-    def asked(words: str = "", vouch: bool = True, path: Path = path, needs: str = "numpy") -> Answer:
-        answer = guard.ask(words, path, needs)
-        if vouch:
-            guard.vouch()
-        return answer
+    def asked(words: str = "", verified: bool = True, path: Path = path, needs: str = "numpy") -> Answer:
+        return guard.ask(words, path, needs, lambda answer: (answer, verified))
 
     yield asked
     guard.let_go()
@@ -64,7 +64,7 @@ def ask(tmp_path: Path) -> Iterator[Ask]:
 
 def test_a_child_is_kept_while_its_answers_are_verified(ask: Ask) -> None:
     """One process for file after file; a fresh one after a file that nobody could verify, or with a library it has not got."""
-    first, second, third = ask(), ask(vouch=False), ask()
+    first, second, third = ask(), ask(verified=False), ask()
     assert first.about["pid"] == second.about["pid"] != third.about["pid"]
     assert [a.about["count"] for a in (first, second, third)] == [1, 2, 1]
     assert [a.arrays["x"].tolist() for a in (first, second, third)] == [[1.0, 2.0, 3.0], [2.0, 3.0, 4.0], [1.0, 2.0, 3.0]]
@@ -72,7 +72,7 @@ def test_a_child_is_kept_while_its_answers_are_verified(ask: Ask) -> None:
 
 
 @pytest.mark.row("F03")
-@pytest.mark.parametrize("trace", ["crash later", "hang later", "refuse later"])
+@pytest.mark.parametrize("trace", ["crash later", "hang later", "refuse later", "stumble later"])
 def test_no_file_pays_for_an_earlier_one(ask: Ask, trace: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What only a used child does is not the file's fault: a fresh child decides, within the time that the file has."""
     monkeypatch.setattr("pipelines.log.guard._SECONDS", 2.0)
@@ -80,6 +80,44 @@ def test_no_file_pays_for_an_earlier_one(ask: Ask, trace: str, monkeypatch: pyte
     began = time.monotonic()
     assert ask(trace).about["count"] == 1
     assert time.monotonic() - began < 2.0
+
+
+def test_a_fault_of_the_reader_itself_is_told(ask: Ask) -> None:
+    """Of a fresh child and of a kept one, which a fresh one follows; the next file is read."""
+    for kept in (False, True):
+        if kept:
+            ask()
+        with pytest.raises(RuntimeError, match="a fault of its own"):
+            ask("stumble")
+        assert ask(verified=False).about["count"] == 1
+
+
+@pytest.mark.row("F04")
+@pytest.mark.parametrize("harm", ["sample", "digest", "text"])
+def test_what_a_used_child_gets_wrong_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, harm: str) -> None:
+    """An earlier file has left something broken behind: sound logs are read by a fresh child, and none is called damaged."""
+    counts = iter(range(1000))
+
+    def spoilt(words: Any) -> Answer:
+        answer = log_reader._read(words)
+        if next(counts) > 0:
+            answer.about.update({"digest": {"digest": "0" * 64}, "text": {"text": "{}"}}.get(harm, {}))
+            answer.arrays["q"][-1, -1] += harm == "sample"
+        return answer
+
+    guard = Guard(spoilt)
+    monkeypatch.setattr(log_reader, "_guard", guard)
+    logs = [small_log(seed=seed) for seed in range(3)]
+    for seed, log in enumerate(logs):
+        write_log(tmp_path / f"{seed}.h5", log)
+    try:
+        assert [open_log(tmp_path / f"{seed}.h5").log for seed in range(3)] == logs
+        with h5py.File(tmp_path / "1.h5", "r+") as file:
+            file["signals/q"][0, 0] += 1.0
+        with pytest.raises(InputRejected, match="RRID-F04"):
+            open_log(tmp_path / "1.h5")
+    finally:
+        guard.let_go()
 
 
 @pytest.mark.row("F03")
@@ -117,11 +155,24 @@ def test_an_opened_log_is_not_kept_locked(tmp_path: Path) -> None:
     """F15 looks for a lock; the child holds none when the log has been read."""
     path = tmp_path / "a.h5"
     write_log(path, small_log())
-    files._guard.let_go()
+    log_reader._guard.let_go()
     open_log(path)
-    assert files._guard._child is not None
+    assert log_reader._guard._child is not None
     with path.open("r+b") as file:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_the_reader_can_be_ended(tmp_path: Path) -> None:
+    """No child is left to wait for, and the next log is read all the same."""
+    write_log(tmp_path / "a.h5", small_log())
+    for _ in range(2):
+        assert open_log(tmp_path / "a.h5").log == small_log()
+        child = log_reader._guard._child
+        assert child is not None and child._process > 0
+        process = child._process
+        log_reader.end_reader()
+        with pytest.raises(ChildProcessError):
+            os.waitpid(process, os.WNOHANG)
 
 
 def test_each_thread_has_a_child_of_its_own(tmp_path: Path) -> None:
@@ -147,8 +198,8 @@ def test_each_thread_has_a_child_of_its_own(tmp_path: Path) -> None:
 def test_the_child_goes_with_its_program(tmp_path: Path, end: str) -> None:
     """However a program ends: nobody waits for its output any longer, and no process stays."""
     write_log(tmp_path / "a.h5", small_log())
-    program = ("import os, sys\nfrom pipelines.log import files\nfiles.open_log(os.path.abspath('a.h5'))\n"
-               f"print(files._guard._child._process, flush=True)\n{end}\n")
+    program = ("import os, sys\nfrom pipelines.log import files, log_reader\nfiles.open_log(os.path.abspath('a.h5'))\n"
+               f"print(log_reader._guard._child._process, flush=True)\n{end}\n")
     done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(REPO)}, timeout=20,
                           stdout=subprocess.PIPE, text=True, check=False)
     child = int(done.stdout)
