@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from pipelines.errors import InputRejected
-from pipelines.log.guard_child import Answer, Child, Lost, die_with_parent, shared_file
+from pipelines.log.guard_child import Answer, Child, Lost, die_with_parent
 
-__all__ = ["Answer", "Guard", "die_with_parent", "guarded", "shared_file"]
+__all__ = ["Answer", "Guard", "die_with_parent", "guarded"]
 
 T = TypeVar("T")
 

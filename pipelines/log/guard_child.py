@@ -5,7 +5,7 @@
     child.end()
 
 The child is a fork: it costs milliseconds, for the libraries are imported already. It hands samples over through memory that
-both share, and everything else as JSON: nothing that a hijacked child says is ever executed.
+both share for the time of one question, and everything else as JSON: nothing that a hijacked child says is ever executed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import contextlib
 import faulthandler
 import gc
 import json
-import mmap
 import os
 import select
 import signal
@@ -34,7 +33,7 @@ from pipelines.errors import EnvironmentFault, InputRejected, RrridError, UsageE
 from pipelines.log.atomic import fault_of
 from pipelines.log.experiment import Array
 
-__all__ = ["Answer", "Child", "Lost", "die_with_parent", "shared_file"]
+__all__ = ["Answer", "Child", "Lost", "die_with_parent"]
 
 _STOPPING: Final = (signal.SIGINT, signal.SIGTERM)
 _PR_SET_PDEATHSIG: Final = 1  # prctl(2)
@@ -98,11 +97,10 @@ class Child:
             RrridError: what `work` raised.
         """
         self.asked += 1
-        store = shared_file()
+        store = _shared_file()
         try:
             text = self._answered({"words": words, "memory": memory}, store, time.monotonic() + seconds)
-            # What is mapped may not change under us: the child is gone, or the memory is sealed.
-            if last or not _sealed(store):
+            if last:
                 self.end()
             return _answer(json.loads(text), store, path)
         except BaseException:
@@ -134,7 +132,10 @@ class Child:
     def _died(self) -> int:
         """The signal that the child died of, which has closed its end; one that lives on all the same is killed for it."""
         for _ in range(_PAUSES):
-            process, status = os.waitpid(self._process, os.WNOHANG)
+            try:
+                process, status = os.waitpid(self._process, os.WNOHANG)
+            except ChildProcessError:  # whoever started us ignores ends of children (SIGCHLD): how it ended, nobody knows
+                process, status = self._process, 0
             if process:
                 self._process = 0
                 return os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
@@ -155,10 +156,10 @@ class Child:
             self.end()  # that of a thread which has ended
 
 
-def shared_file() -> int:
-    """A file without a name that both processes can map."""
+def _shared_file() -> int:
+    """A file without a name that both processes can read and write."""
     if hasattr(os, "memfd_create"):
-        return os.memfd_create("rrrid", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        return os.memfd_create("rrrid", os.MFD_CLOEXEC)
     import tempfile
 
     with tempfile.TemporaryFile() as file:
@@ -171,19 +172,6 @@ def die_with_parent() -> None:
 
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
-
-
-def _sealed(store: int) -> bool:
-    """Make the memory one that nobody can write to any more; False where the system cannot."""
-    import fcntl
-
-    if not hasattr(fcntl, "F_ADD_SEALS"):
-        return False
-    try:
-        fcntl.fcntl(store, fcntl.F_ADD_SEALS, fcntl.F_SEAL_WRITE | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW)
-    except OSError:  # the child has it mapped, or the file is none of memory
-        return False
-    return True
 
 
 def _serve(work: Callable[[Any], Answer], end: socket.socket, reader: int) -> NoReturn:
@@ -293,15 +281,18 @@ def _answer(reply: dict[str, Any], store: int, path: Path) -> Answer:
                                                       where=error["where"] or path, remedy=error["remedy"])
     if "internal" in reply:
         raise RuntimeError(f"reading {path}: {reply['internal']}")
-    return Answer(reply["about"], {name: _mapped(store, place) for name, place in reply["arrays"].items()})
+    return Answer(reply["about"], {name: _copied(store, place) for name, place in reply["arrays"].items()})
 
 
-def _mapped(store: int, place: list[int]) -> Array:
+def _copied(store: int, place: list[int]) -> Array:
+    """The array at `place`, out of the child's reach. A map would hold a handle for as long as its log is needed."""
     offset, *shape = place
-    size = 8 * int(np.prod(shape))
-    if size == 0:
-        return np.empty(shape)
-    # Private: of what is sealed against writing older systems (Linux before 6.7) give no shared map, not even to read.
-    whole = np.frombuffer(mmap.mmap(store, offset + size, flags=mmap.MAP_PRIVATE, prot=mmap.PROT_READ), dtype=np.float64,
-                          count=size // 8, offset=offset)
-    return whole.reshape(shape)
+    values = np.empty(shape)
+    view = values.reshape(-1).view(np.uint8).data
+    while view:
+        got = os.preadv(store, [view], offset)
+        if not got:
+            raise ValueError("fewer samples than were told")
+        offset, view = offset + got, view[got:]
+    values.flags.writeable = False
+    return values

@@ -133,6 +133,19 @@ def test_a_file_that_harms_every_child_is_refused(ask: Ask, monkeypatch: pytest.
         assert ask().about["count"] == 1
 
 
+@pytest.mark.row("F03")
+@pytest.mark.parametrize("words", ["crash", "leave"])
+def test_a_crash_is_told_where_nobody_can_wait_for_a_child(ask: Ask, words: str) -> None:
+    """SIGCHLD ignored, as a program may inherit it: the system takes the dead child away, and says nothing of its end."""
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        with pytest.raises(InputRejected, match="RRID-F03 .*ended its process"):
+            ask(words)
+        assert ask().about["count"] == 1
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
 def test_relative_paths_are_read_from_where_the_program_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The program changes its folder, and its kept child does not."""
     for name in "ab":
@@ -149,6 +162,17 @@ def test_what_is_read_stays_what_it_was(ask: Ask) -> None:
     assert first.arrays["x"].tolist() == [1.0, 2.0, 3.0]
     with pytest.raises(ValueError, match="read-only"):
         first.arrays["x"][0] = 9.0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts handles in /proc")
+def test_a_log_that_is_kept_holds_no_file(tmp_path: Path) -> None:
+    """A command has 1000 logs open at once, and the system gives it 1024 handles."""
+    write_log(tmp_path / "a.h5", small_log())
+    open_log(tmp_path / "a.h5")
+    before = len(os.listdir("/proc/self/fd"))
+    logs = [open_log(tmp_path / "a.h5").log for _ in range(20)]
+    assert len(os.listdir("/proc/self/fd")) == before
+    assert logs == [small_log()] * 20
 
 
 def test_an_opened_log_is_not_kept_locked(tmp_path: Path) -> None:
@@ -168,7 +192,8 @@ def test_the_reader_can_be_ended(tmp_path: Path) -> None:
     for _ in range(2):
         assert open_log(tmp_path / "a.h5").log == small_log()
         child = log_reader._guard._child
-        assert child is not None and child._process > 0
+        assert child is not None
+        assert child._process > 0
         process = child._process
         log_reader.end_reader()
         with pytest.raises(ChildProcessError):
