@@ -44,9 +44,10 @@ def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[]
     if not 1 < len(pieces) < _MOST or not _second():
         return [work(piece) for piece in pieces]
     places = _places(len(pieces))
-    other = _Other(lambda: ([(k, work(pieces[k])) for k in _next(places)], left()))
+    other = _Other()
     found: dict[int, A] = {}
     try:
+        other.begin(lambda: ([(k, work(pieces[k])) for k in _next(places)], left()))
         found.update((k, work(pieces[k])) for k in _next(places))
         with contextlib.suppress(EOFError, OSError, MemoryError):  # it came to grief: its pieces are done here
             answers, words = other.answer()
@@ -85,8 +86,12 @@ def _next(places: int) -> Iterator[int]:
 class _Other:
     """A copy of this process that answers once."""
 
-    def __init__(self, work: Callable[[], Any]) -> None:
-        self._ours, theirs = multiprocessing.Pipe(duplex=False)
+    def __init__(self) -> None:
+        self._process = 0
+        self._ours, self._theirs = multiprocessing.Pipe(duplex=False)
+
+    def begin(self, work: Callable[[], Any]) -> None:
+        """Make the copy. A signal that comes meanwhile is taken when all is in place for `end`."""
         parent = os.getpid()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)  # the copy has no use for this program's handlers
         try:
@@ -94,10 +99,10 @@ class _Other:
                 warnings.simplefilter("ignore", DeprecationWarning)  # a fork beside threads: the copy takes none of their locks
                 self._process = os.fork()
             if self._process == 0:
-                _serve(work, theirs, before, parent)
+                _serve(work, self._theirs, before, parent)
+            self._theirs.close()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            theirs.close()
 
     def answer(self) -> Any:
         """What it has made of its work.
@@ -110,9 +115,11 @@ class _Other:
     def end(self) -> None:
         """It has answered, or nobody waits for it any more."""
         self._ours.close()
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self._process, signal.SIGKILL)
-        os.waitpid(self._process, 0)
+        self._theirs.close()
+        if self._process:
+            with contextlib.suppress(ProcessLookupError, ChildProcessError):  # it ended and was waited for: by another, or by none
+                os.kill(self._process, signal.SIGKILL)
+                os.waitpid(self._process, 0)
 
 
 def _serve(work: Callable[[], Any], end: Connection[Any, Any], mask: set[int | signal.Signals],

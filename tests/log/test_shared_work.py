@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import time
 
 import numpy as np
@@ -89,6 +91,41 @@ def test_an_error_is_told_and_no_process_is_left(bad: int, monkeypatch: pytest.M
     for child in started:  # not any child: other tests have theirs
         with pytest.raises(ChildProcessError):
             os.waitpid(child, os.WNOHANG)
+
+
+def _handles() -> int:
+    return len(os.listdir("/proc/self/fd"))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts handles in /proc")
+def test_ctrl_c_while_the_copy_is_made_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No process and no open pipe, whenever it is taken notice of."""
+    started, fork, handles = list[int](), os.fork, _handles()
+
+    def interrupted() -> int:
+        if child := fork():
+            started.append(child)
+            os.kill(os.getpid(), signal.SIGINT)
+        return child
+
+    monkeypatch.setattr(os, "fork", interrupted)
+    for _ in range(3):
+        with pytest.raises(KeyboardInterrupt):
+            shared_out(slowly, PIECES)
+    assert _handles() == handles
+    assert len(started) == 3
+    for child in started:
+        with pytest.raises(ChildProcessError):
+            os.waitpid(child, os.WNOHANG)
+
+
+def test_a_program_whose_children_nobody_waits_for_gets_its_answers() -> None:
+    """SIGCHLD ignored, as a program may inherit it: the system takes the copy away before anybody can wait for it."""
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        assert [piece for piece, _ in shared_out(slowly, PIECES)] == PIECES
+    finally:
+        signal.signal(signal.SIGCHLD, before)
 
 
 def test_workers_of_a_batch_share_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
