@@ -30,7 +30,8 @@ __all__ = ["Diagnose", "by_command", "engine_named", "judge", "scores_in", "task
 
 Diagnose = Callable[[Path, tuple[str, ...]], Any]
 Task = tuple[Sealed, tuple[str, ...]]
-_KEPT = ("verdict", "findings", "standing", "rejected", "not_testable", "residual_rms", "reason", "floor_origin")
+_KEPT = ("verdict", "findings", "standing", "rejected", "not_testable", "residual_rms", "reason", "floor_origin",
+         "held_out_floor")
 
 
 def by_command(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:

@@ -43,7 +43,8 @@ class Score:
     joint: bool | None = None  # of the first finding, where one joint is to be named
     parameters: tuple[tuple[str, bool], ...] = ()  # "cogging order", whether it agrees
     angles: tuple[tuple[str, bool], ...] = ()
-    residual: float | None = None  # held-out residual over the floor with all findings, of the worst joint
+    residual: float | None = None  # held-out residual over the floor of the held-out logs, all findings, worst joint
+    over_fitted: float | None = None  # the same over the floor of the fitted logs
     simulated: bool | None = None  # the simulated position error fell; None: nothing was named, or nothing simulated
     seconds: float = math.nan
     case: Mapping[str, Any] = field(default_factory=dict)
@@ -68,7 +69,8 @@ def score(sealed: Sealed, said: Said, seconds: float = math.nan, without: Sequen
         sealed.key, "taken out" if without else sealed.family, kinds, sealed.strength, said.verdict,
         tuple(found.cause for found in said.findings), _right(sealed, said, true, without, twins or {}), len(true),
         len(pairs) - len(true), _joint(first, truths), tuple(named), tuple(angles),
-        _over_floor(said) if true else None, _fell(said.findings) if true else None, seconds, sealed.case)
+        _over_floor(said, said.held_out_floor or said.floor) if true else None, _over_floor(said, said.floor) if true else None,
+        _fell(said.findings) if true else None, seconds, sealed.case)
 
 
 def same_place(found: Found, truth: Mapping[str, Any]) -> bool:
@@ -146,10 +148,10 @@ def _agreed_angle(found: Found, truth: Mapping[str, Any], name: str) -> bool:
     return abs(away) <= max(_ANGLE, STDS * std)
 
 
-def _over_floor(said: Said) -> float:
-    """Largest over the joints of the held-out residual with every finding over the floor; NaN where there is none."""
+def _over_floor(said: Said, floors: Sequence[float]) -> float:
+    """Largest over the joints of the held-out residual with every finding over a floor; NaN where there is none."""
     after = said.findings[-1].torque_after
-    shares = [rms / floor if floor > 0.0 else math.nan for rms, floor in zip(after, said.floor, strict=True)]
+    shares = [rms / floor if floor > 0.0 else math.nan for rms, floor in zip(after, floors, strict=True)]
     return math.nan if not shares or any(math.isnan(share) for share in shares) else max(shares)
 
 

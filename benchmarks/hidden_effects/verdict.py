@@ -31,7 +31,8 @@ class Said:
     findings: tuple[Found, ...] = ()
     standing: tuple[Place, ...] = ()
     not_testable: Mapping[str, str] = field(default_factory=dict)  # cause -> reason
-    floor: tuple[float, ...] = ()  # [N m] of each joint
+    floor: tuple[float, ...] = ()  # [N m] of each joint, of the fitted logs
+    held_out_floor: tuple[float, ...] = ()  # of the held-out ones; empty where nobody knows
 
 
 def read_verdict(answer: Mapping[str, Any]) -> Said:
@@ -43,7 +44,8 @@ def read_verdict(answer: Mapping[str, Any]) -> Said:
     return Said(
         answer["verdict"], tuple(_found(one) for one in answer["findings"]),
         tuple((one["cause"], one["joint"]) for one in answer["standing"]),
-        {one["cause"]: one["reason"] for one in answer["not_testable"]}, _numbers(answer["residual_rms"]["floor"]))
+        {one["cause"]: one["reason"] for one in answer["not_testable"]}, _numbers(answer["residual_rms"]["floor"]),
+        _numbers(answer.get("held_out_floor")))
 
 
 def _found(one: Mapping[str, Any]) -> Found:

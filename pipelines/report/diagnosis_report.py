@@ -13,8 +13,8 @@ from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_words import (
     cause_at,
-    floor_name,
     floor_words,
+    held_out_floor,
     held_out_words,
     in_order,
     per_joint,
@@ -42,7 +42,7 @@ def diagnosis_report(result: Result) -> Report:
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
                 *_limits(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
-                  errors_table(result.residual_rms, result.after_rms, result.rated, floor_name(result), floor_words(result)),
+                  errors_table(result.residual_rms, result.after_rms, result.rated, *held_out_floor(result)),
                   tuple(sections), _advice(result))
 
 

@@ -13,8 +13,8 @@ from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, to_one_place, with_std
 
-__all__ = ["cause_at", "floor_name", "floor_words", "held_out_words", "in_order", "per_joint", "title_of", "told_value",
-           "torque_errors"]
+__all__ = ["cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "per_joint", "title_of",
+           "told_value", "torque_errors"]
 
 _FLOORS = {
     "twin": "The floor is what the simulated twin leaves: the fitted model run through the same experiment and the same analysis.",
@@ -25,6 +25,10 @@ _FLOORS = {
 
 _FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference logs", "repetition": "between repetitions",
                 "blocks": "noise of the residual"}
+
+
+_HELD_OUT_FLOOR = ("An arm in order: the fitted rigid body and friction, run through the held-out experiments with the noise of "
+                   "these drives, and analysed alike.")
 
 
 def cause_at(cause: str, joint: int | None) -> str:
@@ -61,6 +65,13 @@ def floor_name(found: Diagnosis) -> str:
     return _FLOOR_NAMES.get(found.floor_origin, "floor")
 
 
+def held_out_floor(found: Diagnosis) -> tuple[Array, str, str]:
+    """The floor beside held-out errors: (joints,) [N m], its name in a heading, and where it comes from."""
+    if found.held_out_floor is None:
+        return found.residual_rms.floor, floor_name(found), floor_words(found)
+    return found.held_out_floor, "left by an arm in order", _HELD_OUT_FLOOR
+
+
 def floor_words(found: Diagnosis) -> str:
     """Where the floor comes from."""
     return _FLOORS.get(found.floor_origin, f"The floor comes from {found.floor_origin}.")
@@ -73,16 +84,16 @@ def held_out_words(held_out: str) -> str:
     return "No log has the role validate: contiguous blocks of time were held out, one after the other."
 
 
-def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: str, words: str) -> Table:
+def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: Array, name: str, words: str) -> Table:
     """Joint by joint: the held-out torque error before and after, in N m and in percent of the rated torque, and the floor.
 
     Args:
-        floor: what the floor is called; `words`: where it comes from.
+        floor: (joints,) [N m]; `name`: what it is called; `words`: where it comes from.
     """
-    torques = to_one_place([*map(float, before.validate), *map(float, after.validate), *map(float, before.floor)])
-    joints = len(before.floor)
+    torques = to_one_place([*map(float, before.validate), *map(float, after.validate), *map(float, floor)])
+    joints = len(floor)
     limits = [rated[j] if j < len(rated) and math.isfinite(rated[j]) else math.nan for j in range(joints)]
     shares = to_one_place([100.0 * float(x[j]) / limits[j] for x in (before.validate, after.validate) for j in range(joints)])
     rows = tuple((j + 1, *torques[j::joints], *shares[j::joints]) for j in range(joints))
-    return Table(("joint", "held-out torque error now [N m]", "extended [N m]", f"{floor} [N m]", "now [% of rated]",
+    return Table(("joint", "held-out torque error now [N m]", "extended [N m]", f"{name} [N m]", "now [% of rated]",
                   "extended [% of rated]"), rows, f"Root mean square. {words}".strip())

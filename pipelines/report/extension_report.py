@@ -27,7 +27,7 @@ def extension_report(result: Extension) -> Report:
     if result.doctor:
         sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
-                  torque_errors(result.residual_rms, result.after_rms, result.rated, *_NOISE),
+                  torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.floor, *_NOISE),
                   tuple(sections))
 
 

@@ -29,6 +29,7 @@ from pipelines.model.diagnosis.evidence import evidence, floors_of
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.held_out import held_out_left
+from pipelines.model.diagnosis.held_out_floor import held_out_floor, noise_in
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.limits import detectable, not_testable
@@ -114,6 +115,7 @@ class _Floored:
     origin: str
     thresholds: Thresholds | None
     calibration: Calibration | None
+    noise: Array | None  # (joints,) [N m] of the drives; None where nobody knows
 
 
 def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -123,8 +125,8 @@ def _floored(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen
         refuse_unfit(given, prepared, case.families, "twin")
     made = _calibrated(prepared, case, rough, chosen) if given is None else given
     if made is None:
-        return _Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None)
-    return _Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made)
+        return _Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
+    return _Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.noise)
 
 
 def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> Calibration | None:
@@ -165,7 +167,8 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     done = settled(found, rule(found, since.floor), case, now, since.floor)
     if since.absorbed is not None and done.ruling.verdict == "unknown":
         done = unnamed(done, since.floor)
-    told = _told(first, case, done, _Floored(since.floor, "reference logs", None, given), chosen, since.probed)
+    noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
+    told = _told(first, case, done, _Floored(since.floor, "reference logs", None, given, noise), chosen, since.probed)
     if given is None:
         told = replace(told, calibration=Calibration(
             origin_of("reference logs", logs, None, chosen), conditions_of(now), since.chance.weight, since.floor,
@@ -209,6 +212,9 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     judge = first.held.judge if parts else prepared.judge
     rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
            for one, rows in ((plain, judge), (responded.final, responded.judge))]
+    own = None if judge is None or floored.noise is None else held_out_floor(
+        responded.final.model, acted(responded.final.model.arm, case.beside), floored.noise, prepared.judging, judge,
+        prepared.recipe, chosen.seed)
     made = floored.calibration
     pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()
     harmful = tuple(Rejected(part.acting.effect.name, part.acting.effect.joint, f"named by frequency responses, but the model goes "
@@ -220,7 +226,7 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
         (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
-        0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise,
+        0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise, own,
         acted(plain.model.arm, standing), acted(arm, responded.acting), made)
 
 

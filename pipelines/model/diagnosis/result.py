@@ -257,6 +257,7 @@ class Diagnosis:
     evidence: tuple[Evidence, ...]
     replicas: int  # of the twin; 0 without
     noise: Array  # [N m] of the drives, as the twin has it; NaN without
+    held_out_floor: Array | None  # [N m] what the arm in order would leave of the held-out logs; None: it cannot be simulated
     nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding, with what stands
     extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects
     calibration: Calibration | None = field(default=None, metadata=NOT_STORED, repr=False)  # thresholds

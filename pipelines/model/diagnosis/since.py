@@ -41,6 +41,7 @@ class Since:
 
     case: Case
     floor: Array  # (joints,) [N m]
+    left: Array  # (rows,) [N m] of the reference logs, by the model that has the standing effects
     standing: tuple[Standing, ...]
     acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
     absorbed: Absorbed | None  # what the base parameters show
@@ -71,7 +72,8 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm))
     start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
 
-    floor = reference.rms(whole.left[~later])
+    left = whole.left[~later]
+    floor = reference.rms(left)
     weight, there = (1.0 / np.maximum(floor, 1e-12), {}) if known is None else known
     chance = Chance.of(data, later, nominal, common, weight, arm,
                        {family: there[family.cause, family.joint] for family in every if (family.cause, family.joint) in there})
@@ -89,7 +91,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     kept = len(columns.kept)
     moved = absorbed(data, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
     pairs = list(zip(standing, sizes, strict=True))
-    return Since(case, floor, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed)
+    return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed)
 
 
 def _slopes(found: Refined, later: Mask) -> Array:

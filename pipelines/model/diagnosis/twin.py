@@ -28,7 +28,7 @@ from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Noise, Simulated, simulate, simulate_together
 
-__all__ = ["Twin", "drive_noise", "make_twin", "replayable", "white"]
+__all__ = ["Twin", "drive_noise", "imperfect", "make_twin", "replayable", "replica", "white"]
 
 _WINDOW = 0.4  # [s] in which the noise is looked at
 _QUIET = 0.3  # of the windows are taken for quiet
@@ -130,16 +130,17 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
     runs = dict(zip(places, every, strict=True))
     found = []
     for k in range(replicas):
-        parts = [_motion(motions[place], done, k, recipe) for place, done in runs.items()]
+        parts = [replica(motions[place], done, k, recipe) for place, done in runs.items()]
         rows = [data.logs[place].equations.rows for place in places]
         own = gather(tuple(parts), columns, recipe, rows)
-        small = own.lay_each(_imperfect(model.nominal, noise, own, seed + k))
+        small = own.lay_each(imperfect(model.nominal, noise, own, seed + k))
         slopes, _ = law_slopes(own, columns, model.beta)
         found.append(fit_columns(own, np.concatenate([rows_of(own, columns), *slopes]), own.y + small, weight))
     return Twin(tuple(found), places, noise)
 
 
-def _imperfect(arm: Arm, noise: Array, own: Data, seed: int) -> Callable[[int, Motion], Array]:
+def imperfect(arm: Arm, noise: Array, own: Data, seed: int) -> Callable[[int, Motion], Array]:
+    """Small loads (samples, joints) [N m] of a replica in each of its logs `own`, drawn by `seed`."""
     def loads(log: int, motion: Motion) -> Array:
         step = own.logs[log].log.sample_time
         return small_loads(motion, arm, noise, step, np.random.default_rng([_NUISANCE, seed]),
@@ -150,11 +151,11 @@ def _imperfect(arm: Arm, noise: Array, own: Data, seed: int) -> Callable[[int, M
 
 def _analysed(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int, recipe: Recipe, columns: Columns, data: Data,
               place: int) -> tuple[Data, Fit]:
-    own = gather((_motion(real, done, k, recipe),), columns, recipe, (data.logs[place].equations.rows,))
+    own = gather((replica(real, done, k, recipe),), columns, recipe, (data.logs[place].equations.rows,))
     return own, fit_columns(own, rows_of(own, columns))
 
 
-def _motion(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int,
+def replica(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int,
             recipe: Recipe) -> tuple[ExperimentLog, Reconstructed]:
     """Replica `k`, reconstructed as the log was: another tuning, in which ends are less certain, would be no noise of the drive."""
     log, found = real
