@@ -14,21 +14,21 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Spring"]
 
-_DEGREE = 5
+_DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
 _TURN = 0.98 * 2.0 * math.pi  # [rad]
-_TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth")  # of x, x², …
+_TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …
 
 
 @dataclass(frozen=True)
 class Spring(Effect):
-    """τ = k x + b x² + c x³ + d x⁴ + e x⁵, x = q - q0: a polynomial in q, whose coefficients are the amplitudes.
+    """τ = k x + b x² + c x³ + d x⁴ + e x⁵ (+ f x⁶ + g x⁷), x = q - q0: a polynomial in q, whose coefficients are the amplitudes.
 
     A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its linear part is q0. Where gravity
     acts on the joint, the fit of its weight takes much of the polynomial: k, of either sign then, and q0 are known poorly. With
     odd powers alone they were no better known, and the fit, no longer linear, ended elsewhere.
     """
 
-    degree: int = _DEGREE
+    degree: int = _MORE
     highest: int = _DEGREE  # of the form that a finding is refitted with
 
     name = "spring"
@@ -40,6 +40,8 @@ class Spring(Effect):
         Quantity("hardening", "N m/rad^3", -1e4, 1e4, "c: how much stiffer it is far out"),
         Quantity("fourth", "N m/rad^4", -1e4, 1e4, "d"),
         Quantity("fifth", "N m/rad^5", -1e4, 1e4, "e"),
+        Quantity("sixth", "N m/rad^6", -1e2, 1e2, "f", unsaid=0.0),
+        Quantity("seventh", "N m/rad^7", -1e2, 1e2, "g", unsaid=0.0),
     )
     signature = "A torque that depends on the angle of its joint alone and pulls towards one angle."
     explanation = "A cable bundle, a hose or a balancing spring pulls the joint."
@@ -61,6 +63,9 @@ class Spring(Effect):
     def full(self) -> Self:
         return replace(self, degree=self.highest)
 
+    def forms(self) -> tuple[Self, ...]:
+        return (replace(self, degree=_MORE, highest=_MORE),) if self.highest == _DEGREE else ()
+
     def own_load(self, values: Values) -> OwnLoad:
         slope, constant, *rest = self.amplitudes(values).tolist()
         falling = (*rest[::-1], slope, constant)
@@ -81,7 +86,7 @@ class Spring(Effect):
         slope, constant, *rest = (float(a) for a in amplitudes)
         polynomial = [constant, slope, *rest]
         zero = _zero(polynomial)
-        found = dict(zip(_TERMS, [*_about(polynomial, zero)[1:], *[0.0] * (_DEGREE - self.degree)], strict=True))
+        found = dict(zip(_TERMS, [*_about(polynomial, zero)[1:], *[0.0] * (_MORE - self.degree)], strict=True))
         return {q.name: zero if q.name == "rest_angle" else found[q.name] for q in self.parameters}
 
 

@@ -20,7 +20,7 @@ from sample_logs.make_model import synthetic_arm
 
 UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "kg m^2", "N", "N m", "N m s/rad",
          "N m/rad", "N m/rad^2", "N m/rad^3", "N m/rad^4",
-         "N m/rad^5", "N m s^2/rad^2"}
+         "N m/rad^5", "N m/rad^6", "N m/rad^7", "N m s^2/rad^2"}
 REPO = Path(__file__).resolve().parents[3]
 # Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, and what
 # a frequency response tells apart without any motion.
