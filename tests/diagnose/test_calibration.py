@@ -153,6 +153,26 @@ def test_what_is_no_calibration_is_rejected(spoil: Any, code: str, words: str, p
     assert refused.value.code == code
 
 
+@pytest.mark.parametrize(("of", "name"), [
+    ("wide", "weight"), ("wide", "model"), ("wide", "left"), ("wide", "usual"), ("wide", "rest"), ("wide", "longer"),
+    ("cause", "columns"), ("cause", "model"), ("cause", "left"), ("conditions", "speed"),
+    ("conditions", "row_time"), ("", "floor")])
+def test_what_is_no_number_is_rejected(of: str, name: str, place: Path, tmp_path: Path) -> None:
+    """S19: with one NaN in the sums, no gain of a cause of the whole arm would ever exceed its threshold, and nobody would know."""
+    made = read_calibration(place / "first")
+    assert made.wide is not None
+    owner: Any = {"wide": made.wide, "cause": made.wide.causes[-1], "conditions": made.conditions, "": made}[of]
+    value = np.array(getattr(owner, name), dtype=float)
+    value.reshape(-1)[-1] = np.nan
+    spoilt: Any = replace(owner, **{name: value if value.ndim else float(value)})
+    parts: dict[str, Any] = {"wide": {"wide": spoilt}, "conditions": {"conditions": spoilt},
+                             "cause": {"wide": replace(made.wide, causes=(*made.wide.causes[:-1], spoilt))}}.get(of, {})
+    write_calibration(tmp_path, replace(made, **parts) if of else spoilt)
+    with pytest.raises(InputRejected, match="no numbers|no positive numbers") as refused:
+        read_calibration(tmp_path)
+    assert refused.value.code == "RRID-S19"
+
+
 def test_one_that_is_missing_or_was_changed_is_told(place: Path, tmp_path: Path) -> None:
     with pytest.raises(RrridError) as missing:
         read_calibration(tmp_path)

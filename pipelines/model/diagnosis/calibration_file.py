@@ -20,6 +20,7 @@ from pipelines.log.results import decode, encode, json_text, read_foreign_series
 from pipelines.log.stored_result import listed_outputs
 from pipelines.log.text import read_small_text
 from pipelines.model.diagnosis.calibration import FORMAT, FORMAT_VERSION, Calibration
+from pipelines.model.diagnosis.wide import Wide
 
 __all__ = ["calibration_files", "calibration_schema", "read_calibration", "write_calibration"]
 
@@ -109,9 +110,16 @@ def _fault(made: Calibration) -> str:
     places = (None, *range(1, joints + 1))
     if not all(one.own >= 0.0 and (stored or one.gain >= 0.0) and one.joint in places for one in made.causes):
         return "a threshold that is no number, or of a joint that is not there"
-    wide, count = made.wide, sum(one.joint is None for one in made.causes)
-    if wide is None:
+    if not (np.isfinite(arrays[0]).all() and all(np.isfinite(one).all() for one in arrays[2:])
+            and made.conditions.row_time > 0.0):
+        return "a floor, or conditions, that are no numbers"  # the noise of the drives is unknown without a twin
+    if made.wide is None:
         return "" if stored else "causes of the whole arm are missing"
+    return _fault_of_sums(made.wide, joints, sum(one.joint is None for one in made.causes))
+
+
+def _fault_of_sums(wide: Wide, joints: int, count: int) -> str:
+    """Of `count` causes of the whole arm."""
     rank, replicas = wide.model.shape[1], wide.left.shape[2]
     fits = (len(wide.causes) == count and wide.model.shape == (joints, rank, rank) and wide.left.shape == (joints, rank, replicas)
             and wide.weight.shape == wide.usual.shape == wide.rest.shape == (joints,))
@@ -119,4 +127,9 @@ def _fault(made: Calibration) -> str:
         shapes, k = one.columns.shape[1:3]
         fits = fits and (one.columns.shape == (joints, shapes, k, k) and one.model.shape == (joints, shapes, k, rank)
                          and one.left.shape == (joints, shapes, k, replicas))
-    return "" if fits else "sums of causes of the whole arm that do not go together"
+    if not fits:
+        return "sums of causes of the whole arm that do not go together"
+    # Of a cause without numbers no gain exceeds its threshold: it would be found nowhere, and nobody told.
+    sums = [wide.model, wide.left, wide.usual, wide.rest, *(x for one in wide.causes for x in (one.columns, one.model, one.left))]
+    finite = all(np.isfinite(x).all() for x in sums) and bool((np.isfinite(wide.weight) & (wide.weight > 0.0)).all())
+    return "" if finite and 0.0 < wide.longer < np.inf else "sums of causes of the whole arm that are no numbers"
