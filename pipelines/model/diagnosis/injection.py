@@ -139,7 +139,9 @@ def smallest(family: Family, bound: float, probe: Probe) -> Hidden | None:
 
 def _raised(factor: Callable[[float], float], strength: float) -> float:
     """The strength for which the factor by which more is wanted is one."""
-    for _ in range(_TIMES if np.isfinite(strength) else 0):
+    for _ in range(_TIMES):
+        if not np.isfinite(strength):
+            break
         more = factor(strength)
         if more == 1.0:
             return strength

@@ -14,7 +14,7 @@ from pipelines.bench.faults import make
 from pipelines.bench.machine import Machine, draw_machine
 from pipelines.bench.session import record
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.injection import _last_root
+from pipelines.model.diagnosis.injection import _last_root, _raised
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Detectable, Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
@@ -102,3 +102,17 @@ def test_from_which_strength_on_a_gain_stays_above_its_bound(seed: int) -> None:
         roots = np.roots([line[0], 2.0 * line[1], line[2]])
         real = roots[np.abs(roots.imag) < 1e-12].real
         assert one == pytest.approx(max([0.0, *real]), abs=1e-9)
+
+
+def test_a_strength_is_raised_until_it_passes_and_no_further_than_a_torque_goes() -> None:
+    """A quarter more at a time; where the torque has run away no greater strength is tried."""
+    assert _raised(lambda strength: 1.0 if strength > 3.0 else 1.25, 1.0) == pytest.approx(1.25**5)
+    asked: list[float] = []
+
+    def runs_away(strength: float) -> float:
+        asked.append(strength)
+        return np.inf if strength > 2.0 else 1.5
+
+    assert _raised(runs_away, 1.0) == np.inf
+    assert asked == [1.0, 1.5, 2.25]
+    assert _raised(lambda strength: 1.0, np.inf) == np.inf
