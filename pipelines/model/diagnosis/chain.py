@@ -31,9 +31,9 @@ def gains(found: Found, named: Sequence[int], order: Sequence[int], simulated: S
         beside: effects that the rows are without, and the arms that are simulated are not.
     """
     as_found = list(range(len(order)))
-    if list(order) == as_found == list(named):
+    if list(order) == as_found == list(named) and len(simulated) == len(order) + 1:
         models = [found.nominal, *(found.steps[k + 1].before for k in as_found[:-1]), found.final]
-        runs = list(simulated[:len(models)])
+        runs = list(simulated)
     else:
         models = [found.nominal, *(_with(found, order[:count]) for count in range(1, len(order))), found.final]
         runs = simulation_errors([acted(one.model.arm, beside) for one in models], prepared.judging or prepared.motions)

@@ -1,0 +1,50 @@
+"""Which arms are simulated for what each cause is worth, on made-up steps: always those that are told of."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from pipelines.model.diagnosis import chain
+
+
+def left(name: str) -> Any:
+    return SimpleNamespace(model=SimpleNamespace(arm=name))
+
+
+@pytest.fixture
+def simulated_anew(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The arms that are simulated again; a gain is told by the simulations before and after."""
+    asked: list[str] = []
+
+    def simulate(arms: list[str], motions: object) -> list[str]:
+        asked.extend(arms)
+        return [f"simulated {arm}" for arm in arms]
+
+    monkeypatch.setattr(chain, "simulation_errors", simulate)
+    monkeypatch.setattr(chain, "acted", lambda arm, beside: arm)
+    monkeypatch.setattr(chain, "torque_gain", lambda before, after, judge, blocks: None)
+    monkeypatch.setattr(chain, "gain_of", lambda torque, before, after: (before, after))
+    monkeypatch.setattr(chain, "_with", lambda found, places: left(f"with {places}"))
+    return asked
+
+
+@pytest.mark.parametrize(("named", "order", "anew"), [
+    ((0, 1), (0, 1), []),  # as they were found
+    ((0,), (0,), ["nominal", "final"]),  # the last was dropped, and the weights are still its
+    ((1,), (0,), ["nominal", "final"]),  # the first
+    ((0, 1), (1, 0), ["nominal", "with [1]", "final"])])  # told in another order
+def test_a_gain_is_that_of_the_arm_that_is_told(named: tuple[int, ...], order: tuple[int, ...], anew: list[str],
+                                               simulated_anew: list[str]) -> None:
+    """What was simulated after each step of the search serves only where the final model is the search's own."""
+    steps = [SimpleNamespace(before=left(name)) for name in ("nominal", "after 1", "after 2")]
+    found: Any = SimpleNamespace(nominal=left("nominal"), steps=steps, final=left("final"))
+    runs: Any = ["then nominal", "then 1", "then 2"]
+    prepared: Any = SimpleNamespace(judging=(), motions=(), judge=None)
+    worth: Any = chain.gains(found, named, list(order), runs, prepared, (), 10)
+    assert simulated_anew == anew
+    chained = [f"simulated {arm}" for arm in anew] or runs
+    assert worth == list(pairwise(chained))
