@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import os
+import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import partial
@@ -31,7 +32,8 @@ class Kept:
     def __init__(self, room: int = _ROOM) -> None:
         self._room, self._used = room, 0
         self._rows: OrderedDict[Hashable, Array] = OrderedDict()
-        self._numbered: list[tuple[object, Hashable]] = []
+        self._numbered: list[tuple[weakref.ref[object], Hashable]] = []
+        self._count = 0
 
     def of(self, key: Hashable, lay: Callable[[], Array]) -> Array:
         found = self._rows.pop(key, None)
@@ -46,11 +48,16 @@ class Kept:
         return found
 
     def number(self, thing: object) -> Hashable:
-        """One for each object, as part of a key; what a copy of this process numbers has no number of this one's."""
+        """One for each object, as part of a key; what a copy of this process numbers has no number of this one's.
+
+        Only objects that somebody else holds have one, and no number is given twice.
+        """
+        self._numbered = [(other, number) for other, number in self._numbered if other() is not None]
         for other, number in self._numbered:
-            if other is thing:
+            if other() is thing:
                 return number
-        self._numbered.append((thing, (os.getpid(), len(self._numbered))))
+        self._count += 1
+        self._numbered.append((weakref.ref(thing), (os.getpid(), self._count)))
         return self._numbered[-1][1]
 
     def keys(self) -> frozenset[Hashable]:
