@@ -24,7 +24,9 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Val
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
-__all__ = ["agreement", "extended_arm", "findings", "held_finding", "rejected", "sure"]
+__all__ = ["BY_CHANCE", "agreement", "by_chance", "extended_arm", "findings", "held_finding", "rejected", "sure", "unlike"]
+
+BY_CHANCE = "its gain on held-out torque is within what chance does"
 
 _HALF = 0.5
 _ALIKE = 0.8  # cosine from which two causes explain the same
@@ -106,13 +108,24 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
 def sure(step: Step, prepared: Prepared, blocks: int) -> str:
     """Why an accepted step is not to be believed; empty where it is: its gain repeats, its amplitude is the same in every log."""
     best = step.best
-    if best is None or best.log is not None:
-        return ""
-    gain = torque_gain(step.before, best.done, prepared.judge, blocks)
+    if best is not None and best.log is None and by_chance(step.before, best.done, prepared.judge, blocks):
+        return BY_CHANCE
+    return unlike(step, prepared, blocks)
+
+
+def by_chance(before: Refined, after: Refined, judge: Data | None, blocks: int) -> bool:
+    """Whether no joint's held-out error falls by more than chance does."""
+    gain = torque_gain(before, after, judge, blocks)
     # An event, torque that is clipped once say, is in one block of time only, and drawn blocks do not repeat it; but what was
     # fitted to other time does not take half of the power off by chance.
-    if not (gain.ci95[:, 1] < 0.0).any() and not (gain.after**2 < _HALF * gain.before**2).any():
-        return "its gain on held-out torque is within what chance does"
+    return not (gain.ci95[:, 1] < 0.0).any() and not (gain.after**2 < _HALF * gain.before**2).any()
+
+
+def unlike(step: Step, prepared: Prepared, blocks: int) -> str:
+    """Why an accepted step does not do the same in every log; empty where it does."""
+    best = step.best
+    if best is None or best.log is not None:
+        return ""
     data = best.done.data if prepared.judge is None else prepared.judge
     if worse := worse_log(data, *(held_out_left(one, prepared.judge, blocks) for one in (step.before, best.done))):
         return worse

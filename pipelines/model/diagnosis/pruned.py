@@ -1,4 +1,8 @@
-"""After the search: what does not repeat on held-out time, or no longer pays beside what was found later, is dropped again."""
+"""After the search: what does not repeat on held-out time, or no longer pays beside what was found later, is dropped again.
+
+What gained no more than chance when it was found is asked again beside all that is believed: what was found after it was noise
+to it then.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +12,16 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.beside import acted
+from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import sure
+from pipelines.model.diagnosis.findings import BY_CHANCE, by_chance, unlike
 from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.search import Found
+from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 
@@ -23,7 +29,9 @@ __all__ = ["Settled", "settled", "unnamed"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
+_ALIKE = 0.25  # of what a cause took away, that one for which it could be mistaken takes as well: weaker ones are no rivals
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
+_SHAPE = "it only mends the shape of what was found before it at the joint"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +49,14 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    doubts = {k: sure(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1], late=late)
+    doubts = {k: unlike(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1], late=late)
               for k in ruling.named}
     doubts = {k: why for k, why in doubts.items() if why}
-    kept = _apart(found, [k for k in ruling.named if k not in doubts])
-    final = _without(found, kept, case)
+    doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
+    kept = _apart(found, [k for k in ruling.named if k not in doubts], case)
+    doubts |= {k: _SHAPE for k in ruling.named if k not in (*kept, *doubts)}
+    kept, final = _asked_again(found, kept, [k for k, why in doubts.items() if why == BY_CHANCE], case)
+    doubts = {k: why for k, why in doubts.items() if k not in kept}
     while len(kept) > 1:
         idle = _idle(found, kept, case, final)
         if idle is None:
@@ -93,21 +104,50 @@ def _harm(found: Found, final: Refined, case: Case) -> str:
     return worse_log(case.data if case.judge is None else case.judge, *left)
 
 
-def _apart(found: Found, kept: list[int]) -> list[int]:
+def _by_chance(step: Step, prepared: Prepared, blocks: int) -> bool:
+    best = step.best
+    return best is not None and best.log is None and by_chance(step.before, best.done, prepared.judge, blocks)
+
+
+def _asked_again(found: Found, kept: list[int], vague: list[int], case: Case) -> tuple[list[int], Refined]:
+    """With those of `vague` that gain more than chance does beside `kept`, and the model with all of them."""
+    final = _without(found, kept, case)
+    left = vague if kept else []
+    while left:
+        others = []
+        for k in left:
+            more = sorted((*kept, k))
+            there = _without(found, more, case, final) if k in _apart(found, more, case) else None
+            if there is None or by_chance(final, there, case.judge, case.blocks):
+                others.append(k)
+            else:
+                kept, final = more, there
+        if len(others) == len(left):
+            break
+        left = others
+    return kept, final
+
+
+def _apart(found: Found, kept: list[int], case: Case) -> list[int]:
     """Without what only mends the shape of a cause found before at the same joint, for which it could be mistaken.
 
     No law of the library is that of the machine to the last: the rest of a great Stribeck hump is no drag.
     """
     out: list[int] = []
     for k in kept:
-        own = found.final.model.effects[k].effect
-        before = [found.final.model.effects[j].effect for j in out]
-        alike = [e for e in before if e.joint == own.joint and (own.name in e.twins or e.name in own.twins)]
         step = found.steps[k]
         taken = 0.0 if step.best is None else _power(found, step.before.rms) - _power(found, step.best.done.rms)
-        if not alike or taken > _MENDS * _power(found, found.nominal.rms):
+        if taken > _MENDS * _power(found, found.nominal.rms) or not any(_mistaken(found, j, k, case) for j in out):
             out.append(k)
     return out
+
+
+def _mistaken(found: Found, earlier: int, later: int, case: Case) -> bool:
+    """Whether the later of two causes would have passed for the earlier one."""
+    own, before = (found.final.model.effects[k].effect for k in (later, earlier))
+    if before.joint != own.joint or not (own.name in before.twins or before.name in own.twins):
+        return False
+    return imitated(found.steps[earlier], _family(case, own), case) > _ALIKE
 
 
 def _power(found: Found, rms: Array) -> float:
@@ -135,8 +175,11 @@ def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | No
 
 def _bound(case: Case, effect: Effect, final: Refined, bounds: Array | None) -> float:
     """Squared weighted residual that the cause has to take away; `bounds` (families,) where thresholds say so."""
-    place = next(k for k, family in enumerate(case.families) if (family.cause, family.joint) == (effect.name, effect.joint))
-    return _LEAST * final.rss if bounds is None else float(bounds[place])
+    return _LEAST * final.rss if bounds is None else float(bounds[case.families.index(_family(case, effect))])
+
+
+def _family(case: Case, effect: Effect) -> Family:
+    return next(family for family in case.families if (family.cause, family.joint) == (effect.name, effect.joint))
 
 
 def _without(found: Found, kept: list[int], case: Case, weighted: Refined | None = None) -> Refined:

@@ -11,6 +11,7 @@ from pipelines.model.diagnosis.candidates import Family, families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.screen import screen, screen_family
@@ -125,3 +126,12 @@ def test_an_event_belongs_to_its_log() -> None:
     values = best.done.model.effects[0].values
     assert values["start"] == pytest.approx(3.0, abs=0.01)
     assert values["force"] == pytest.approx(np.hypot(6.0, 10.0), rel=0.05)
+
+
+def test_eleven_waves_a_turn_could_have_passed_for_themselves_and_for_no_spring(waving: Case) -> None:
+    """A polynomial of the angle does not follow eleven waves a turn; the wave itself does, wherever the search put its numbers."""
+    step = search(waving, 1).steps[0]
+    there = {(family.cause, family.joint): imitated(step, family, waving) for family in waving.families}
+    assert there["cogging", 2] > 0.9
+    assert there["spring", 2] < 0.25
+    assert there["cogging", 1] < 0.25
