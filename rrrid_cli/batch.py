@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -72,8 +71,9 @@ def batch(
 
 def _jobs(jobs: int | None) -> int:
     if jobs is None:
-        usable = getattr(os, "sched_getaffinity", None)  # Linux: what this process may use of them
-        return len(usable(0)) if usable is not None else os.cpu_count() or 1
+        from pipelines.log.processors import processors
+
+        return processors()
     if not 1 <= jobs <= 4096:
         raise UsageError("C02", f"{jobs} at a time", where="--jobs", remedy="give 1 or more")
     return jobs

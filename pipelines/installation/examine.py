@@ -18,6 +18,7 @@ from typing import Final, Literal
 
 from pipelines import __version__
 from pipelines.errors import clean
+from pipelines.log.processors import processors
 
 __all__ = ["Finding", "examine"]
 
@@ -114,8 +115,7 @@ def _blas() -> Finding:
 
 
 def _processor() -> Finding:
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return Finding("processor", "ok", f"{usable} of {os.cpu_count()} cores may be used; a run takes one, rrrid batch all")
+    return Finding("processor", "ok", f"{processors()} of {os.cpu_count()} cores may be used; a run takes one, rrrid batch all")
 
 
 def _folder(name: str, where: Callable[[], Path], otherwise: Level, remedy: str) -> Finding:

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pipelines.log.guard import die_with_parent
+from pipelines.log.processors import processors
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -63,11 +64,6 @@ def _second() -> bool:
     """Whether another process may be made: not among the workers of a batch, which have every processor already."""
     alone = multiprocessing.parent_process() is None and threading.current_thread() is threading.main_thread()
     return alone and not _COPY.is_set() and processors() > 1
-
-
-def processors() -> int:
-    """That this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _places(count: int) -> int:
