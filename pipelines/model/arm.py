@@ -115,8 +115,10 @@ class Arm:
         return replace(self, body=body, base=base, uncertainty=None)
 
     def extended(self, *more: Acting) -> Arm:
-        """With more effects, each around those before it; what changes the record stays outermost."""
-        return replace(self, effects=tuple(sorted((*self.effects, *more), key=lambda acting: acting.effect.last)))
+        """With more effects, each around those before it; what misreads an angle around all that act there, and what changes the
+        record outermost."""
+        outer = sorted((*self.effects, *more), key=lambda acting: (acting.effect.last, acting.effect.misread))
+        return replace(self, effects=tuple(outer))
 
     def torque(self, motion: Motion) -> Array:
         """Torque (samples, joints) [N m] that a log of this motion should show."""

@@ -33,6 +33,7 @@ class EncoderCrosstalk(Effect):
     remedy = "Take the part found off the reading; look at what couples the two encoders."
     experiment = "Hold this joint still against a stop or a level and move the other over its range."
     twins = ("link_length", "transmission_coupling")
+    misread = True
 
     @classmethod
     def everywhere(cls, n_joints: int) -> tuple[Self, ...]:

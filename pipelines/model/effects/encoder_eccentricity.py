@@ -34,6 +34,7 @@ class EncoderEccentricity(Effect):
     remedy = "Correct the reading by the sine found, or centre the disc; two opposite heads cancel it."
     experiment = "Turn the joint over a full turn at three constant speeds."
     twins = ("cogging", "spring", "gravity_tilt")
+    misread = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         q, v, u = (self.own(x) for x in (motion.q, motion.dq, motion.ddq))
