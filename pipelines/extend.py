@@ -128,8 +128,9 @@ def _kept(arm: Arm | None) -> list[Wanted]:
 
 
 def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
-    """What `diagnose` named, within `run`; what happened once has no place in a model."""
-    named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings if not _once(find_effect(one.cause))]
+    """What `diagnose` named, within `run`; what happened once has no place in a model, nor what did harm there."""
+    named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings
+             if not one.doubt and not _once(find_effect(one.cause))]
     if not named:
         raise NothingMatched("C06", f"diagnose found nothing to extend the model by: {diagnosed.verdict}", where=label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")

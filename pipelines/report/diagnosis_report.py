@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.responding import BELOW
-from pipelines.model.diagnosis.result import Detectable, Finding, Gain
+from pipelines.model.diagnosis.result import Detectable, Finding, Gain, Trial
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_proof import proof_figures
@@ -97,7 +97,9 @@ def finding_section(number: int, one: Finding, offer: bool = True, floor: str = 
         text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
                     f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
                     "torque worked out from the encoder is mostly noise")
-    if offer and not _happens_once(one):
+    if one.doubt:
+        text.append(f"The extended model goes without it: {one.doubt}")
+    if offer and not one.doubt and not _happens_once(one):
         text.append(f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it")
     if one.rivals:
         names = ", ".join(f"{cause_at(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
@@ -166,12 +168,22 @@ def gain_table(gain: Gain, caption: str) -> Table:
 def _unknown(result: Result) -> list[Section]:
     if result.verdict != "unknown":
         return []
-    near = sorted((t for t in result.ledger if math.isfinite(t.exact_gain)), key=lambda t: -t.exact_gain)[:5]
-    names = ", ".join(f"{cause_at(t.cause, t.joint)} ({format_number(100.0 * t.exact_gain, 3)} % of the residual)" for t in near)
+    near = sorted(_nearest(result.ledger).items(), key=lambda one: -one[1])[:5]
+    names = ", ".join(f"{cause_at(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
     tried = f" The nearest explanations, none of them good enough: {names}." if near else ""
     return [Section("Why there is no name", (
         _sentence(result.reason) + tried,
         "A wrong name costs more than none. What follows shows where and when the residual stands above its floor."))]
+
+
+def _nearest(ledger: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
+    """What each cause takes off the residual at most; to first order where it was not fitted, for it stayed below its threshold."""
+    found: dict[tuple[str, int | None], float] = {}
+    for t in ledger:
+        gain = t.exact_gain if math.isfinite(t.exact_gain) else t.gain
+        if gain > found.get((t.cause, t.joint), 0.0):
+            found[t.cause, t.joint] = gain
+    return found
 
 
 def _standing(result: Result) -> list[Section]:

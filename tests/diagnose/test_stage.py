@@ -6,6 +6,8 @@ The library is cut down to a few causes, for speed; with all of them it is asked
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -75,6 +77,16 @@ def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> Non
     assert any(" mm " in text for text in first.text)
     assert first.figures[0].name == "proof-1"
     assert {"What this rests on", "What these logs cannot tell"} <= {section.title for section in report.sections}
+
+
+def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagnose.Result]) -> None:
+    """Where nothing exceeded its threshold nothing was fitted, and first order tells: cogging, most of what joint 2 leaves."""
+    ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.ledger)
+    result = replace(rippled.result, verdict="unknown", reason="it is far above its floor", findings=(), ledger=ledger)
+    section = next(one for one in diagnose.report(result).sections if one.title == "Why there is no name")
+    assert "The nearest explanations, none of them good enough: cogging:2 (" in section.text[0]
+    assert section.text[0].count("cogging:2 (") == 1
+    assert section.text[0].count("% of the residual") == min(5, len({(one.cause, one.joint) for one in ledger if one.gain > 0.0}))
 
 
 @pytest.mark.parametrize(("cause", "joint"), [("torque_offset", 3), ("quadratic_drag", 1)])

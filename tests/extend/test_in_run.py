@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from pipelines import diagnose, run
-from pipelines.errors import UsageError
+from pipelines import diagnose, extend, run
+from pipelines.errors import NothingMatched, UsageError
 from pipelines.log.model_file import read_model
 from pipelines.model.diagnosis.result import Rejected
 from pipelines.report.run_ledger import ledger_lines
@@ -50,6 +52,17 @@ def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
     assert all(answer < k for k in sources)  # the answer before its sources
     model = read_model(outcome.folder / "extend/model.json")
     assert [(one.effect, one.joint) for one in model.effects] == [("cogging", 2)]
+
+
+def test_what_does_harm_to_the_model_is_not_offered() -> None:
+    """Frequency responses name a soft base, and held-out motion shows none: the model is extended by the rest alone."""
+    soft: Any = SimpleNamespace(cause="base_resonance", joint=None, doubt="the held-out torque error is larger with it")
+    ripple: Any = SimpleNamespace(cause="cogging", joint=2, doubt="")
+    diagnosed: Any = SimpleNamespace(findings=(soft, ripple), verdict="cause")
+    assert [one.effect.name for one in extend._found(diagnosed, "logs")] == ["cogging"]
+    diagnosed.findings = (soft,)
+    with pytest.raises(NothingMatched, match="nothing to extend the model by"):
+        extend._found(diagnosed, "logs")
 
 
 def test_a_stage_that_there_is_not_cannot_be_skipped(tmp_path: Path) -> None:

@@ -217,12 +217,10 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
         prepared.recipe, chosen.seed)
     made = floored.calibration
     pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()
-    harmful = tuple(Rejected(part.acting.effect.name, part.acting.effect.joint, f"named by frequency responses, but the model goes "
-                             f"without it: {part.doubt}") for part in parts if part.doubt)
     arm = extended_arm(replace(found, final=responded.final), ruling)
     standing = [one for one in case.beside if one not in first.held.acting]
     return Diagnosis(
-        ruling.verdict, _sentence(ruling, named), named, (), (*harmful, *rejected(found, ruling)), limits,
+        ruling.verdict, _sentence(ruling, named), named, (), rejected(found, ruling), limits,
         (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,

@@ -64,7 +64,8 @@ def held_finding(part: Part, nominal: Array, floor: Array, draw: bool) -> Findin
     std = {p.name: p.std for p in acting.parameters}
     numbers = {name: Value(value, std.get(name), units.get(name, "1")) for name, value in effect.reported(acting.values).items()}
     return Finding(effect.name, effect.joint, effect.title, numbers, explained(before.rms, after.rms, nominal, floor), seen, (),
-                   None, part.gain, "frequency responses", size, of_rated, proof(before, after, joint + 1) if draw else None)
+                   None, part.gain, "frequency responses", size, of_rated, proof(before, after, joint + 1) if draw else None,
+                   part.doubt)
 
 
 def _size(torque: Array, data: Data, joint: int | None, floor: Array) -> tuple[float, int, float]:

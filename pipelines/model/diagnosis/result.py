@@ -111,6 +111,7 @@ class Finding:
     torque_rms: float  # [N m] of its torque on its own joint, or of the largest joint
     of_rated: float  # the same as a share of the rated torque; NaN where the description gives none
     proof: Proof | None
+    doubt: str = ""  # of what frequency responses name: why the extended model goes without it; empty where it has it
 
 
 @dataclass(frozen=True)

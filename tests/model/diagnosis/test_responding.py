@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.base_resonance import BaseResonance
+from pipelines.report.diagnosis_report import finding_section
 from tests.diagnose.sessions import but, healthy_again, session
 
 SETTINGS = DiagnosisSettings(without=but("base_resonance", "torque_offset"), replicas=0, most=1, evidence=False, limits=False)
@@ -59,6 +60,21 @@ def test_a_soft_base_is_worth_something_on_held_out_logs_and_enters_the_model() 
     assert found.extended is not None
     assert [one.place for one in found.extended.effects] == ["base_resonance"]
     assert found.after_rms.validate[0] == pytest.approx(gain.validate_torque_rms.after[0], rel=1e-6)
+
+
+@pytest.mark.usefixtures("told")
+def test_what_does_harm_to_the_model_is_told_once() -> None:
+    """Responses name a soft base where motion shows a firm one: a finding, with why the model goes without it."""
+    fitted, judging = session(seed=3)
+    found = diagnose(Logs((fitted,), (judging,), (), (fitted,)), SETTINGS)
+    assert [one.cause for one in found.findings] == ["base_resonance"]
+    assert found.findings[0].doubt
+    assert "base_resonance" not in [one.cause for one in found.rejected]
+    assert found.extended is not None
+    assert not found.extended.effects
+    section = finding_section(1, found.findings[0])
+    assert any("The extended model goes without it" in text for text in section.text)
+    assert not any("rrrid extend" in text for text in section.text)
 
 
 @pytest.mark.usefixtures("told")
