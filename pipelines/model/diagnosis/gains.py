@@ -13,6 +13,7 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.fit.bootstrap import apart
@@ -25,6 +26,7 @@ from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import BeforeAfter, Gain, TipError, TorqueGain
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
+from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Plant, choose_step, simulate, simulate_windows
 
 __all__ = ["Simulation", "farther", "gain_of", "simulation_errors", "torque_gain", "torque_gain_of", "worse_log"]
@@ -34,6 +36,8 @@ _SEED = 20040509
 _LONGEST = 5.0  # [s] of a log that is simulated
 _SOFT = 1.0  # [s] the same, where something moves beside the joints of an arm, which takes many steps
 _WINDOW = 0.1  # [s]
+_FINE = 1e-3  # [s] between torques that drive a window: a faster log's are averaged, which moves an arm as far
+_EXACT = 1e-3  # of the position error, to which it is worked out
 _LOGS = 2  # that are simulated
 _WORSE = 1.1  # times the error of a held-out log, that an extension must not exceed
 
@@ -162,8 +166,24 @@ def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed) -> tuple[Array
     usable = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
     tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
-    length = max(3, round(_WINDOW / log.sample_time))
-    windows = simulate_windows(Plant.of(arm), found.motion, tau, log.sample_time, length, usable)
+    motion, tau, usable, every = _coarser(found.motion, tau, usable, log.sample_time)
+    length = max(3, round(_WINDOW / (every * log.sample_time)))
+    windows = simulate_windows(Plant.of(arm), motion, tau, every * log.sample_time, length, usable, _EXACT)
     if not np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():  # left out, it would count as no error at all
         raise InputRejected("D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia")
-    return windows.q, found.motion.q
+    return windows.q, motion.q
+
+
+def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_], sample_time: float,
+             ) -> tuple[Motion, Array, npt.NDArray[np.bool_], int]:
+    """Every so-manieth sample of a motion, the mean torque (samples, joints) until the next, and where all of that is usable."""
+    every = max(1, int(_FINE / sample_time * (1.0 + 1e-9)))
+    if every == 1:
+        return motion, tau, usable, 1
+    count = len(tau) // every
+    uneven = np.abs(np.diff(motion.t, append=motion.t[-1] + sample_time) - sample_time) > 0.5 * sample_time
+    good: npt.NDArray[np.bool_] = np.asarray(usable & ~uneven)
+    some = slice(0, count * every, every)
+    thin = Motion(motion.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
+    mean = np.asarray(tau[:count * every].reshape(count, every, -1).mean(axis=1))
+    return thin, mean, np.asarray(good[:count * every].reshape(count, every).all(axis=1)), every

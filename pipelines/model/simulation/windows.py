@@ -40,12 +40,14 @@ class Windows:
 
 
 def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: float, length: int,
-                     usable: Mask | None = None) -> Windows:
+                     usable: Mask | None = None, share: float = 0.0) -> Windows:
     """Follow `tau` (samples, joints) from the state that `motion` has at the start of every window of `length` samples.
 
     Args:
         tau: held from each sample to the next.
         usable: (samples,) where motion and torque are known without gaps; everywhere where left out.
+        share: of the distance from `motion`, that a position may be wrong by (root mean square, joint by joint), where that is more
+            than the usual 1e-7 rad.
 
     Raises:
         InputRejected: T08, no window fits; D15, the model's inertia matrix is singular or worse; D17, the step would be too small
@@ -60,7 +62,7 @@ def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: floa
         raise InputRejected("T08", f"no window of {length} samples is without a gap", remedy="ask for shorter windows")
     plant.refuse_unphysical(motion.q[first])
     tried = first[np.linspace(0, len(first) - 1, min(len(first), 32)).astype(int)]
-    steps = _steps(plant, motion, tau, sample_time, tried, length)
+    steps = _steps(plant, motion, tau, sample_time, tried, length, share)
     q, dq = np.full(motion.q.shape, np.nan), np.full(motion.q.shape, np.nan)
     for begin in range(0, len(first), _AT_ONCE):
         some = first[begin:begin + _AT_ONCE]
@@ -77,17 +79,23 @@ def _starts(good: Mask, uneven: Mask, length: int) -> Indices:
     return np.concatenate([np.zeros(0, dtype=np.intp), *runs])
 
 
-def _steps(plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, length: int) -> int:
+def _steps(plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, length: int, share: float) -> int:
     """The fewest steps a sample whose halving changes no position by more than the tolerance."""
-    coarse = None
+    seen, coarse = motion.q[first[:, None] + np.arange(length)], None
     for steps in (*_CANDIDATES, 2 * _CANDIDATES[-1]):
         with np.errstate(all="ignore"):
             fine = _follow(plant, motion, tau, sample_time, first, length, steps)[..., :tau.shape[1]]
-        if coarse is not None and np.abs(fine - coarse).max() <= _TOLERANCE:
-            return steps // 2
+            if coarse is not None and (np.abs(fine - coarse).max() <= _TOLERANCE
+                                       or (share > 0.0 and (_rms(fine - coarse) <= share * _rms(fine - seen)).all())):
+                return steps // 2
         coarse = fine
     raise InputRejected("D17", f"{_CANDIDATES[-1]} steps a sample do not settle the simulation",
                         remedy="friction that changes sign within a very small speed needs a lower sharpness")
+
+
+def _rms(x: Array) -> Array:
+    """(joints,) over windows and samples."""
+    return np.asarray(np.sqrt(np.mean(np.square(x), axis=(0, 1))))
 
 
 def _follow(plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, length: int, steps: int) -> Array:

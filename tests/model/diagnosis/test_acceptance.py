@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation.windows import Windows, simulate_windows
 from tests.diagnose.sessions import session
 
@@ -68,6 +69,20 @@ def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest
     first, second = simulation_errors([arm, arm], prepared.motions)
     assert (first.how, second.how) == ("windowed", "none")
     assert "runs away" in farther(first, second)
+
+
+def test_a_fast_log_drives_its_windows_by_the_mean_torque_of_a_millisecond() -> None:
+    """Five samples of 0.2 ms make one; none is left of a millisecond of which a sample is missing, or of no use."""
+    t = np.delete(2e-4 * np.arange(61), 23)
+    tau = RNG.normal(size=(60, 3))
+    usable = np.arange(60) != 11
+    motion = Motion(t, *(RNG.normal(size=(60, 3)) for _ in range(3)))
+    thin, mean, left, every = gains._coarser(motion, tau, usable, 2e-4)
+    assert every == 5
+    np.testing.assert_array_equal(thin.q, motion.q[::5])
+    np.testing.assert_allclose(mean[1], tau[5:10].mean(axis=0), rtol=1e-12)
+    assert left.tolist() == [k not in (2, 4) for k in range(12)]
+    assert gains._coarser(motion, tau, usable, 1e-3) == (motion, tau, usable, 1)
 
 
 def two_logs() -> Any:
