@@ -15,10 +15,10 @@ from typing import Any
 
 from pipelines.batch.drift import LIMIT
 from pipelines.batch.record import Record
-from pipelines.errors import clean
+from pipelines.errors import Check, clean
 from pipelines.log.model_file import ModelFile, StoredEffect
 
-__all__ = ["against", "known_figures"]
+__all__ = ["against", "known_figures", "unheld"]
 
 
 def against(record: Record, baseline: ModelFile) -> Record:
@@ -35,6 +35,26 @@ def against(record: Record, baseline: ModelFile) -> Record:
     if accepted and record.status == "found":
         return dataclasses.replace(record, status="ok", verdict=f"Nothing beyond the baseline. {record.verdict}")
     return record
+
+
+def unheld(stage: str, records: Iterable[Record], baseline: ModelFile) -> tuple[Check, ...]:
+    """What of the baseline no item of `stage` can be held against: that nothing is said of it does not mean that it is the same."""
+    done = [record for record in records if record.status in ("ok", "found")]
+    judged = [record for record in done if _robot(baseline) in ("", record.robot)]
+    if not judged:
+        return (_warned(f"the baseline is of {_robot(baseline)}, and no item is: nothing is held against it",
+                        "give a model of this robot"),) if done else ()
+    parts = {"base parameters": dataclasses.replace(baseline, friction=(), effects=()),
+             "friction": dataclasses.replace(baseline, base_parameters=(), effects=())}
+    missing = [name for name, part in parts.items()
+               if _spelled(part) and not any(known_figures(part, record.figures) for record in judged)]
+    return (_warned(f"{' and '.join(missing)} of the baseline are held against nothing: {stage} gives none by those names",
+                    "run 'rrrid batch' with --stage run or estimate-bps, and with the friction laws of the baseline"),
+            ) if missing else ()
+
+
+def _warned(message: str, remedy: str) -> Check:
+    return Check.of("C06", "warn", message, where="--baseline", remedy=remedy)
 
 
 def _robot(baseline: ModelFile) -> str:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from pipelines.batch.baseline import against
+from pipelines.batch.baseline import against, unheld
 from pipelines.batch.drift import drift_of
 from pipelines.batch.folder import BatchFolder
 from pipelines.batch.items import Item, find_items, shard
@@ -81,8 +81,8 @@ def run_batch(plan: Plan, wanted: Wanted) -> Outcome[Summary]:
         done = _Done(plan, plan_key(plan), folder, wanted, listener)
         done.go(items)
         records = _judged([done.records.get(item.slug) or done.missing(item) for item in items], baseline)
-        summary = Summary(plan.stage, records, drift_of(records), tuple(_short(check, root) for check in checks), baseline,
-                          bool(listener.number))
+        remarks = (*(_short(check, root) for check in checks), *(() if baseline is None else unheld(plan.stage, records, baseline)))
+        summary = Summary(plan.stage, records, drift_of(records), remarks, baseline, bool(listener.number))
         outcome = _written(folder, summary, done, started)
     if done.fault is not None:
         raise done.fault

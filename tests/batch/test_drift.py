@@ -10,7 +10,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from pipelines.batch.baseline import against
+from pipelines.batch.baseline import against, unheld
 from pipelines.batch.drift import drift_of, from_others
 from pipelines.batch.record import Record
 from pipelines.batch.result import Result
@@ -135,6 +135,23 @@ def test_friction_is_held_against_the_baseline_by_any_name() -> None:
     assert against(told, baseline).verdict.count("amplitude") == 1
 
 
+def test_what_no_item_can_be_held_against_is_said() -> None:
+    """A diagnosis names causes, and gives no base parameters and no friction: their silence is no agreement."""
+    viscous = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.6, 0.01, "N m s/rad", "fitted")})
+    baseline = dataclasses.replace(_baseline(), friction=(viscous,))
+    diagnosed = Record("a", "a", "found", 1, figures={"cogging joint 2 amplitude": (0.5, 0.01, "N m")}, robot="arm")
+    (said,) = unheld("diagnose", [diagnosed], baseline)
+    assert (said.level, said.where) == ("warn", "--baseline")
+    assert "base parameters and friction of the baseline are held against nothing: diagnose gives none" in said.message
+    estimated = Record("b", "b", "ok", 0, figures={"p1": (1.0, STD, "kg m^2")}, robot="arm")
+    assert [one.message.split(" of ")[0] for one in unheld("estimate-bps", [diagnosed, estimated], baseline)] == ["friction"]
+    whole = dataclasses.replace(estimated, figures={**estimated.figures, "viscous:1:coefficient": (0.6, 0.01, "N m s/rad")})
+    assert unheld("run", [whole], baseline) == ()
+    (other,) = unheld("run", [whole], dataclasses.replace(baseline, robot='name = "another"'))
+    assert "the baseline is of another, and no item is" in other.message
+    assert unheld("run", [Record("a", "a", "rejected", 3)], baseline) == ()
+
+
 def test_a_phase_is_the_same_after_a_whole_turn() -> None:
     """3.1 rad and -3.1 rad are 0.08 rad apart."""
     effect = StoredEffect("cogging", 2, {"phase": StoredValue(3.1, 0.05, "rad", "fitted")})
@@ -155,6 +172,7 @@ def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Pa
     root = lay({f"{i}": f"value {1.0 + 0.01 * i} std {STD}" for i in range(3)})
     assert obey(root, baseline=str(tmp_path / "model.json"), check=True).exit_code == 0
     outcome = obey(lay({"1": f"value 1.3 std {STD}"}), baseline=str(tmp_path / "model.json"), check=True)
+    assert outcome.json["checks"] == []
     assert outcome.exit_code == 1
     assert {item["name"]: item["status"] for item in outcome.json["items"]} == {"0": "ok", "1": "found", "2": "ok"}
     assert outcome.json["drift"][0]["figures"][0]["moved"] == ["1"]
