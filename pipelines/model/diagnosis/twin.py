@@ -17,6 +17,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog, Signal
+from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.exact import Exact
@@ -87,12 +88,14 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     log = motions[place][0]
     rough = _roughness(mine, step)
     guess = rough * np.sqrt(step / log.sample_time)
-    seen = []
-    for level, own in ((np.zeros_like(guess), seed), (guess, seed + 1)):
+
+    def of_replica(drawn: tuple[Array, int]) -> Array:
+        level, own = drawn
         done = simulate(model.nominal, Experiment.of_log(log), Noise(level, np.zeros_like(guess)), (own,))
         copy, found = _analysed(motions[place], done, 0, recipe, model.columns, data, place)
-        seen.append(_roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t)))))
-    still, shaken = np.square(seen[0]), np.square(seen[1])
+        return _roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t))))
+
+    still, shaken = np.square(shared_out(of_replica, ((np.zeros_like(guess), seed), (guess, seed + 1))))
     share = (np.square(rough) - still) / np.maximum(shaken - still, 1e-6 * np.square(rough) + 1e-300)
     return np.asarray(guess * np.sqrt(np.clip(share, *_BOUNDS)))
 
