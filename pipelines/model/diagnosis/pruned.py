@@ -51,7 +51,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
     doubts = {k: unlike(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1], late=late)
               for k in ruling.named}
-    doubts = {k: why for k, why in doubts.items() if why}
+    doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
     kept = _apart(found, [k for k in ruling.named if k not in doubts], case)
     doubts |= {k: _SHAPE for k in ruling.named if k not in (*kept, *doubts)}

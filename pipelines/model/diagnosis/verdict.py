@@ -26,6 +26,7 @@ _REST = 0.35  # of a joint's residual that may be left beside a named cause, whe
 
 _REST_OF_GAP = 0.6  # the same beside a gap: where the link is in it hangs on lubricant and tooth, which no law has to the last
 
+_MISFIT = "beside a gap, whose law leaves more than the floor at some moments, nothing that happened once is told from it"
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
              "testable without a floor: reference logs, or logs whose controller is known and a twin")
 
@@ -88,7 +89,13 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")
-    return Ruling("cause", tuple(range(len(accepted))), "")
+    doubts = {k: _MISFIT for k, step in enumerate(accepted) if _happened(step)} if gap and len(joints) else {}
+    return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
+
+
+def _happened(step: Step) -> bool:
+    """Whether what it found is an event."""
+    return step.best is not None and step.best.screened.family.event
 
 
 def held_out_high(rms: Array, floor: Array) -> str:

@@ -10,7 +10,9 @@ import pytest
 
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.verdict import excess, explained, rule
+from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.cogging import Cogging
+from pipelines.model.effects.contact import Contact
 
 FLOOR = np.array([0.01, 0.01, 0.01])
 
@@ -75,6 +77,18 @@ def test_two_causes_share_what_stands_above_the_floor() -> None:
     shares = [explained(step.before.rms, step.best.done.rms, case.nominal.rms, FLOOR) for step in case.steps[:2]]
     assert shares == pytest.approx([24.0 / 32.0, 8.0 / 32.0])
     assert rule(case, FLOOR).named == (0, 1)
+
+
+@pytest.mark.parametrize(("rest", "named"), [(0.03, (0,)), (0.011, (0, 1))])
+def test_beside_a_gap_that_leaves_much_no_event_is_named(rest: float, named: tuple[int, ...]) -> None:
+    """Where the link is in a gap no law has to the last: at some moments more is left, as after a touch."""
+    case = found(left(0.01, 0.3, 0.01), left(0.01, 0.05, 0.01), left(0.01, rest, 0.01))
+    for step, (effect, happened) in zip(case.steps, ((Backlash(2), False), (Contact(), True)), strict=False):
+        step.best.effect = effect
+        step.best.screened = SimpleNamespace(family=SimpleNamespace(event=happened))
+    ruling = rule(case, FLOOR)
+    assert ruling.named == named
+    assert set(ruling.doubts) == {0, 1} - set(named)
 
 
 def test_without_a_floor_what_is_left_is_no_alarm() -> None:
