@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 from pipelines.errors import UsageError, did_you_mean
@@ -29,7 +29,7 @@ from pipelines.model.diagnosis.simulated import with_simulation
 from pipelines.model.effects import effect_names
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, read_by_role
+from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -43,7 +43,7 @@ class Settings:
     identify: tuple[str, ...] = ()  # paths of logs to fit, instead of those that say so
     validate: tuple[str, ...] = ()  # that judge
     reference: tuple[str, ...] = ()  # of the arm as it was before
-    model: str | None = None  # a model file, whose friction laws the nominal model takes
+    model: str | None = field(default=None, metadata={"in_run": True})  # a model file: the nominal model takes its friction laws
     without: tuple[str, ...] = ()  # causes that it cannot be, the user says
     replicas: int = DiagnosisSettings.replicas  # of the simulated twin; 0: none
     most: int = DiagnosisSettings.most  # findings
@@ -74,17 +74,30 @@ def read(request: Request, settings: Settings) -> Inputs:
     """
     inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
                                               "reference": settings.reference})
-    stored = None
+    found = beside(settings, request)
+    return replace(inputs, sources=(*inputs.sources, *found.sources), folders=(*inputs.folders, *found.folders),
+                   material=found.material)
+
+
+def beside(settings: Settings, request: Request) -> Beside:
+    """The model whose friction laws are to be taken, and stored thresholds.
+
+    Raises:
+        UsageError: C04, no such file.
+        InputRejected: a model (S18) or a calibration (S19, F05, F11) that cannot be used.
+    """
+    stored, arm = None, None
+    sources: tuple[Path, ...] = ()
+    folders: tuple[Path, ...] = ()
     if settings.calibration is not None:
         home = Path(settings.calibration).expanduser().absolute()
         stored = read_calibration(home)
-        inputs = replace(inputs, sources=(*inputs.sources, *calibration_files(home)), folders=(*inputs.folders, home))
-    if settings.model is None:
-        return replace(inputs, material=Material(None, request.tell, stored))
-    path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
-    arm = Arm.from_model(read_model(settings.model), path)
-    return replace(inputs, sources=(*inputs.sources, *sources), material=Material(arm, request.tell, stored))
+        sources, folders = calibration_files(home), (home,)
+    if settings.model is not None:
+        path = Path(settings.model).absolute()
+        sources += (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+        arm = Arm.from_model(read_model(settings.model), path)
+    return Beside(Material(arm, request.tell, stored), sources, folders)
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
@@ -97,10 +110,10 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
             together; T04, no stretch of a log can be used; T08, too few equations are left; D14, one recording in two roles.
     """
     _refuse_strange(settings)
-    if settings.calibration is not None and not isinstance(inputs.material, Material):
-        raise UsageError("C02", "a run makes its own thresholds", where="diagnose.calibration",
-                         remedy="take stored ones with rrrid diagnose --calibration")
     given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)
+    if (settings.model is not None and given.arm is None) or (settings.calibration is not None and given.calibration is None):
+        raise UsageError("C02", "a model or a calibration is named that was not read", where="diagnose",
+                         remedy="hand on what diagnose.beside reads, as material")
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
     if given.arm is not None and given.arm.n_joints != chosen.identify[0].n_joints:
         raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has "
@@ -154,4 +167,5 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, write, _exit_code,
-              lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result), hands_on="material")
+              lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result), hands_on="material",
+              beside=beside)

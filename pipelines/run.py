@@ -31,7 +31,7 @@ from pipelines.recall.store import CACHE, Kept, Missed, Store
 from pipelines.report.report import Report
 from pipelines.report.run_report import run_report
 from pipelines.report.run_result import Group, Result, Step
-from pipelines.stage import Inputs, Request, Stage, default_out, read_logs, result_type, slug
+from pipelines.stage import Beside, Inputs, Request, Stage, default_out, read_logs, result_type, slug
 
 __all__ = ["STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report", "restored"]
 
@@ -57,6 +57,7 @@ class Material:
     pictures: Pictures
     names: Mapping[str, str]  # folders of inputs -> how results name them
     options: Mapping[str, Any]  # of the request, as far as they change what logs say
+    beside: Mapping[str, Beside]  # what stages have read beside the logs
     request: Request
 
 
@@ -71,7 +72,7 @@ class Planned:
 
 
 def read(request: Request, settings: Settings) -> Inputs:
-    """Every log that can be opened, and what earlier runs have left."""
+    """Every log that can be opened, the files that settings of stages name, and what earlier runs have left."""
     inputs = read_logs(request, settings, keep_rejected=True)
     out = request.out or default_out(inputs, "run")
     robot = None if inputs.robot is None else digest_of_json(format_robot(inputs.robot))
@@ -81,7 +82,11 @@ def read(request: Request, settings: Settings) -> Inputs:
     if request.roles:
         options["roles"] = {str(renamed(str(opened.path), names)): opened.log.role for opened in inputs.logs}
     pictures = Pictures(out, {}) if settings.fresh else pictures_of(out, _MODULES)
-    return dataclasses.replace(inputs, material=Material(Store(out, settings.fresh), pictures, names, options, request))
+    beside = {stage.name: stage.beside(own, request) for stage, own in _wanted(settings) if stage.beside is not None}
+    return dataclasses.replace(
+        inputs, material=Material(Store(out, settings.fresh), pictures, names, options, beside, request),
+        sources=(*inputs.sources, *(path for one in beside.values() for path in one.sources)),
+        folders=(*inputs.folders, *(path for one in beside.values() for path in one.folders)))
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
@@ -125,7 +130,7 @@ def _wanted(settings: Settings) -> Iterator[tuple[Stage[Any, Any], Any]]:
 def _stages(group: str, inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
     """Every stage in turn, each on what those before it leave; one that finds nothing to read is passed over."""
     given: Material = inputs.material
-    chain, steps = Chain(inputs, given.names, given.options), []
+    chain, steps = Chain(inputs, given.names, given.options, given.beside), []
     for stage, own in _wanted(settings):
         key, place = chain.key(stage, own), _place(group, stage.name)
         kept = given.store.recall(place, key)
@@ -144,7 +149,7 @@ def _stages(group: str, inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
 
 def _planned(group: str, inputs: Inputs, settings: Settings) -> Iterator[Planned]:
     given: Material = inputs.material
-    chain = Chain(inputs, given.names, given.options)
+    chain = Chain(inputs, given.names, given.options, given.beside)
     for stage, own in _wanted(settings):
         key, place = chain.key(stage, own), _place(group, stage.name)
         kept = given.store.recall(place, key, dry=True)

@@ -32,8 +32,8 @@ from pipelines.log.results import encode, json_text, write_series
 from pipelines.log.robot_files import robot_sources
 from pipelines.report.report import Report
 
-__all__ = ["Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "footer_of", "read_by_role", "read_logs",
-           "refuse_foreign", "result_type", "run_stage", "slug", "tilde"]
+__all__ = ["Beside", "Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "footer_of", "read_by_role",
+           "read_logs", "refuse_foreign", "result_type", "run_stage", "slug", "tilde"]
 
 _LISTED = 40  # inputs, at the foot of a report
 
@@ -54,6 +54,15 @@ class Uses:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """What a stage reads beside the logs, of files that its settings name."""
+
+    material: Any = None
+    sources: tuple[Path, ...] = ()  # every one of the user's files
+    folders: tuple[Path, ...] = ()  # no output goes there
+
+
+@dataclass(frozen=True)
 class Stage(Generic[S, R]):
     """One command's computation, between reading and writing."""
 
@@ -70,6 +79,7 @@ class Stage(Generic[S, R]):
     hands_on: Literal["", "choice", "logs", "material"] = ""  # fewer logs, each log by itself with more in it, or material
     restored: Callable[[R, Path], R] | None = None  # a stored result with what `onward` needs out of the files it has written
     uses: Uses = field(default_factory=Uses)
+    beside: Callable[[S, Request], Beside] | None = None  # reads it within `run` as well, where settings say `in_run`
     in_run: S | None = None  # settings within `run`, where they are others than by default
     durations: Callable[[R], dict[str, float]] = lambda result: {}  # [s] of parts of compute, for provenance.json alone
     remakes: Callable[[str], bool] = lambda name: False  # own files that are made again where they were changed (P10)

@@ -46,7 +46,7 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
             if not isinstance(options, Mapping):
                 raise UsageError("C01", f"'{name}' is a stage, not an option", where=where,
                                  remedy=f"write [{name}] and its options below")
-            if stage == "run" and name in _run_stages() and (read := next(filter(_READ.__contains__, options), None)):
+            if stage == "run" and name in _run_stages() and (read := next(filter(_of_reader(name).__contains__, options), None)):
                 raise UsageError("C02", f"{name}.{read} has no place in a run, whose stages take logs and models from each other",
                                  where=where, remedy=f"give it to rrrid {name}; 'rrrid run' takes --identify, --validate, "
                                  "--reference for all")
@@ -63,7 +63,13 @@ def known_options(command: str) -> dict[str, list[str]]:
     """What --set takes for `command`: stage -> its options. For `run` those of every stage it runs."""
     if command != "run":
         return {command: _options_of(_settings_of(command))}
-    return {stage: [name for name in _options_of(_settings_of(stage)) if name not in _READ] for stage in _run_stages()}
+    return {stage: [name for name in _options_of(_settings_of(stage)) if name not in _of_reader(stage)] for stage in _run_stages()}
+
+
+def _of_reader(stage: str) -> tuple[str, ...]:
+    """Its options that have no place in a run."""
+    able = {field.name for field in dataclasses.fields(_settings_of(stage)) if field.metadata.get("in_run")}
+    return tuple(name for name in _READ if name not in able)
 
 
 def _run_stages() -> list[str]:

@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pipelines.log.files import hash_file
 from pipelines.log.places import renamed, tilde
 from pipelines.log.results import encode
 from pipelines.log.schema import FORMAT_VERSION
 from pipelines.recall.code import code_of, libraries
 from pipelines.recall.key import Key, digest_of_json
-from pipelines.stage import Inputs, Stage
+from pipelines.stage import Beside, Inputs, Stage
 
 __all__ = ["Chain"]
 
@@ -23,9 +24,16 @@ class Chain:
     What a stage that was taken back would hand on is read out of its files only when a stage after it is computed.
     """
 
-    def __init__(self, inputs: Inputs, names: Mapping[str, str], options: Mapping[str, Any]) -> None:
-        """`names`: folders of inputs -> how results name them; `options`: of the request, as far as they change what logs say."""
-        self.names, self.options = names, options
+    def __init__(self, inputs: Inputs, names: Mapping[str, str], options: Mapping[str, Any],
+                 beside: Mapping[str, Beside] | None = None) -> None:
+        """What it is made of.
+
+        Args:
+            names: folders of inputs -> how results name them.
+            options: of the request, as far as they change what logs say.
+            beside: what stages, by their names, have read beside the logs.
+        """
+        self.names, self.options, self.beside = names, options, beside or {}
         self.inputs = dataclasses.replace(inputs, material=None)
         self.waiting: list[tuple[Stage[Any, Any], Any, Path]] = []
         self.through: dict[str, str] = {}
@@ -40,7 +48,11 @@ class Chain:
                     for one in self.inputs.rejected} if stage.uses.rejected else {}
         return Key(stage.name, tilde(encode(settings)[0]), {self._name(o.path): o.sha256 for o in logs}, tuple(sorted(others)),
                    unusable, self.options, code_of(stage.compute.__module__, ("pipelines.report",)), libraries(),
-                   f"log {FORMAT_VERSION}", self.through, self.upon if stage.uses.before else {})
+                   f"log {FORMAT_VERSION}", self.through, self.upon if stage.uses.before else {},
+                   {self._name(path): hash_file(path) for path in self._beside(stage).sources})
+
+    def _beside(self, stage: Stage[Any, Any]) -> Beside:
+        return self.beside.get(stage.name, Beside())
 
     def _name(self, path: Path) -> str:
         return str(renamed(str(path), self.names))
@@ -51,7 +63,8 @@ class Chain:
             self.inputs = earlier.onward(earlier.restored(result, files) if earlier.restored else result, self.inputs)
         self.waiting = []
         uses = stage.uses
-        return dataclasses.replace(self.inputs, material=self.inputs.material if uses.before else None,
+        material = self.inputs.material if uses.before else self._beside(stage).material
+        return dataclasses.replace(self.inputs, material=material,
                                    rejected=self.inputs.rejected if uses.rejected else ())
 
     def passed(self, stage: Stage[Any, Any], key: Key, result: Any) -> None:

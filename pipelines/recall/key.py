@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 __all__ = ["Key", "changes", "digest_of_json"]
@@ -23,7 +23,8 @@ class Key:
     """Of one stage: everything that goes in, as plain JSON.
 
     `logs` are those the stage looks at, name -> SHA-256 of the file; of the `others` only what they say of themselves.
-    `through` are the stages that the logs have come through, `upon` the one whose result it builds on.
+    `through` are the stages that the logs have come through, `upon` the one whose result it builds on, `beside` the files that
+    its settings name, name -> SHA-256.
     """
 
     stage: str
@@ -37,6 +38,7 @@ class Key:
     schema: str
     through: Mapping[str, str]
     upon: Mapping[str, str]
+    beside: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def parts(self) -> dict[str, Any]:
@@ -67,6 +69,7 @@ def _changes(old: Mapping[str, Any], key: Key) -> Iterator[str]:
     if list(old.get("others", [])) != list(key.others):
         yield "there are other logs beside those it reads"
     yield from _told("unusable file", old.get("unusable", {}), key.unusable, lambda name: f"{name} is unusable in another way")
+    yield from _told("file", old.get("beside", {}), key.beside, lambda name: f"{name} has other content")
     for part in ("settings", "options"):
         before, now = old.get(part, {}), getattr(key, part)
         for name in _differ(before, now):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,17 +12,20 @@ import jsonschema
 import numpy as np
 import pytest
 
-from pipelines import diagnose
+from pipelines import diagnose, run
 from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.log.files import hash_file
+from pipelines.log.model_file import read_model, write_model
 from pipelines.model.diagnosis.calibrated import refuse_unfit
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.calibration_file import calibration_schema, read_calibration, write_calibration
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.stage import Inputs, Outcome, Request, run_stage
+from rrrid_cli.settings import make_settings
 from tests.diagnose.sessions import but, healthy_again, session, written
 
+STAGES = tuple(module.replace("_", "-") for module in run.STEPS)
 FEW = but("cogging", "torque_offset", "gravity_tilt")
 
 
@@ -130,9 +134,47 @@ def test_a_cause_that_it_does_not_know_is_asked_to_be_left_out(place: Path, tmp_
         asked(place / "logs", tmp_path / "out", without=but("cogging", "quadratic_drag"), calibration=str(place / "first"))
 
 
-def test_within_a_run_it_is_refused(place: Path) -> None:
-    """A run reads logs alone."""
-    with pytest.raises(UsageError, match="a run makes its own thresholds"):
+def test_a_run_takes_it_as_diagnose_does(place: Path, tmp_path: Path) -> None:
+    """The same causes against the same thresholds, and no twin; taken back as long as the file is the same, and refused in an
+    output folder of its own."""
+    home = tmp_path / "stored"
+    shutil.copytree(place / "first", home)
+    own = diagnose.Settings(without=FEW, replicas=2, most=1, calibration=str(home))
+    settings = run.Settings({"diagnose": own}, tuple(name for name in STAGES if name not in ("inspect", "diagnose")))
+    request = Request((place / "logs",), out=tmp_path / "run", no_report=True)
+    found = run_stage(run.STAGE, request, settings).result.stages[-1].result
+    alone = asked(place / "logs", tmp_path / "alone", calibration=str(home)).result
+    assert found.calibrated_with == alone.calibrated_with == ("excitation-1",)
+    assert [(one.cause, one.joint) for one in found.findings] == [(one.cause, one.joint) for one in alone.findings]
+    assert found.thresholds == alone.thresholds
+    listed = json.loads((tmp_path / "run/provenance.json").read_text())["inputs"]
+    assert {"calibration.json", "calibration.h5"} <= {Path(name).name for name in listed}
+    assert not [one.why for one in run.plan(request, settings) if one.computed]
+    (home / "provenance.json").unlink()
+    (home / "calibration.json").write_text((home / "calibration.json").read_text() + "\n")
+    assert [(one.stage, one.why) for one in run.plan(request, settings) if one.computed] == [
+        ("diagnose", f"{home / 'calibration.json'} has other content")]
+    with pytest.raises(RrridError):
+        run_stage(run.STAGE, replace(request, out=home), settings)
+
+
+def test_a_run_takes_the_friction_laws_of_a_model(place: Path, tmp_path: Path) -> None:
+    """--set diagnose.model leaves what diagnose --model leaves, which is not what Coulomb and viscous friction leave."""
+    model = tmp_path / "model.json"
+    write_model(model, read_model("rrr"))
+    sets = [f"diagnose.model={model}", "diagnose.replicas=0", "diagnose.most=1", f"diagnose.without={list(FEW)}"]
+    skipped = [name for name in STAGES if name not in ("inspect", "diagnose")]
+    settings = make_settings(run.Settings, "run", (*STAGES, "run"), None, [*sets, f"run.skip={skipped}"], {})
+    request = Request((place / "logs",), out=tmp_path / "run", no_report=True)
+    found = run_stage(run.STAGE, request, settings).result.stages[-1].result
+    alone, usual = (asked(place / "logs", tmp_path / name, replicas=0, model=laws).result
+                    for name, laws in (("alone", str(model)), ("usual", None)))
+    np.testing.assert_array_equal(found.residual_rms.identify, alone.residual_rms.identify)
+    assert not np.allclose(found.residual_rms.identify, usual.residual_rms.identify, rtol=1e-3)
+
+
+def test_one_that_was_not_read_is_not_passed_over(place: Path) -> None:
+    with pytest.raises(UsageError, match="was not read"):
         diagnose.compute(Inputs(), diagnose.Settings(calibration=str(place / "first")))
 
 

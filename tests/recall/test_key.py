@@ -12,7 +12,7 @@ from pipelines.recall.key import Key, changes
 
 KEY = Key("frf", {"low": 4.0, "model": None}, {"a.h5": "1" * 64, "b.h5": "2" * 64}, ("hold (identify, measured)",),
           {"cut.h5": "3" * 64}, {"joints": []}, {"pipelines.frf": "abc", "pipelines.model.frf.fit": "def"}, {"numpy": "1.26"},
-          "log 1", {"reconstruct": "4" * 64}, {"estimate-bps": "5" * 64})
+          "log 1", {"reconstruct": "4" * 64}, {"estimate-bps": "5" * 64}, {"model.json": "8" * 64})
 
 OTHER = {
     "low was 4.0, is 5.0": replace(KEY, settings={"low": 5.0, "model": None}),
@@ -29,6 +29,7 @@ OTHER = {
     "format log 1 is now log 2": replace(KEY, schema="log 2"),
     "reconstruct before it changed": replace(KEY, through={"reconstruct": "7" * 64}),
     "estimate-bps before it changed": replace(KEY, upon={}),
+    "model.json has other content": replace(KEY, beside={"model.json": "0" * 64}),
 }
 
 
