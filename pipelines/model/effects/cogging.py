@@ -19,7 +19,6 @@ _HIGHEST = 150.0  # order that is searched for
 _MOST = 200  # orders on the grid
 _PEAKS = 24
 _ROUNDED = 1e-11  # difference of orders that is rounding
-_TURN = 0.98 * 2.0 * math.pi  # [rad]
 _APART = 0.25  # of what the range tells apart: nearer to a whole order it is 45 degrees off that at either end at most
 
 
@@ -85,7 +84,7 @@ class Cogging(Effect):
         would pull a free one off its place. From one on, for what comes back to where it began is no spring.
         """
         travel = max(float(np.ptp(self.own(motion.q))), 1e-3)
-        if travel > _TURN and arm.robot.revolute[self._index]:
+        if self.goes_round(motion) and arm.robot.revolute[self._index]:
             step = 0.5 if travel < 4.0 * math.pi else 1.0
             for order in np.arange(1.0, _HIGHEST, step).tolist():
                 whole = order.is_integer()
@@ -116,7 +115,7 @@ class Cogging(Effect):
 
     def again(self, motion: Motion) -> bool:
         """Magnets, teeth and poles each have their own order; a full turn tells them apart, on less any curve is a few waves."""
-        return float(np.ptp(self.own(motion.q))) > _TURN
+        return self.goes_round(motion)
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -15,7 +15,6 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["Spring"]
 
 _DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
-_TURN = 0.98 * 2.0 * math.pi  # [rad]
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …
 
 
@@ -57,7 +56,7 @@ class Spring(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Straight alone where a joint without limits closes its circle: what comes back to where it began there is a wave."""
         low, high = arm.robot.joints[self._index].position
-        closed = math.isinf(high - low) and float(np.ptp(self.own(motion.q))) > _TURN and arm.robot.revolute[self._index]
+        closed = math.isinf(high - low) and self.goes_round(motion) and arm.robot.revolute[self._index]
         yield replace(self, degree=1, highest=1 if closed else self.highest)
 
     def full(self) -> Self:

@@ -1,0 +1,36 @@
+"""A joint that closes its circle does so for every effect: what comes back to where it began is a wave, and no spring."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.body import Motion
+
+FREE: Any = SimpleNamespace(robot=SimpleNamespace(revolute=(True,), joints=(SimpleNamespace(position=(-np.inf, np.inf)),)))
+
+
+def turning(by: float) -> Motion:
+    """To and fro over `by` rad."""
+    t = np.linspace(0.0, 10.0, 2001)
+    q = 0.5 * by * np.sin(t)[:, None]
+    return Motion(t, q, 0.5 * by * np.cos(t)[:, None], -q)
+
+
+def effect(name: str) -> Effect:
+    return find_effect(name)(joint=1)
+
+
+@pytest.mark.parametrize(("turns", "closed"), [(0.95, False), (0.985, True), (1.5, True)])
+def test_a_closed_circle_has_whole_orders_and_no_curved_spring(turns: float, closed: bool) -> None:
+    motion = turning(2.0 * np.pi * turns)
+    first: Any = next(iter(effect("cogging").shapes(motion, FREE)))
+    spring: Any = next(iter(effect("spring").shapes(motion, FREE)))
+    assert first.whole is closed
+    assert (spring.highest == 1) is closed
+    assert effect("cogging").again(motion) is closed
