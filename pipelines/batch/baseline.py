@@ -48,7 +48,7 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile) -> tuple[
              "friction": dataclasses.replace(baseline, base_parameters=(), effects=())}
     missing = [name for name, part in parts.items()
                if _spelled(part) and not any(known_figures(part, record.figures) for record in judged)]
-    return (_warned(f"{' and '.join(missing)} of the baseline are held against nothing: {stage} gives none by those names",
+    return (_warned(f"of the baseline, {' and '.join(missing)} met nothing to be held against: {stage} gives none by those names",
                     "run 'rrrid batch' with --stage run or estimate-bps, and with the friction laws of the baseline"),
             ) if missing else ()
 

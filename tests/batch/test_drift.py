@@ -142,9 +142,9 @@ def test_what_no_item_can_be_held_against_is_said() -> None:
     diagnosed = Record("a", "a", "found", 1, figures={"cogging joint 2 amplitude": (0.5, 0.01, "N m")}, robot="arm")
     (said,) = unheld("diagnose", [diagnosed], baseline)
     assert (said.level, said.where) == ("warn", "--baseline")
-    assert "base parameters and friction of the baseline are held against nothing: diagnose gives none" in said.message
+    assert "of the baseline, base parameters and friction met nothing to be held against: diagnose gives none" in said.message
     estimated = Record("b", "b", "ok", 0, figures={"p1": (1.0, STD, "kg m^2")}, robot="arm")
-    assert [one.message.split(" of ")[0] for one in unheld("estimate-bps", [diagnosed, estimated], baseline)] == ["friction"]
+    assert ["baseline, friction met" in one.message for one in unheld("estimate-bps", [diagnosed, estimated], baseline)] == [True]
     whole = dataclasses.replace(estimated, figures={**estimated.figures, "viscous:1:coefficient": (0.6, 0.01, "N m s/rad")})
     assert unheld("run", [whole], baseline) == ()
     (other,) = unheld("run", [whole], dataclasses.replace(baseline, robot='name = "another"'))
@@ -173,6 +173,10 @@ def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Pa
     assert obey(root, baseline=str(tmp_path / "model.json"), check=True).exit_code == 0
     outcome = obey(lay({"1": f"value 1.3 std {STD}"}), baseline=str(tmp_path / "model.json"), check=True)
     assert outcome.json["checks"] == []
+    viscous = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.6, 0.01, "N m s/rad", "fitted")})
+    write_model(tmp_path / "friction.json", ModelFile("known", rrr, _baseline().base_parameters, friction=(viscous,)))
+    (said,) = obey(root, baseline=str(tmp_path / "friction.json")).checks
+    assert said.message.startswith("of the baseline, friction met nothing")
     assert outcome.exit_code == 1
     assert {item["name"]: item["status"] for item in outcome.json["items"]} == {"0": "ok", "1": "found", "2": "ok"}
     assert outcome.json["drift"][0]["figures"][0]["moved"] == ["1"]
