@@ -89,16 +89,17 @@ class _Other:
     def begin(self, work: Callable[[], Any]) -> None:
         """Make the copy. A signal that comes meanwhile is taken when all is in place for `end`."""
         parent = os.getpid()
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)  # the copy has no use for this program's handlers
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", DeprecationWarning)  # a fork beside threads: the copy takes none of their locks
-                self._process = os.fork()
-            if self._process == 0:
-                _serve(work, self._theirs, before, parent)
-            self._theirs.close()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with _undisturbed():
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)  # the copy has no use for this program's handlers
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", DeprecationWarning)  # a fork beside threads: the copy takes none of their locks
+                    self._process = os.fork()
+                if self._process == 0:
+                    _serve(work, self._theirs, before, parent)
+                self._theirs.close()
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def answer(self) -> Any:
         """What it has made of its work.
@@ -116,6 +117,25 @@ class _Other:
             with contextlib.suppress(ProcessLookupError, ChildProcessError):  # it ended and was waited for: by another, or by none
                 os.kill(self._process, signal.SIGKILL)
                 os.waitpid(self._process, 0)
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """No handler of this program runs meanwhile; what came is taken at the end.
+
+    A mask alone does not do it: another thread takes the signal then, and the handler runs here all the same.
+    """
+    came: list[int] = []
+    before = {number: handler for number in _STOPPING if (handler := signal.getsignal(number)) is not None}
+    try:
+        for number in before:
+            signal.signal(number, lambda number, _: came.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for one in came:
+            signal.raise_signal(one)
 
 
 def _serve(work: Callable[[], Any], end: Connection[Any, Any], mask: set[int | signal.Signals],

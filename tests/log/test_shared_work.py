@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 
 import numpy as np
@@ -98,8 +99,12 @@ def _handles() -> int:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts handles in /proc")
-def test_ctrl_c_while_the_copy_is_made_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No process and no open pipe, whenever it is taken notice of."""
+@pytest.mark.parametrize("beside", [False, True])
+def test_ctrl_c_while_the_copy_is_made_leaves_nothing(beside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No process and no open pipe, also where a thread beside takes the signal, and its handler runs at once."""
+    ended = threading.Event()
+    if beside:
+        threading.Thread(target=ended.wait, daemon=True).start()
     started, fork, handles = list[int](), os.fork, _handles()
 
     def interrupted() -> int:
@@ -112,6 +117,7 @@ def test_ctrl_c_while_the_copy_is_made_leaves_nothing(monkeypatch: pytest.Monkey
     for _ in range(3):
         with pytest.raises(KeyboardInterrupt):
             shared_out(slowly, PIECES)
+    ended.set()
     assert _handles() == handles
     assert len(started) == 3
     for child in started:
