@@ -45,9 +45,9 @@ class ManyChains:
     def acceleration(self, q: Array, dq: Array, torque: Array, out: Array) -> None:
         """a (joints, replicas) [rad/s^2] into `out`, for q, dq and the torque that is left for motion, all of that shape."""
         mass, bias = self.equations(q, dq)
-        rest = np.moveaxis(torque - bias, 0, -1)[..., None]
+        rest = (torque - bias).T[..., None]
         try:
-            out[:] = np.linalg.solve(np.moveaxis(mass, -1, 0), rest)[..., 0].T
+            out[:] = np.linalg.solve(mass.transpose(2, 0, 1), rest)[..., 0].T
         except np.linalg.LinAlgError:
             out[:] = np.nan  # whoever simulates refuses it as a runaway
 
@@ -78,19 +78,21 @@ class ManyChains:
         angle = q + self._offset
         np.sin(angle, out=features[:, 1])
         np.cos(angle, out=features[:, 2])
-        features[shifting, 1] = angle[shifting]
+        if len(shifting):
+            features[shifting, 1] = angle[shifting]
         local = np.matmul(self._local, features).reshape(n, 3, 4, replicas)
         for here, step, there in zip(frames[:-1], local, frames[1:], strict=True):
             np.einsum("abr,bcr->acr", here[:3, :3], step, out=there[:3])
             there[:3, 3] += here[:3, 3]
         rotation = frames[:-1, :3, :3]
         x, y, z = axis = np.einsum("nabr,nbk->anr", rotation, self._axis)
-        px, py, pz = np.einsum("nabr,nbk->anr", rotation, self._anchor) + np.moveaxis(frames[:-1, :3, 3], 1, 0)
+        px, py, pz = np.einsum("nabr,nbk->anr", rotation, self._anchor) + frames[:-1, :3, 3].transpose(1, 0, 2)
         twists[:, 2, 1], twists[:, 0, 2], twists[:, 1, 0] = x, y, z
         twists[:, 1, 2], twists[:, 2, 0], twists[:, 0, 1] = -x, -y, -z
         twists[:, 0, 3], twists[:, 1, 3], twists[:, 2, 3] = py * z - pz * y, pz * x - px * z, px * y - py * x
-        twists[shifting, :, :3] = 0.0
-        twists[shifting, :, 3] = np.moveaxis(axis[:, shifting], 0, 1)
+        if len(shifting):
+            twists[shifting, :, :3] = 0.0
+            twists[shifting, :, 3] = axis[:, shifting].transpose(1, 0, 2)
 
     def _up_to(self, values: Array) -> Array:
         """Sums over each link and all links before it; the first axis counts links."""
