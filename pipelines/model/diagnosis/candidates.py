@@ -25,7 +25,7 @@ from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Family", "Laid", "families", "lay_family", "lay_one", "place_of", "whole_motion"]
+__all__ = ["Family", "Laid", "families", "lay_family", "lay_one", "place_of", "runs_away", "whole_motion"]
 
 Indices = npt.NDArray[np.intp]
 
@@ -152,7 +152,12 @@ def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -
 
 def _finite(table: Array) -> Array:
     """Columns that run away, of an arm that is badly known, are none."""
-    return table if (np.abs(table) < _AWAY).all() else np.zeros_like(table)
+    return np.zeros_like(table) if runs_away(table) else table
+
+
+def runs_away(table: Array) -> bool:
+    """Whether some of it is no number, or larger than any torque."""
+    return not bool((np.abs(table) < _AWAY).all())
 
 
 def _first_samples(data: Data) -> Motion:

@@ -17,7 +17,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.candidates import Family, runs_away
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.injection import Hidden, Probe
 from pipelines.model.diagnosis.injection import smallest as smallest_hidden
@@ -122,7 +122,11 @@ def not_testable(data: Data, fit: Fit, columns: Columns, screened: Sequence[Scre
 
 def _absorbed(effect: Effect, data: Data, fit: Fit, columns: Columns, arm: Arm, wanted: str) -> NotTestable:
     shape = next(iter(effect.shapes(data.logs[0].motion, arm)), effect)
-    table = data.lay(lambda motion: shape.columns(motion, arm))
+    with np.errstate(all="ignore"):
+        table = data.lay(lambda motion: shape.columns(motion, arm))
+    if runs_away(table):
+        why = "the fitted arm is known too badly for its torque to be worked out; needs other motion"
+        return NotTestable(effect.name, effect.joint, why, effect.experiment)
     need = f"needs {' and '.join(effect.needs)}" if effect.needs else wanted
     hiding = ", ".join(_hiding(table, fit, columns))
     return NotTestable(effect.name, effect.joint, f"absorbed by {hiding}{'; ' if need else ''}{need}", effect.experiment)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from pipelines.bench.session import record
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.injection import _last_root, _raised
 from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.limits import _absorbed
 from pipelines.model.diagnosis.result import Detectable, Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from tests.diagnose.sessions import but
@@ -116,3 +119,16 @@ def test_a_strength_is_raised_until_it_passes_and_no_further_than_a_torque_goes(
     assert _raised(runs_away, 1.0) == np.inf
     assert asked == [1.0, 1.5, 2.25]
     assert _raised(lambda strength: 1.0, np.inf) == np.inf
+
+
+@pytest.mark.parametrize("size", [np.inf, np.nan, 1e200])
+def test_of_a_torque_that_runs_away_nobody_says_what_absorbs_it(size: float) -> None:
+    """An inertia of the wrong sign lets what rings behind a spring grow without end."""
+    column = np.full(5, size)
+    effect: Any = SimpleNamespace(name="spring", joint=1, needs=(), experiment="", shapes=lambda motion, arm: (),
+                                  columns=lambda motion, arm: column)
+    data: Any = SimpleNamespace(logs=[SimpleNamespace(motion=None)], lay=lambda torque: torque(None))
+    nothing: Any = None
+    said = _absorbed(effect, data, nothing, nothing, nothing, "").reason
+    assert "absorbed" not in said
+    assert "other motion" in said
