@@ -29,6 +29,7 @@ _FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference
 
 _HELD_OUT_FLOOR = ("An arm in order: the fitted rigid body and friction, run through the held-out experiments with the noise of "
                    "these drives, and analysed alike.")
+_AND_BEFORE = " To that comes what the model leaves of the reference logs beyond such a simulation of them."
 
 
 def cause_at(cause: str, joint: int | None) -> str:
@@ -69,7 +70,8 @@ def held_out_floor(found: Diagnosis) -> tuple[Array, str, str]:
     """The floor beside held-out errors: (joints,) [N m], its name in a heading, and where it comes from."""
     if found.held_out_floor is None:
         return found.residual_rms.floor, floor_name(found), floor_words(found)
-    return found.held_out_floor, "left by an arm in order", _HELD_OUT_FLOOR
+    more = _AND_BEFORE if found.floor_origin == "reference logs" else ""
+    return found.held_out_floor, "left by an arm in order", f"{_HELD_OUT_FLOOR}{more}"
 
 
 def floor_words(found: Diagnosis) -> str:

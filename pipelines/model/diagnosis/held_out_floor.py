@@ -1,25 +1,30 @@
 """The floor of the held-out logs: what the arm in order would leave of these very motions.
 
-    rms = held_out_floor(model, arm, noise, motions, data, recipe, seed)      (joints,) [N m]
+    rms = held_out_floor(model, arm, noise, prepared, judge, before, seed)      (joints,) [N m]
 
 A floor hangs on the motion. Where a joint reverses with little acceleration, smoothing blunts its friction for longer, and the
 ripple of a drive grows with its load: a model without any fault may leave twice as much of one log as of another. The arm in order
 is run through the held-out experiments with the noise of the drives, what it logs is reconstructed and laid like the logs, and the
 model it was run with is subtracted: nothing is fitted, so that a wrong number of the model is no part of the floor.
+
+Where there are reference logs, an arm in order also has what no law of the model has to the last, its friction say: as much as they
+leave more than their own replicas do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array
+from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.twin import drive_noise, imperfect, replayable, replica
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
@@ -27,31 +32,43 @@ from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
 __all__ = ["held_out_floor", "noise_in"]
 
 
-def held_out_floor(model: Exact, arm: Arm, noise: Array, motions: Motions, data: Data, recipe: Recipe, seed: int) -> Array | None:
-    """(joints,) [N m] root mean square; None where a held-out log has no controller, or the arm in order cannot be simulated.
+def held_out_floor(model: Exact, arm: Arm, noise: Array, prepared: Prepared, judge: Data, before: Array, seed: int) -> Array | None:
+    """(joints,) [N m] root mean square; None where a log has no controller, or the arm in order cannot be simulated.
 
     Args:
         model: whose rigid body and friction the arm in order has.
         arm: with all that is known of the machine, whose torque its drives carry.
         noise: (joints,) [N m] white noise of the drives.
-        motions: the held-out logs; `data` their rows.
+        judge: rows of the held-out logs.
+        before: (joints,) [N m] what the reference logs leave, where there are any.
     """
-    logs = [log for log, _ in motions]
-    if not logs or len(replayable(logs)) < len(logs):
+    asked = [(prepared.judging, judge)]
+    if prepared.reference is not None:
+        asked.append((prepared.referring, prepared.reference))
+    logs = [log for motions, _ in asked for log, _ in motions]
+    if len(replayable(logs)) < len(logs):
         return None
     bare = replace(model, effects=())
 
-    def run(number: int) -> Simulated:
-        return simulate(bare.nominal, Experiment.of_log(logs[number]), Noise(noise, np.zeros_like(noise)), (seed,))
+    def run(log: ExperimentLog) -> Simulated:
+        return simulate(bare.nominal, Experiment.of_log(log), Noise(noise, np.zeros_like(noise)), (seed,))
 
     try:
-        done = shared_out(run, range(len(logs)))
-        parts = tuple(replica(one, simulated, 0, recipe) for one, simulated in zip(motions, done, strict=True))
-        own = gather(parts, bare.columns, recipe, [one.equations.rows for one in data.logs])
+        done = iter(shared_out(run, logs))
+        left = [_left(bare, arm, noise, [next(done) for _ in motions], motions, data, prepared.recipe, seed)
+                for motions, data in asked]
     except InputRejected:  # D15, D17, T04
         return None
-    small = own.lay_each(imperfect(arm, noise, own, seed))
-    return own.rms(own.y + small - bare.torque(own))
+    misfit = np.maximum(np.square(before) - np.square(left[1]), 0.0) if len(left) > 1 else 0.0
+    return np.asarray(np.sqrt(np.square(left[0]) + misfit))
+
+
+def _left(bare: Exact, arm: Arm, noise: Array, done: Sequence[Simulated], motions: Motions, data: Data, recipe: Recipe,
+          seed: int) -> Array:
+    """(joints,) [N m] root mean square of what the model leaves of its own replicas of these logs."""
+    parts = tuple(replica(one, simulated, 0, recipe) for one, simulated in zip(motions, done, strict=True))
+    own = gather(parts, bare.columns, recipe, [one.equations.rows for one in data.logs])
+    return own.rms(own.y + own.lay_each(imperfect(arm, noise, own, seed)) - bare.torque(own))
 
 
 def noise_in(model: Exact, data: Data, left: Array, motions: Motions, recipe: Recipe, seed: int) -> Array | None:
