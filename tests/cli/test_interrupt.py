@@ -40,14 +40,30 @@ def _complete(out: Path) -> dict[str, str]:
 
 
 def _nobody_left(group: int) -> bool:
-    """Whether a process group ends within a second: who has just died waits for init to take notice."""
+    """Whether a process group ends within a second: nobody in it runs. Who is dead may wait longer for init to take notice."""
     for _ in range(100):
-        try:
-            os.killpg(group, 0)
-        except ProcessLookupError:
+        if not _running(group):
             return True
         time.sleep(0.01)
     return False
+
+
+def _running(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    states = [_state(place, group) for place in Path("/proc").glob("[0-9]*/stat")]
+    return not states or any(state not in ("", "Z", "X") for state in states)
+
+
+def _state(place: Path, group: int) -> str:
+    """R, S, Z … of a process of the group, proc(5); empty for any other."""
+    try:
+        state, _, found = place.read_text().rpartition(")")[2].split()[:3]
+    except (OSError, ValueError):  # it is gone by now
+        return ""
+    return state if int(found) == group else ""
 
 
 @pytest.mark.row("P06")
