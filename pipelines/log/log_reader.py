@@ -44,7 +44,11 @@ def read_guarded(path: Path, container: str, only: Collection[str] | None,
                                 remedy="copy the file again from where it was recorded")
         return (log, digest), True
 
-    return _guard.ask([str(path), container, None if only is None else sorted(only)], path, _READS_IT[container], taken)
+    try:
+        return _guard.ask([str(path), container, None if only is None else sorted(only)], path, _READS_IT[container], taken)
+    except InputRejected:
+        sound()
+        raise
 
 
 def end_reader() -> None:

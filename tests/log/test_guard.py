@@ -133,6 +133,29 @@ def test_a_file_that_harms_every_child_is_refused(ask: Ask, monkeypatch: pytest.
         assert ask().about["count"] == 1
 
 
+@pytest.mark.row("F14")
+@pytest.mark.parametrize("harm", ["refuse", "crash"])
+def test_a_file_that_is_written_while_it_is_read_is_not_called_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                                      harm: str) -> None:
+    """Half of it is old, half new: whatever the library makes of that, it is told to wait."""
+    write_log(tmp_path / "a.h5", small_log())
+
+    def meddled(words: Any) -> Answer:
+        with (tmp_path / "a.h5").open("ab") as file:
+            file.write(b"more")
+        if harm == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        raise InputRejected("F02", "damaged", where="", remedy="copy it again")
+
+    guard = Guard(meddled)
+    monkeypatch.setattr(log_reader, "_guard", guard)
+    try:
+        with pytest.raises(InputRejected, match="RRID-F14"):
+            open_log(tmp_path / "a.h5")
+    finally:
+        guard.let_go()
+
+
 @pytest.mark.row("F03")
 @pytest.mark.parametrize("words", ["crash", "leave"])
 def test_a_crash_is_told_where_nobody_can_wait_for_a_child(ask: Ask, words: str) -> None:
