@@ -87,18 +87,18 @@ class _Other:
         self._ours, self._theirs = multiprocessing.Pipe(duplex=False)
 
     def begin(self, work: Callable[[], Any]) -> None:
-        """Make the copy. A signal that comes meanwhile is taken when all is in place for `end`."""
+        """Make the copy, if the system has a process for it. A signal that comes meanwhile is taken when `end` has all it needs."""
         parent = os.getpid()
         with _undisturbed():
             before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)  # the copy has no use for this program's handlers
             try:
-                with warnings.catch_warnings():
+                with warnings.catch_warnings(), contextlib.suppress(OSError):  # none can be had: every piece is done here
                     warnings.simplefilter("ignore", DeprecationWarning)  # a fork beside threads: the copy takes none of their locks
                     self._process = os.fork()
-                if self._process == 0:
-                    _serve(work, self._theirs, before, parent)
-                self._theirs.close()
+                    if self._process == 0:
+                        _serve(work, self._theirs, before, parent)
             finally:
+                self._theirs.close()  # or nobody would ever be told that no answer comes
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def answer(self) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -123,6 +124,18 @@ def test_ctrl_c_while_the_copy_is_made_leaves_nothing(beside: bool, monkeypatch:
     for child in started:
         with pytest.raises(ChildProcessError):
             os.waitpid(child, os.WNOHANG)
+
+
+def test_where_no_process_can_be_had_all_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The system lets this user have no more of them (ulimit -u), or has no memory for one."""
+    handles = _handles() if sys.platform == "linux" else 0
+
+    def refused() -> int:
+        raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(os, "fork", refused)
+    assert shared_out(slowly, PIECES) == [(piece, os.getpid()) for piece in PIECES]
+    assert handles == (_handles() if sys.platform == "linux" else 0)
 
 
 def test_a_program_whose_children_nobody_waits_for_gets_its_answers() -> None:
