@@ -74,6 +74,7 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
             if one.log in (None, log) else np.zeros_like(motion.q))
 
     here, more = model.torque(data), []
+    as_read = not any(one.effect.misread for one in model.effects)
     names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
     for place, _, name in names:
         step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])
@@ -82,7 +83,7 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
         for name, size in _steps(one):
             names.append((1, place, name))
             there = number_moved(one, name, size)
-            if one.effect.adds:
+            if one.effect.adds and as_read:
                 more.append((alone(there) - alone(one))[None] / size)
             else:
                 effects = (*model.effects[:place], there, *model.effects[place + 1:])
