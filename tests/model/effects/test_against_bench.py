@@ -195,3 +195,21 @@ def test_a_spring_of_three_zeros_rests_at_the_one_near_its_line() -> None:
     found = Spring(1, degree=3).values([-7.0, 6.0, 0.0, 1.0])
     assert found["rest_angle"] == pytest.approx(1.0)
     assert found["stiffness"] == pytest.approx(-4.0)  # (1 - 2)(1 + 3)
+
+
+def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
+    """NumPy's polynomial says so, wherever its zero lies; a file from before the sixth and seventh power says the same of five."""
+    fitted = np.array([0.3, -0.2, 0.4, 0.8, -0.1, 0.3, 0.05, -0.2])  # from the constant upwards
+    spring, q = Spring(1), np.linspace(-1.2, 1.2, 25)
+    values = spring.values([fitted[1], fitted[0], *fitted[2:]])
+    load = spring.own_load(values)
+    np.testing.assert_allclose([load(x, 0.0) for x in q], np.polynomial.Polynomial(fitted)(q), atol=1e-12)
+    assert load(values["rest_angle"], 0.0) == pytest.approx(0.0, abs=1e-12)
+    five = Spring(1, degree=5).values([fitted[1], fitted[0], *fitted[2:6]])
+    whole = Arm.from_links(machine().robot).extended(Acting.of(Spring(1, degree=5), five)).to_model()
+    before = {name: value for name, value in whole.effects[0].parameters.items() if name not in ("sixth", "seventh")}
+    arm_then = Arm.from_model(replace(whole, effects=(replace(whole.effects[0], parameters=before),)))
+    old = arm_then.effects[0]
+    load = old.effect.own_load(old.values)
+    assert load is not None
+    np.testing.assert_allclose([load(x, 0.0) for x in q], np.polynomial.Polynomial(fitted[:6])(q), atol=1e-12)
