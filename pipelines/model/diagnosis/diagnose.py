@@ -213,7 +213,7 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
            for one, rows in ((plain, judge), (responded.final, responded.judge))]
     own = None if judge is None or floored.noise is None else held_out_floor(
-        responded.final.model, acted(responded.final.model.arm, case.beside), floored.noise, prepared, judge,
+        responded.final.model, acted(responded.final.model.arm, responded.acting), floored.noise, prepared, judge,
         floored.rms, chosen.seed)
     made = floored.calibration
     pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()
