@@ -34,6 +34,7 @@ class TimeDelay(Effect):
     remedy = "Stamp positions where they are taken, or move this joint's signal by the delay before it is used; lower the gains."
     experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
     twins = ("drive_lag", "torque_lag")
+    misread = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         dq, ddq = self.own(motion.dq), self.own(motion.ddq)
