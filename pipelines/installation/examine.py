@@ -115,7 +115,8 @@ def _blas() -> Finding:
 
 
 def _processor() -> Finding:
-    return Finding("processor", "ok", f"{processors()} of {os.cpu_count()} cores may be used; a run takes one, rrrid batch all")
+    usable = f"{processors()} of {os.cpu_count()} cores may be used"
+    return Finding("processor", "ok", f"{usable}; a run takes two at most, rrrid batch all")
 
 
 def _folder(name: str, where: Callable[[], Path], otherwise: Level, remedy: str) -> Finding:
