@@ -130,6 +130,14 @@ def test_the_residual_is_held_against_the_floor() -> None:
     assert judged(case("spring"), answer(finding("spring", 2, after=1.2 * FLOOR))).residual == pytest.approx(1.2)
 
 
+@pytest.mark.parametrize(("own", "residual"), [([2.0 * FLOOR] * 3, 0.6), ([2.0 * FLOOR, FLOOR, 2.0 * FLOOR], 1.2), (None, 1.2)])
+def test_by_the_floor_of_the_held_out_logs_where_there_is_one_and_by_the_other_as_well(own: list[float] | None,
+                                                                                     residual: float) -> None:
+    """Of the worst joint; the floor of the fitted logs stays in its own row, whatever the first one says."""
+    one = judged(case("spring"), answer(finding("spring", 2, after=1.2 * FLOOR)) | {"held_out_floor": own})
+    assert (one.residual, one.over_fitted) == (pytest.approx(residual), pytest.approx(1.2))
+
+
 @pytest.mark.parametrize(("count", "of"), [(0, 20), (19, 20), (57, 60), (1, 100)])
 def test_wilsons_interval(count: int, of: int) -> None:
     """As scipy has it."""
