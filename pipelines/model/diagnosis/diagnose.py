@@ -29,17 +29,17 @@ from pipelines.model.diagnosis.evidence import evidence, floors_of
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.held_out import held_out_left
-from pipelines.model.diagnosis.held_out_floor import held_out_floor, noise_in
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.memory import Memory
+from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import Settled, settled, unnamed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, Rejected, ResidualRms, Threshold
-from pipelines.model.diagnosis.search import Explored, Step, clean, gap_first, gives_way, provisional, search
+from pipelines.model.diagnosis.search import Explored, Found, Step, clean, gap_first, gives_way, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
@@ -165,9 +165,9 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     first = replace(first, held=replace(first.held, prepared=now))
     found = search(case, chosen.most)
     done = settled(found, rule(found, since.floor), case, now, since.floor)
-    if since.absorbed is not None and done.ruling.verdict == "unknown":
-        done = unnamed(done, since.floor)
     noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
+    if since.absorbed is not None and done.ruling.verdict == "unknown":
+        done = unnamed(done, _with_load(found, case, now, since.floor, noise, chosen.seed))
     told = _told(first, case, done, _Floored(since.floor, "reference logs", None, given, noise), chosen, since.probed)
     if given is None:
         told = replace(told, calibration=Calibration(
@@ -185,6 +185,13 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     findings = _strongest((one.finding, *told.findings))
     return replace(told, verdict="cause", findings=findings, reason="", extended=one.arm,
                    summary=_sentence(Ruling("cause", (), ""), findings))
+
+
+def _with_load(found: Found, case: Case, now: Prepared, before: Array, noise: Array | None, seed: int) -> Array:
+    """(joints,) [N m] floor of the later logs, whose arm is heavier: it reverses more slowly; `before` where nobody can tell."""
+    arm = acted(found.nominal.model.arm, case.beside)
+    own = None if noise is None else motion_floor(found.nominal.model, arm, noise, now.motions, case.data, now, before, seed)
+    return before if own is None else np.maximum(own, before)
 
 
 def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -212,8 +219,8 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     judge = first.held.judge if parts else prepared.judge
     rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
            for one, rows in ((plain, judge), (responded.final, responded.judge))]
-    own = None if judge is None or floored.noise is None else held_out_floor(
-        responded.final.model, acted(responded.final.model.arm, responded.acting), floored.noise, prepared, judge,
+    own = None if judge is None or floored.noise is None else motion_floor(
+        responded.final.model, acted(responded.final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
         floored.rms, chosen.seed)
     made = floored.calibration
     pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()

@@ -35,6 +35,7 @@ _WINDOW = 0.4  # [s] in which the noise is looked at
 _QUIET = 0.3  # of the windows are taken for quiet
 _NUISANCE = 20040509
 _BOUNDS = (0.25, 2.0)  # of the guess's power: counting of the encoders hides what is less
+_FEWEST = 4  # rows of a window
 _SMOOTH = 5  # rows of the moving average whose remainder is noise
 
 
@@ -104,14 +105,17 @@ def white(data: Data, left: Array) -> Array:
     """(joints,) [N m] of the residual that is white noise, from its quick changes: a floor that no model can be below."""
     share = np.sqrt(1.0 - 1.0 / _SMOOTH)
     each = [_roughness(x, float(np.median(np.diff(one.t)))) / share for one, x in zip(data.logs, data.split(left), strict=True)]
-    return np.asarray(np.sqrt(np.mean(np.square(each), axis=0)))
+    return np.asarray(np.sqrt(np.nanmean(np.square(each), axis=0)))
 
 
 def _roughness(x: Array, step: float) -> Array:
-    """(joints,) of x (joints, rows): standard deviation of what a moving average leaves, in the quietest windows."""
+    """(joints,) of x (joints, rows): standard deviation of what a moving average leaves, in the quietest windows; NaN of fewer rows
+    than a window has."""
+    if x.shape[1] < _SMOOTH + _FEWEST:
+        return np.full(len(x), np.nan)
     kernel = np.ones(_SMOOTH) / _SMOOTH
     rest = np.array([row[_SMOOTH // 2:len(row) - _SMOOTH // 2] - np.convolve(row, kernel, mode="valid") for row in x])
-    size = max(4, round(_WINDOW / step))
+    size = min(max(_FEWEST, round(_WINDOW / step)), rest.shape[1])
     windows = rest[:, :rest.shape[1] // size * size].reshape(len(rest), -1, size)
     return np.asarray(np.sqrt(np.quantile(windows.var(axis=2), _QUIET, axis=1)))
 

@@ -16,7 +16,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["Ruling", "excess", "explained", "held_out_high", "rule", "without_steps"]
+__all__ = ["Ruling", "at_floor", "excess", "explained", "held_out_high", "rule", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -96,6 +96,11 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
 def _happened(step: Step) -> bool:
     """Whether what it found is an event."""
     return step.best is not None and step.best.screened.family.event
+
+
+def at_floor(rms: Array, floor: Array) -> bool:
+    """Whether every joint stands so low that it may be the floor."""
+    return bool((rms <= _CLEAR * floor).all())
 
 
 def held_out_high(rms: Array, floor: Array) -> str:

@@ -1,11 +1,11 @@
-"""The floor of the held-out logs: what the arm in order would leave of these very motions.
+"""The floor of a motion: what the arm in order would leave of these very logs.
 
-    rms = held_out_floor(model, arm, noise, prepared, judge, before, seed)      (joints,) [N m]
+    rms = motion_floor(model, arm, noise, motions, data, prepared, before, seed)      (joints,) [N m]
 
 A floor hangs on the motion. Where a joint reverses with little acceleration, smoothing blunts its friction for longer, and the
-ripple of a drive grows with its load: a model without any fault may leave twice as much of one log as of another. The arm in order
-is run through the held-out experiments with the noise of the drives, what it logs is reconstructed and laid like the logs, and the
-model it was run with is subtracted: nothing is fitted, so that a wrong number of the model is no part of the floor.
+ripple of a drive grows with its load: a model without any fault may leave twice as much of one log as of another, or of an arm with
+a payload. The arm in order is run through the experiments with the noise of the drives, what it logs is reconstructed and laid
+like the logs, and the model it was run with is subtracted: nothing is fitted, so that a wrong number of the model is no part of it.
 
 Where there are reference logs, an arm in order also has what no law of the model has to the last, its friction say: as much as they
 leave more than their own replicas do.
@@ -29,24 +29,25 @@ from pipelines.model.diagnosis.twin import drive_noise, imperfect, replayable, r
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
 
-__all__ = ["held_out_floor", "noise_in"]
+__all__ = ["motion_floor", "noise_in"]
 
 
-def held_out_floor(model: Exact, arm: Arm, noise: Array, prepared: Prepared, judge: Data, before: Array, seed: int) -> Array | None:
+def motion_floor(model: Exact, arm: Arm, noise: Array, motions: Motions, data: Data, prepared: Prepared, before: Array,
+                 seed: int) -> Array | None:
     """(joints,) [N m] root mean square; None where a log has no controller, or the arm in order cannot be simulated.
 
     Args:
         model: whose rigid body and friction the arm in order has.
         arm: with all that is known of the machine, whose torque its drives carry.
         noise: (joints,) [N m] white noise of the drives.
-        judge: rows of the held-out logs.
+        motions: the logs, held out or fitted; `data` their rows.
         before: (joints,) [N m] what the reference logs leave, where there are any.
     """
-    asked = [(prepared.judging, judge)]
+    asked = [(motions, data)]
     if prepared.reference is not None:
         asked.append((prepared.referring, prepared.reference))
-    logs = [log for motions, _ in asked for log, _ in motions]
-    if len(replayable(logs)) < len(logs):
+    logs = [log for some, _ in asked for log, _ in some]
+    if not len(replayable(logs)) == len(logs) > 0:
         return None
     bare = replace(model, effects=())
 
@@ -55,8 +56,7 @@ def held_out_floor(model: Exact, arm: Arm, noise: Array, prepared: Prepared, jud
 
     try:
         done = iter(shared_out(run, logs))
-        left = [_left(bare, arm, noise, [next(done) for _ in motions], motions, data, prepared.recipe, seed)
-                for motions, data in asked]
+        left = [_left(bare, arm, noise, [next(done) for _ in some], some, rows, prepared.recipe, seed) for some, rows in asked]
     except InputRejected:  # D15, D17, T04
         return None
     misfit = np.maximum(np.square(before) - np.square(left[1]), 0.0) if len(left) > 1 else 0.0
@@ -75,6 +75,7 @@ def noise_in(model: Exact, data: Data, left: Array, motions: Motions, recipe: Re
     """`drive_noise` (joints,) [N m] in the first log whose controller is known; None where there is none, or no simulation."""
     places = replayable([log for log, _ in motions])
     try:
-        return drive_noise(model, data, left, motions, recipe, places[0], seed) if places else None
+        found = drive_noise(model, data, left, motions, recipe, places[0], seed) if places else None
+        return None if found is None or not np.isfinite(found).all() else found
     except InputRejected:  # D15, D17
         return None

@@ -15,6 +15,7 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.twin import _roughness
 from tests.diagnose.sessions import but
 
 
@@ -53,3 +54,10 @@ def test_without_a_controller_nobody_can_tell() -> None:
     """What was driven by nobody knows what cannot be simulated."""
     logs = tuple(log if log.role == "identify" else replace(log, controller=None) for log in recorded())
     assert asked(logs).held_out_floor is None
+
+
+def test_a_recording_of_a_few_rows_tells_no_noise() -> None:
+    """A third of a second, thinned out: fewer rows than the quiet windows have."""
+    assert np.isnan(_roughness(np.zeros((3, 4)), 0.01)).all()
+    rng = np.random.default_rng(1)
+    np.testing.assert_allclose(_roughness(rng.standard_normal((3, 30)), 0.05), np.sqrt(0.8), rtol=0.6)
