@@ -186,7 +186,9 @@ def _computed(stage: Stage[Any, Any], settings: Any, inputs: Inputs, place: str,
     """Compute one stage and store what it found, or why it found nothing."""
     try:
         result = renamed(stage.compute(inputs, settings), given.names)
-    except (NothingMatched, InputRejected) as problem:
+    except (NothingMatched, InputRejected, UsageError) as problem:
+        if isinstance(problem, UsageError) and place == stage.name:  # of several robots one does without what fits another
+            raise
         told = tilde(renamed(problem.as_dict(), given.names)) | {"exit": problem.exit_code}
         return given.store.keep(place, key, {"problem": told}, None, lambda folder: None), None
     about = {"exit": stage.exit_code(result, True), "problem": None,

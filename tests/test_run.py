@@ -6,11 +6,14 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pipelines import estimate_bps, run
+from pipelines.errors import UsageError
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
 from pipelines.report.run_ledger import ledger_lines
@@ -137,3 +140,19 @@ def test_the_sample_logs_are_three_sessions(samples: Path) -> None:
     parts = [sorted({opened.path.parent.name for opened in part.logs}) for _, part in run._apart(inputs)]
     assert sorted(parts) == [["rrr-changed"], ["rrr-closed-form"], ["rrr-healthy"]]
     assert sum(len(part.logs) for _, part in run._apart(inputs)) == len(inputs.logs)
+
+
+@pytest.mark.parametrize("place", ["rrr-a/diagnose", "diagnose"])
+def test_one_of_several_robots_does_without_what_fits_another(place: str) -> None:
+    """C02 of a robot's stage is that stage's word, where several robots are reported apart; alone it ends the run."""
+    def refused(inputs: object, settings: object) -> None:
+        raise UsageError("C02", "the calibration is not for these logs", remedy="leave it out")
+
+    stage: Any = SimpleNamespace(name="diagnose", compute=refused)
+    given: Any = SimpleNamespace(names={}, store=SimpleNamespace(keep=lambda place, key, about, *rest: about))
+    if place == stage.name:
+        with pytest.raises(UsageError):
+            run._computed(stage, None, given, place, given, given)
+    else:
+        told: Any = run._computed(stage, None, given, place, given, given)
+        assert (told[0]["problem"]["code"], told[0]["problem"]["exit"]) == ("RRID-C02", 2)

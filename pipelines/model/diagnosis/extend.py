@@ -25,12 +25,13 @@ from pipelines.model.diagnosis.candidates import Family, families, place_of, who
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, sure
+from pipelines.model.diagnosis.findings import BY_CHANCE, extended_arm, findings, held_finding, unlike
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.pruned import vague
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
@@ -167,8 +168,9 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     why: dict[tuple[str, int | None], str] = {}
     late = any(step.best is not None and step.best.effect.last for step in steps)
     for k, step in enumerate(steps):
-        if step.best is not None and (doubt := sure(step, prepared, chosen.blocks) or
-                                      farther(simulated[k], simulated[k + 1], late=late)):
+        if step.best is not None and (doubt := unlike(step, prepared, chosen.blocks) or
+                                      farther(simulated[k], simulated[k + 1], late=late) or
+                                      (BY_CHANCE if vague(found, k, prepared, case) else "")):
             why[step.best.effect.name, step.best.effect.joint] = doubt
     taken = {(one.cause, one.joint) for one in told}
     why |= {(f.cause, f.joint): "it takes nothing off the held-out error" for f in case.families

@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Val
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
-__all__ = ["BY_CHANCE", "agreement", "by_chance", "extended_arm", "findings", "held_finding", "rejected", "sure", "unlike"]
+__all__ = ["BY_CHANCE", "agreement", "by_chance", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
 
 BY_CHANCE = "its gain on held-out torque is within what chance does"
 
@@ -104,14 +104,6 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
         if one is not best and alike > _ALIKE and one.error < 1.0 and one.possible:
             found.append(Rival(one.screened.cause, one.screened.joint, alike))
     return tuple(sorted(found, key=lambda rival: -rival.similarity))
-
-
-def sure(step: Step, prepared: Prepared, blocks: int) -> str:
-    """Why an accepted step is not to be believed; empty where it is: its gain repeats, its amplitude is the same in every log."""
-    best = step.best
-    if best is not None and best.log is None and by_chance(step.before, best.done, prepared.judge, blocks):
-        return BY_CHANCE
-    return unlike(step, prepared, blocks)
 
 
 def by_chance(before: Refined, after: Refined, judge: Data | None, blocks: int) -> bool:

@@ -22,10 +22,10 @@ from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
-from pipelines.model.diagnosis.verdict import Ruling, held_out_high, without_steps
+from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Settled", "settled", "unnamed"]
+__all__ = ["Settled", "settled", "unnamed", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
@@ -78,7 +78,9 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
 def unnamed(done: Settled, floor: Array) -> Settled:
     """The same where the base parameters tell what has changed: what is left near the floor, and has no name, is no alarm then."""
     alone = without_steps(done.found, floor, True)
-    return done if alone.verdict == "unknown" else replace(done, ruling=replace(alone, doubts=done.ruling.doubts), simulated=())
+    if alone.verdict == "unknown" and not at_floor(done.found.nominal.rms, floor):
+        return done
+    return replace(done, ruling=Ruling("nothing-wrong", (), "", done.ruling.doubts), simulated=())
 
 
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:
@@ -109,6 +111,14 @@ def _by_chance(step: Step, prepared: Prepared, blocks: int) -> bool:
     return best is not None and best.log is None and by_chance(step.before, best.done, prepared.judge, blocks)
 
 
+def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
+    """Whether step `k` gained no more than chance when it was found, nor does beside all the others."""
+    if not _by_chance(found.steps[k], prepared, case.blocks):
+        return False
+    others = [j for j, step in enumerate(found.steps) if step.best is not None and j != k]
+    return not others or by_chance(_without(found, others, case), found.final, case.judge, case.blocks)
+
+
 def _asked_again(found: Found, kept: list[int], vague: list[int], case: Case) -> tuple[list[int], Refined]:
     """With those of `vague` that gain more than chance does beside `kept`, and the model with all of them."""
     final = _without(found, kept, case)
@@ -117,7 +127,7 @@ def _asked_again(found: Found, kept: list[int], vague: list[int], case: Case) ->
         others = []
         for k in left:
             more = sorted((*kept, k))
-            there = _without(found, more, case, final) if k in _apart(found, more, case) else None
+            there = _without(found, more, case, final) if _apart(found, more, case) == more else None
             if there is None or by_chance(final, there, case.judge, case.blocks):
                 others.append(k)
             else:

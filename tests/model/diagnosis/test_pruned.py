@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.diagnosis import pruned
+from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
@@ -140,3 +141,25 @@ def test_what_gained_no_more_than_chance_is_asked_again_beside_what_was_found_af
     monkeypatch.setattr(pruned, "by_chance", lambda before, after, judge, blocks: (before, after) != ((2,), (0, 2)))
     assert pruned._asked_again(found, [2], [0, 1], among()) == ([0, 2], (0, 2))
     assert pruned._asked_again(found, [], [0, 1], among()) == ([], ())
+
+
+@pytest.mark.parametrize(("rest", "floor", "verdict"), [(0.018, 0.018, "nothing-wrong"), (0.018, 0.01, "unknown")])
+@pytest.mark.parametrize("gives_way", [False, True])
+def test_what_an_arm_with_its_load_leaves_is_no_alarm(rest: float, floor: float, verdict: str, gives_way: bool) -> None:
+    """A payload slows reversals down: joint 3 leaves more than before, and no more than the same arm in order does with it."""
+    nominal, other = left(0.01, 0.01, rest), SimpleNamespace(joint=3) if gives_way else None
+    step: Any = SimpleNamespace(before=nominal, best=None, other=other)
+    done = pruned.Settled(Found(nominal, (step,), nominal), Ruling("unknown", (), "something stands above the floor"), ())
+    assert pruned.unnamed(done, np.array([0.01, 0.01, floor])).ruling.verdict == verdict
+
+
+def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With it the later one would only mend its shape: one of two names has to go, and the later one was surer."""
+    one, other = twins()
+    found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.05, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
+    monkeypatch.setattr(pruned, "imitated", lambda step, family, case: 0.5)
+    monkeypatch.setattr(pruned, "by_chance", lambda *_: False)
+    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, final=None: tuple(kept))
+    case = among(effect(one, 1), effect(other, 1))
+    kept, final = pruned._asked_again(found, [1], [0], case)
+    assert (kept, final) == ([1], (1,))
