@@ -16,6 +16,7 @@ from pipelines.log.limits import percent
 __all__ = ["MOTION_CHECKS", "both_ways", "degrees_or_motor"]
 
 _DEGREE = np.pi / 180.0
+_AT, _STANDS = 0.999, 0.02  # of the largest torque that is its limit; of the time that it stands there
 _NOISE_SPEED = 6.0  # standard deviations that a limit must be exceeded by
 
 
@@ -156,14 +157,24 @@ def follows_reference(s: Subject) -> list[Check]:
         share = float(np.std(error)) / max(float(np.std(reference[ok])), 1e-12)
         seen.append(percent(share, 2))
         if share > 0.5:
-            found.append(s.say("S16", "reject" if share > 0.8 else "warn",
+            limit = _stands_at(log.tau[:s.good.end, j])
+            why = ("they are not of the same run, or not of the same joint" if limit is None else
+                   f"its torque stands at ±{limit:.3g} {s.unit('tau', int(j))}, and the joint cannot follow")
+            found.append(s.say("S16", "reject" if share > 0.8 and limit is None else "warn",
                                f"position and reference differ by {100 * share:.0f} % of the motion "
-                               f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): "
-                               "they are not of the same run, or not of the same joint",
+                               f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): {why}",
                                signal="q_ref", joint=int(j), gate=True,
-                               remedy="log both in one recorder, or leave the reference out"))
+                               remedy="log both in one recorder, or leave the reference out" if limit is None else
+                               "look for what limits the drive, or drive it more gently"))
     within = f" within {', '.join(seen)} of the motion" if seen else ""
     return found or s.ok("S16", f"the position follows its reference{within}", signal="q_ref")
+
+
+def _stands_at(tau: Array) -> float | None:
+    """The limit at which a torque (samples,) stands for a good part of the time; None where it has none."""
+    size = np.abs(tau[np.isfinite(tau)])
+    most = float(size.max(initial=0.0))
+    return most if most > 0.0 and float(np.mean(size >= _AT * most)) > _STANDS else None
 
 
 def stopped(s: Subject) -> list[Check]:

@@ -132,6 +132,17 @@ def test_a_sagging_controller_still_follows() -> None:
     assert not any(c.code == "RRID-S16" and c.level != "ok" for c in check_log(lazy))
 
 
+def test_a_drive_at_its_limit_is_no_log_of_another_run() -> None:
+    """S16: a joint whose torque is at its limit for half of the time does not follow; a fault of the arm, not of the log."""
+    log = good_log()
+    away = with_signal(log, q_ref=log.q[::-1])
+    assert any(c.code == "RRID-S16" and c.level == "reject" for c in check_log(away))
+    weak = with_signal(away, tau=np.clip(log.tau, -0.5 * np.abs(log.tau).max(axis=0), 0.5 * np.abs(log.tau).max(axis=0)))
+    said = [c for c in check_log(weak) if c.code == "RRID-S16"]
+    assert {c.level for c in said} == {"warn"}
+    assert "cannot follow" in said[0].message
+
+
 def test_a_joint_that_spins_for_ever_is_not_in_degrees() -> None:
     """40 rad of travel at a speed within its limit are 40 rad."""
     log = make_log(turning(4.0, 0), "free", duration=10.0)
