@@ -19,6 +19,7 @@ __all__ = ["Backlash"]
 
 _FLANK_HZ = 80.0  # of the link on a closed flank, the motor locked: stiff beside what an arm is moved at
 _LINK = 0.1  # of the inertia that the joint feels: what stays with the link at least
+_TIGHT = 1e-5  # [rad] what no gear is tighter than
 _NOTHING = 1e-6  # [N m] that leave the link in the middle of the gap at first
 _CROSSING = 3e-3  # [s] that the joint's usual torque needs to carry the link through the gap's lubricant
 
@@ -57,6 +58,10 @@ class Backlash(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]
+
+    def possible(self, values: Values) -> bool:
+        """A gap of nothing is none."""
+        return super().possible(values) and values["gap"] > _TIGHT
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
         """All gaps of one motor are followed at once."""

@@ -213,3 +213,10 @@ def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
     load = old.effect.own_load(old.values)
     assert load is not None
     np.testing.assert_allclose([load(x, 0.0) for x in q], np.polynomial.Polynomial(fitted[:6])(q), atol=1e-12)
+
+
+def test_a_gap_of_nothing_is_no_backlash() -> None:
+    """A refit that closes the gap has explained nothing by it."""
+    effect, values = effect_of("backlash", 2)
+    assert effect.possible(values)
+    assert not effect.possible(values | {"gap": 0.0})
