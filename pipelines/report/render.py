@@ -168,7 +168,7 @@ def _draw(figure: Figure, salt: str) -> tuple[str, bytes]:
         drawing.set_layout_engine(None)  # already laid out: both shall be the same picture, with no trial drawing before them
         svg, png = io.BytesIO(), io.BytesIO()
         drawing.savefig(svg, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-        drawing.savefig(png, format="png", dpi=150, metadata={"Software": None})
+        drawing.savefig(png, format="png", metadata={"Software": None})
     return _without_ballast(svg.getvalue().decode()), png.getvalue()
 
 

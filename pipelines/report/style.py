@@ -51,7 +51,9 @@ _RC: Final[dict[Any, Any]] = {
     "xtick.major.size": 3.0, "ytick.major.size": 3.0, "xtick.major.width": 0.7, "ytick.major.width": 0.7,
     # a lone sample between two gaps is a very short line; only its round ends make it visible
     "lines.linewidth": 1.1, "lines.solid_capstyle": "round", "lines.solid_joinstyle": "round",
-    "figure.facecolor": "white", "savefig.facecolor": "white", "figure.dpi": 100.0,
+    "figure.facecolor": "white", "savefig.facecolor": "white",
+    # laid out at the resolution of the PNG: at another the letters are rounded to other widths, and a long label is cut
+    "figure.dpi": 150.0,
 }
 
 
