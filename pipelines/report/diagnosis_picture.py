@@ -75,7 +75,7 @@ def _figures(one: Evidence, suffix: str) -> list[Figure]:
         found.append(Figure(f"position-error{suffix}", "What the simulation gets wrong: simulated minus measured position, in "
                             f"closed loop with controller and references of {one.simulated_log}.",
                             lambda drawing: _simulated(joint_axes(drawing, joints), one), joint_size(joints)))
-    for over, words in (("order", "Orders of the joint's angle: a line is a line at 18 is a torque that repeats 18 times a turn."),
+    for over, words in (("order", "Orders of the joint's angle: a peak at 18 is a torque that repeats 18 times a turn."),
                         ("frequency", "Spectrum of the residual.")):
         spectra = [s for s in one.spectra if s.over == over]
         if spectra:

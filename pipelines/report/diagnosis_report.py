@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+
+import numpy as np
 
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.responding import BELOW
@@ -20,6 +22,7 @@ from pipelines.report.diagnosis_words import (
     per_joint,
     title_of,
     told_value,
+    told_values,
 )
 from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.report import Report, Section, Table, Tone
@@ -93,6 +96,9 @@ def finding_section(number: int, one: Finding, offer: bool = True, floor: str = 
     """
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one, floor)]
+    if math.isfinite(one.torque_rms):
+        text.append(f"Its torque is {format_number(one.torque_rms, 2)} N m rms over the logs that were fitted; over other motion, "
+                    "that of held-out logs say, it is another")
     if one.origin == "frequency responses":
         text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
                     f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
@@ -172,8 +178,18 @@ def _unknown(result: Result) -> list[Section]:
     names = ", ".join(f"{cause_at(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
     tried = f" The nearest explanations, none of them good enough: {names}." if near else ""
     return [Section("Why there is no name", (
-        _sentence(result.reason) + tried,
+        _sentence(result.reason) + tried, *_follows(result),
         "A wrong name costs more than none. What follows shows where and when the residual stands above its floor."))]
+
+
+def _follows(result: Result) -> Iterator[str]:
+    """Which signals the joint that is farthest above its floor goes with most."""
+    for one in result.evidence[:1]:
+        joint = int(np.argmax(np.nan_to_num(one.above_floor))) + 1
+        curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:3]
+        if curves:
+            said = ", ".join(f"{c.against} ({format_number(100.0 * c.explained, 2)} % of its power)" for c in curves)
+            yield f"The residual of joint {joint} goes most with {said}."
 
 
 def _nearest(ledger: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
@@ -189,8 +205,7 @@ def _nearest(ledger: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
 def _standing(result: Result) -> list[Section]:
     if not result.standing:
         return []
-    rows = tuple((title_of(one.cause), one.joint, ", ".join(f"{name} {told_value(v)} {v.unit}".strip()
-                                                             for name, v in in_order(one.cause, one.parameters)),
+    rows = tuple((title_of(one.cause), one.joint, told_values(in_order(one.cause, one.parameters)),
                   _rounded(100.0 * one.explained)) for one in result.standing)
     return [Section("What the reference logs show as well", ("It is part of this robot and no news; the extended model has it.",),
                     (Table(("effect", "joint", "parameters", "explains [%]"), rows),))]
@@ -214,8 +229,16 @@ def _others(result: Result) -> list[Section]:
         sections.append(Section("Ledger of hypotheses", text, (Table(
             ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
-            "believed.", tones),)))
+            f"believed.{_alike(len(result.residual_rms.identify))}", tones),)))
     return sections
+
+
+def _alike(joints: int) -> str:
+    """Why the share of a cause that explains everything at its joint is far from 100 %."""
+    if joints < 2:
+        return ""
+    return (f" Each joint is weighed by its own residual: of {joints} joints, what explains all at one and nothing elsewhere takes "
+            f"away {format_number(100.0 / joints, 2)} %.")
 
 
 def _limits(result: Result) -> list[Section]:
@@ -232,18 +255,13 @@ def _limits(result: Result) -> list[Section]:
     return sections
 
 
-def _numbers_at(one: Detectable) -> str:
-    """The non-linear numbers for which the limit is."""
-    return ", ".join(f"{name} {told_value(value)} {format_unit(value.unit)}".strip() for name, value in one.at.items())
-
-
 def _smallest(one: Detectable) -> tuple[str, ...]:
     """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
     value = one.smallest.value
     expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
     if isinstance(value, float) and expected and value >= min(expected):
         return "cannot be seen", "", "", ""
-    return told_value(one.smallest), format_unit(one.smallest.unit), _numbers_at(one), _WAY[one.way]
+    return told_value(one.smallest), format_unit(one.smallest.unit), told_values(one.at.items()), _WAY[one.way]
 
 
 def _basis(result: Result) -> Section:

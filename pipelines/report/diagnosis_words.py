@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Diagnosis, ResidualRms, Value
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.report import Table
-from pipelines.report.style import format_number, to_one_place, with_std
+from pipelines.report.style import format_number, format_unit, to_one_place, with_std
 
 __all__ = ["cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "per_joint", "title_of",
-           "told_value", "torque_errors"]
+           "told_value", "told_values", "torque_errors"]
 
 _FLOORS = {
     "twin": "The floor is what the simulated twin leaves: the fitted model run through the same experiment and the same analysis.",
@@ -47,6 +47,12 @@ def told_value(value: Value) -> str:
     values = value.value if isinstance(value.value, tuple | list) else (value.value,)
     stds = value.std if isinstance(value.std, tuple | list) else (value.std,) * len(values)
     return ", ".join(with_std(x, s) if s is not None else format_number(x) for x, s in zip(values, stds, strict=True))
+
+
+def told_values(named: Iterable[tuple[str, Value]]) -> str:
+    """"order 18 1/rev, exponent 2": names, values and units in one line; a pure number has no unit to show."""
+    return ", ".join(f"{name} {told_value(value)} {'' if value.unit == '1' else format_unit(value.unit)}".strip()
+                     for name, value in named)
 
 
 def in_order(cause: str, parameters: Mapping[str, Value]) -> list[tuple[str, Value]]:

@@ -67,7 +67,7 @@ def draw_density(axes: Axes, frequency: Array, density: Array, unit: str) -> Non
     largest = np.sqrt(density[1:].max(initial=1e-300))
     axes.set_ylim(max(np.sqrt(max(density[1:].min(initial=1.0), 1e-300)) * 0.5, 1e-5 * largest), 2.0 * largest)
     axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel(f"[{format_unit(unit)}/√Hz]")
+    axes.set_ylabel(f"difference [{format_unit(unit)}/√Hz]")
     style.log_ticks(axes.xaxis)
     style.log_ticks(axes.yaxis)
     axes.legend(loc="best", ncols=min(3, density.shape[1]))

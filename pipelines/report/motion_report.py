@@ -176,7 +176,8 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
     known |= {f"error, largest [{unit}]": log.reconstruction_error_max.tolist(),
               f"rms [{unit}]": log.reconstruction_error_rms.tolist(), f"std q [{unit}]": log.position_std.tolist(),
               f"std dq [{unit}/s]": log.speed_std.tolist(), f"std ddq [{unit}/s^2]": log.acceleration_std.tolist()}
-    tables = (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white."),
+    tables = (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white; a long log "
+                     "shows even a correlation too small to matter."),
               _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
     return tables if log.noise_floor is None else (*tables, _floor_table(log, log.noise_floor))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -55,9 +56,12 @@ def _of(result: Any, stage: str) -> Iterator[Line]:
     if isinstance(result, Estimate):
         yield from _nominal(result, stage)
     elif isinstance(result, Diagnosis):
-        for one in result.findings:
-            if _whole(one.gain):
-                yield _with(f"+ {title_of(one.cause)} ({cause_at(one.cause, one.joint)})", stage, one.gain)
+        found = [one for one in result.findings if _whole(one.gain)]
+        if found:  # what its gains are counted from: else they would seem to bring what another filter and other friction laws do
+            nominal = tuple(map(float, result.residual_rms.validate))
+            yield Line("rigid body and friction, as diagnose fits them", stage, nominal, None, None)
+        for one in found:
+            yield _with(f"+ {title_of(one.cause)} ({cause_at(one.cause, one.joint)})", stage, one.gain)
     elif isinstance(result, Extension) and result.gain is not None and result.findings and _whole(result.gain):
         named = ", ".join(cause_at(one.cause, one.joint) for one in result.findings)
         whole = _with(f"the model with {named}, everything refitted", stage, result.gain)
@@ -134,6 +138,11 @@ def _tip(line: Line) -> str:
     return f"{format_number(1e3 * line.tip[0], 2)} → {format_number(1e3 * line.tip[1], 2)}"
 
 
+def _two_lines(step: str) -> str:
+    """A label that leaves room for its picture."""
+    return textwrap.fill(textwrap.shorten(step, 68, placeholder=" …"), 36)
+
+
 def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
     joints = len(lines[0].rms)
 
@@ -146,7 +155,7 @@ def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
                       alpha=1.0 if j < len(_COLOURS) else 0.5, label=f"joint {j + 1}")
         axes.set_xscale("log")
         style.log_ticks(axes.xaxis)
-        axes.set_yticks(list(places), [line.step if len(line.step) < 48 else f"{line.step[:47]}…" for line in lines], fontsize=7)
+        axes.set_yticks(list(places), [_two_lines(line.step) for line in lines], fontsize=7)
         axes.invert_yaxis()
         axes.set_xlabel("held-out torque error [N m]")
         axes.legend(fontsize=7)
