@@ -12,7 +12,7 @@ from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
 from pipelines.report.bps import convergence_figure, torque_figure
 from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.style import format_number, with_std
+from pipelines.report.style import format_number, format_unit, with_std
 
 __all__ = ["bps_report"]
 
@@ -127,7 +127,7 @@ def _key_figures(result: Result) -> Table:
 def _parameter_section(result: Result) -> Section:
     known = any(p.known is not None for p in result.parameters)
     columns = ("parameter", "value ± std", "unit", "seen", *(("described",) if known else ()), "stands for")
-    rows = [(p.name, "not determined" if p.value is None or p.std is None else with_std(p.value, p.std), p.unit,
+    rows = [(p.name, "not determined" if p.value is None or p.std is None else with_std(p.value, p.std), format_unit(p.unit),
              _seen(p), *((p.known,) if known else ()), p.combination)
             for p in result.parameters]
     tones: tuple[Tone, ...] = tuple(
@@ -254,7 +254,7 @@ def _balance_table(result: Result) -> Table | None:
         return None
     fitted, balance = {p.name: p for p in result.parameters}, result.balance
     rows = [(name, with_std(p.value, p.std) if (p := fitted[name]).value is not None and p.std is not None else "not determined",
-             with_std(value, std), p.unit, round(apart, 1))
+             with_std(value, std), format_unit(p.unit), round(apart, 1))
             for name, value, std, apart in zip(balance.names, balance.value, balance.std, balance.apart, strict=True)]
     rows.append(("torque behind position", "taken for 0", with_std(1e3 * balance.delay, 1e3 * balance.delay_std), "ms",
                  round(abs(balance.delay) / balance.delay_std, 1)))

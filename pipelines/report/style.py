@@ -10,6 +10,7 @@ import atexit
 import logging
 import math
 import os
+import re
 import shutil
 import tempfile
 import warnings
@@ -27,6 +28,7 @@ __all__ = ["BLACK", "BLUE", "COLOURS", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY
            "format_decimals", "format_number", "format_unit", "log_ticks", "prepare_matplotlib", "printable", "to_one_place",
            "with_std"]
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BLACK: Final = "#1a1f24"
 GREY: Final = "#5b6670"
 BLUE: Final = "#0072b2"
@@ -67,8 +69,8 @@ def printable(text: object, limit: int = 400) -> str:
 
 
 def format_unit(unit: str) -> str:
-    """A unit as people read it: "rad/s^2" becomes "rad/s²"."""
-    return printable(unit, 40).replace("^2", "²").replace("^3", "³").replace("^-1", "⁻¹")
+    """A unit as people read it: "rad/s^4" becomes "rad/s⁴"."""
+    return re.sub(r"\^(-?[0-9]+)", lambda power: power[1].translate(_RAISED), printable(unit, 40))
 
 
 def format_number(value: float | None, digits: int = 4) -> str:
@@ -139,7 +141,7 @@ def _grouped(number: str) -> str:
 
 
 def _raised(exponent: int) -> str:
-    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return str(exponent).translate(_RAISED)
 
 
 def log_ticks(axis: Axis) -> None:

@@ -45,7 +45,7 @@ def test_four_digits_are_kept(value: float) -> None:
 
 
 def test_units_and_texts() -> None:
-    assert format_unit("rad/s^2") == "rad/s²"
+    assert [format_unit(u) for u in ("rad/s^2", "rad/s^4", "N m^-1")] == ["rad/s²", "rad/s⁴", "N m⁻¹"]
     assert printable("a\x1b[31m\udc80\nb") == "a[31m? b"
 
 

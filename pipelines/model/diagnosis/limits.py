@@ -66,7 +66,7 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
             found.append(told)
             continue
         size = f"{told.smallest.value:.2g} {told.smallest.unit} of {told.parameter}"
-        why = (f"less than {size}, which is more than such a cause has, would not have been found in these logs"
+        why = (f"these logs would show no less than {size}, and such a cause has less"
                if hidden is None or hidden.found else "hidden in these logs it was found at no strength")
         beyond.append(NotTestable(effect.name, effect.joint, why, effect.experiment))
     return tuple(found), tuple(beyond)
