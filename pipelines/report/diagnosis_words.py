@@ -95,13 +95,18 @@ def held_out_words(held_out: str) -> str:
 def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: Array, name: str, words: str) -> Table:
     """Joint by joint: the held-out torque error before and after, in N m and in percent of the rated torque, and the floor.
 
+    Where nothing extends the model there is no column for what an extension would leave: it would say the same twice.
+
     Args:
         floor: (joints,) [N m]; `name`: what it is called; `words`: where it comes from.
     """
-    torques = to_one_place([*map(float, before.validate), *map(float, after.validate), *map(float, floor)])
+    extended = not np.array_equal(before.validate, after.validate, equal_nan=True)
+    errors = (before.validate, after.validate) if extended else (before.validate,)
+    torques = to_one_place([*(float(x) for one in errors for x in one), *map(float, floor)])
     joints = len(floor)
     limits = [rated[j] if j < len(rated) and math.isfinite(rated[j]) else math.nan for j in range(joints)]
-    shares = to_one_place([100.0 * float(x[j]) / limits[j] for x in (before.validate, after.validate) for j in range(joints)])
+    shares = to_one_place([100.0 * float(x[j]) / limits[j] for x in errors for j in range(joints)])
     rows = tuple((j + 1, *torques[j::joints], *shares[j::joints]) for j in range(joints))
-    return Table(("joint", "held-out torque error now [N m]", "extended [N m]", f"{name} [N m]", "now [% of rated]",
-                  "extended [% of rated]"), rows, f"Root mean square. {words}".strip())
+    heads = ("held-out torque error now [N m]", "extended [N m]", f"{name} [N m]", "now [% of rated]", "extended [% of rated]") \
+        if extended else ("held-out torque error [N m]", f"{name} [N m]", "error [% of rated]")
+    return Table(("joint", *heads), rows, f"Root mean square. {words}".strip())

@@ -11,7 +11,8 @@ from pipelines.report.style import format_number
 
 __all__ = ["extension_report"]
 
-_NOISE = ("noise of the residual", "Noise of the residual: what of it no model can explain, for it does not hang together in time.")
+_NOISE = ("noise of the residual", "Noise of the residual: what of it no model can explain, for it does not hang "
+          "together in time. An arm in order leaves more, at its reversals say: \"rrrid diagnose\" tells how much.")
 
 
 def extension_report(result: Extension) -> Report:
