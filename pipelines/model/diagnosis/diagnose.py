@@ -166,7 +166,8 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     found = search(case, chosen.most)
     done = settled(found, rule(found, since.floor), case, now, since.floor)
     noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
-    if since.absorbed is not None and done.ruling.verdict == "unknown":
+    moved = since.absorbed(done.found.final.of_effects)
+    if moved is not None and done.ruling.verdict == "unknown":
         done = unnamed(done, _with_load(found, case, now, since.floor, noise, chosen.seed))
     told = _told(first, case, done, _Floored(since.floor, "reference logs", None, given, noise), chosen, since.probed)
     if given is None:
@@ -174,12 +175,12 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
             origin_of("reference logs", logs, None, chosen), conditions_of(now), since.chance.weight, since.floor,
             np.full(case.data.n_joints, np.nan), since.chance.bounds, None, ()))
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
-    if since.absorbed is None:
+    if moved is None:
         return told
     if told.verdict == "unknown" or told.extended is None:
         why = "the base parameters have moved as it moves them, beside something that has no name"
-        return replace(told, rejected=(Rejected(since.absorbed.effect.name, since.absorbed.effect.joint, why), *told.rejected))
-    one = carried(since.absorbed, done.found.final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
+        return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
+    one = carried(moved, done.found.final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
         return replace(told, rejected=(*told.rejected, Rejected(one.finding.cause, one.finding.joint, one.doubt)))
     findings = _strongest((one.finding, *told.findings))

@@ -47,6 +47,7 @@ from pipelines.model.parameter import Parameter
 
 __all__ = ["Extended", "Wanted", "extend"]
 
+_NOT_MOVED = "beside the other causes the base parameters have not moved as it moves them"
 _ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
 
 
@@ -96,9 +97,10 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     if any(one.effect.evidence == "reversals" for one in wanted):
         prepared = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
     first = _responding(prepared, wanted, chosen)
-    case, prepared, moved = _case(first, chosen, memory)
+    case, prepared, ask = _case(first, chosen, memory)
     given = {one.place for one in case.beside}
     rest = [one for one in wanted if one.place not in given]
+    moved = None if ask is None else ask(np.zeros(case.data.rows))
     moved = moved if moved is not None and any(_is(one, moved) for one in rest) else None
     every = tuple(_family(case, one) for one in rest if moved is None or not _is(one, moved))
     left, refused = list(every), dict[tuple[str, int | None], str]()
@@ -109,6 +111,10 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
         if not why:
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
+    if moved is not None and ask is not None:
+        beside = ask(found.final.of_effects)
+        refused |= {(moved.effect.name, moved.effect.joint): _NOT_MOVED} if beside is None else {}
+        moved = beside
     return _told(found, named, refused, replace(first, held=replace(first.held, case=case, prepared=prepared)), moved, chosen)
 
 
@@ -126,8 +132,10 @@ def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisS
     return responding(plain, prepared, only=places)
 
 
-def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory) -> tuple[Case, Prepared, Absorbed | None]:
-    """The nominal model on these logs, beside what the reference logs show as well; and what base parameters took in since."""
+def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory,
+          ) -> tuple[Case, Prepared, Callable[[Array], Absorbed | None] | None]:
+    """The nominal model on these logs, beside what the reference logs show as well; and what says what base parameters took in
+    since, less a torque (rows,)."""
     case, prepared = first.held.case, first.held.prepared
     if prepared.reference is None:
         return case, prepared, None

@@ -61,6 +61,11 @@ class Refined:
     def rms(self) -> Array:
         return self.data.rms(self.left)
 
+    @property
+    def of_effects(self) -> Array:
+        """(rows,) [N m] what all effects together do to the torque."""
+        return np.asarray(self.model.torque(self.data) - replace(self.model, effects=()).torque(self.data))
+
     def of_effect(self, place: int) -> list[int]:
         """Which slopes belong to effect number `place`."""
         first = len(self.model.beta)

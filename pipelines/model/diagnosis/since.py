@@ -44,7 +44,7 @@ class Since:
     left: Array  # (rows,) [N m] of the reference logs, by the model that has the standing effects
     standing: tuple[Standing, ...]
     acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
-    absorbed: Absorbed | None  # what the base parameters show
+    absorbed: Callable[[Array], Absorbed | None]  # what base parameters show, less a torque (rows,) [N m] of the later logs
     chance: Chance
     probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]]  # beside a final model: what limits are looked for with
 
@@ -89,7 +89,11 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed,
                 beside=(*before, *acting))
     kept = len(columns.kept)
-    moved = absorbed(data, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
+
+    def moved(torque: Array) -> Absorbed | None:
+        rows, _ = joined(reference, less(prepared.data, torque))
+        return absorbed(rows, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
+
     pairs = list(zip(standing, sizes, strict=True))
     return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed)
 
