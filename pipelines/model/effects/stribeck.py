@@ -16,6 +16,7 @@ __all__ = ["Stribeck"]
 
 _HELD = {"tail": 0.0, "exponent": 2.0}
 _NONE = 1e-6  # of a tail
+_OVER = 2.0  # times the speed over which friction changes its sign: by then it has
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,12 @@ class Stribeck(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """v_s from the slowest speeds of the motion to a third of the fastest, always slower than where the sign has changed."""
         fast = float(np.abs(self.own(motion.dq)).max(initial=0.0)) or 1.0
-        for speed in np.geomspace(2.0 / self.sharpness, max(fast / 3.0, 4.0 / self.sharpness), 8).tolist():
+        for speed in np.geomspace(_OVER / self.sharpness, max(fast / 3.0, 4.0 / self.sharpness), 8).tolist():
             yield replace(self, speed=float(np.clip(speed, 1e-3, 5.0)))
+
+    def possible(self, values: Values) -> bool:
+        """A hump that is over before friction has changed its sign is the shape of that change, which no lubricant makes."""
+        return super().possible(values) and values["speed"] * values["sharpness"] >= _OVER - _NONE
 
     @property
     def free(self) -> tuple[str, ...]:
