@@ -115,9 +115,10 @@ class Arm:
         return replace(self, body=body, base=base, uncertainty=None)
 
     def extended(self, *more: Acting) -> Arm:
-        """With more effects, each around those before it; what misreads an angle around all that act there, and what changes the
-        record outermost."""
-        outer = sorted((*self.effects, *more), key=lambda acting: (acting.effect.last, acting.effect.misread))
+        """With more effects, each around those before it; what misreads an angle around all that act there, what all torque of a
+        joint comes through around that, and what changes the record outermost."""
+        outer = sorted((*self.effects, *more),
+                       key=lambda acting: (acting.effect.last, acting.effect.in_drive, acting.effect.misread))
         return replace(self, effects=tuple(outer))
 
     def torque(self, motion: Motion) -> Array:

@@ -189,6 +189,7 @@ class Effect(ABC):
     shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
     from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
     last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
+    in_drive: ClassVar[bool] = False  # all torque of its joint comes through it, whatever was found after it
     misread: ClassVar[bool] = False  # it changes what an encoder says: all but the record is felt where the joint truly is
     passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction

@@ -25,6 +25,7 @@ class DriveLag(Effect):
     remedy = "Tune the current loop; lead the feed-forward by the time constant."
     experiment = "Repeat an experiment at two speeds, or record the joint's frequency response."
     twins = ("time_delay", "torque_lag", "rotor_inertia")
+    in_drive = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, rate_of_change(self.own(self.predicted(motion, arm)), motion.t))

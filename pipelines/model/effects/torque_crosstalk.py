@@ -29,6 +29,7 @@ class TorqueCrosstalk(Effect):
     remedy = "Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission."
     experiment = "Load one joint while the others carry nothing, each in turn."
     twins = ("torque_gain", "transmission_coupling")
+    in_drive = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

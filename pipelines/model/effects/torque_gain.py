@@ -30,6 +30,7 @@ class TorqueGain(Effect):
     remedy = "Where it fell, look at the motor's magnets and the amplifier; correct the torque constant."
     experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
     twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
+    in_drive = True
     needs = ("a known payload, where all joints have the same error",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

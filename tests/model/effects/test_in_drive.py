@@ -1,0 +1,53 @@
+"""What all torque of a joint comes through: a spring that is found after it is scaled, mixed and late like everything else."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from pipelines.model.arm import Acting
+from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
+from pipelines.model.effects.torque_gain import TorqueGain
+from pipelines.model.rigid.body import Array, Motion
+from sample_logs.make_model import synthetic_arm
+from tests.model.rigid.rrr_arms import random_states
+
+_STIFF, _MIXED, _GAIN = 1.75, -0.1, -0.08
+
+
+@pytest.fixture(scope="module")
+def motion() -> Motion:
+    return Motion(np.linspace(0.0, 0.199, 200), *random_states(np.random.default_rng(1), 200))
+
+
+def sprung(motion: Motion) -> Array:
+    """Torque of the arm with a spring at joint 2 that rests at zero."""
+    tau = synthetic_arm().torque(motion)
+    tau[:, 1] += _STIFF * motion.q[:, 1]
+    return tau
+
+
+def spring() -> Acting:
+    effect = Spring(2, degree=1, highest=1)
+    return Acting.of(effect, effect.values([_STIFF, 0.0]))
+
+
+def test_a_spring_mixes_into_the_channel_beside_it(motion: Motion) -> None:
+    """τ3 = τ3 + c τ2, and the spring is in τ2."""
+    wanted = sprung(motion)
+    wanted[:, 2] += _MIXED * wanted[:, 1]
+    mixed = Acting.of(TorqueCrosstalk(3, from_joint=2.0), {"coefficient": _MIXED, "from_joint": 2.0})
+    for order in permutations((spring(), mixed)):
+        np.testing.assert_allclose(synthetic_arm().extended(*order).torque(motion), wanted, atol=1e-9)
+
+
+def test_a_weak_drive_needs_more_command_for_a_spring_too(motion: Motion) -> None:
+    """u = τ/(1 + e)."""
+    wanted = sprung(motion)
+    wanted[:, 1] /= 1.0 + _GAIN
+    weak = Acting.of(TorqueGain(2), {"gain_error": _GAIN})
+    for order in permutations((spring(), weak)):
+        np.testing.assert_allclose(synthetic_arm().extended(*order).torque(motion), wanted, atol=1e-9)
