@@ -246,7 +246,8 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 def _exit_code(result: Result, check: bool) -> int:
     codes = [step.exit for group in result.groups for step in group.stages if step.exit != NothingMatched.exit_code]
-    return 3 if 3 in codes else max(codes) if check else 0
+    told = next((code for code in (InputRejected.exit_code, UsageError.exit_code) if code in codes), 0)
+    return told or (max(codes, default=0) if check else 0)
 
 
 def _checks(result: Result) -> tuple[Check, ...]:

@@ -60,4 +60,4 @@ def test_a_recording_of_a_few_rows_tells_no_noise() -> None:
     """A third of a second, thinned out: fewer rows than the quiet windows have."""
     assert np.isnan(_roughness(np.zeros((3, 4)), 0.01)).all()
     rng = np.random.default_rng(1)
-    np.testing.assert_allclose(_roughness(rng.standard_normal((3, 30)), 0.05), np.sqrt(0.8), rtol=0.6)
+    np.testing.assert_allclose(_roughness(rng.standard_normal((3, 30)), 0.01), np.sqrt(0.8), rtol=0.6)

@@ -16,7 +16,7 @@ from pipelines.log.limits import percent
 __all__ = ["MOTION_CHECKS", "both_ways", "degrees_or_motor"]
 
 _DEGREE = np.pi / 180.0
-_AT, _STANDS = 0.999, 0.02  # of the largest torque that is its limit; of the time that it stands there
+_AT, _NEAR, _STANDS = 0.999, 0.9, 0.02  # of the largest torque: at its limit, and near it; of the time that it stands there
 _NOISE_SPEED = 6.0  # standard deviations that a limit must be exceeded by
 
 
@@ -174,7 +174,9 @@ def _stands_at(tau: Array) -> float | None:
     """The limit at which a torque (samples,) stands for a good part of the time; None where it has none."""
     size = np.abs(tau[np.isfinite(tau)])
     most = float(size.max(initial=0.0))
-    return most if most > 0.0 and float(np.mean(size >= _AT * most)) > _STANDS else None
+    there = float(np.mean(size >= _AT * most))
+    near = float(np.mean((size >= _NEAR * most) & (size < _AT * most)))  # a wave is longer near its crest than on it
+    return most if most > 0.0 and there > max(_STANDS, near) else None
 
 
 def stopped(s: Subject) -> list[Check]:

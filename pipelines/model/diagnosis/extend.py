@@ -100,9 +100,8 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     case, prepared, ask = _case(first, chosen, memory)
     given = {one.place for one in case.beside}
     rest = [one for one in wanted if one.place not in given]
-    moved = None if ask is None else ask(np.zeros(case.data.rows))
-    moved = moved if moved is not None and any(_is(one, moved) for one in rest) else None
-    every = tuple(_family(case, one) for one in rest if moved is None or not _is(one, moved))
+    taken_in = [one for one in rest if ask is not None and one.effect.evidence == "base parameters"]
+    every = tuple(_family(case, one) for one in rest if one not in taken_in)
     left, refused = list(every), dict[tuple[str, int | None], str]()
     while True:
         say(f"fitting {', '.join(place_of(f.cause, f.joint) for f in left) or 'the nominal model'}")
@@ -111,10 +110,12 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
         if not why:
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
-    if moved is not None and ask is not None:
-        beside = ask(found.final.of_effects)
-        refused |= {(moved.effect.name, moved.effect.joint): _NOT_MOVED} if beside is None else {}
-        moved = beside
+    moved = ask(found.final.of_effects) if ask is not None and taken_in else None
+    moved = moved if moved is not None and any(_is(one, moved) for one in taken_in) else None
+    unmoved = [one for one in taken_in if moved is None or not _is(one, moved)]
+    if unmoved and not every:
+        _family(case, unmoved[0])  # alone it is a slip of who asked
+    refused |= {(one.effect.name, one.effect.joint): _NOT_MOVED for one in unmoved}
     return _told(found, named, refused, replace(first, held=replace(first.held, case=case, prepared=prepared)), moved, chosen)
 
 

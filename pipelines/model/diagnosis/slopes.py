@@ -74,7 +74,7 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
             if one.log in (None, log) else np.zeros_like(motion.q))
 
     here, more = model.torque(data), []
-    as_read = not any(one.effect.misread for one in model.effects)
+    as_read = not any(one.effect.misread or one.effect.in_drive for one in model.effects)
     names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
     for place, _, name in names:
         step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])

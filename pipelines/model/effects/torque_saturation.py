@@ -36,6 +36,7 @@ class TorqueSaturation(Effect):
     remedy = "Correct the limit in the controller's settings, or ask for less acceleration; look at supply and temperature limits."
     experiment = "Repeat the experiment slower, so that the torque stays below the limit."
     twins = ("torque_gain", "load_friction", "quadratic_drag")
+    in_drive = True
     fixed_amplitudes = (1.0,)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

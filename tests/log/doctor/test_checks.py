@@ -141,6 +141,8 @@ def test_a_drive_at_its_limit_is_no_log_of_another_run() -> None:
     said = [c for c in check_log(weak) if c.code == "RRID-S16"]
     assert {c.level for c in said} == {"warn"}
     assert "cannot follow" in said[0].message
+    wave = np.outer(np.sin(np.linspace(0.0, 60.0, len(log.t))), np.abs(log.tau).max(axis=0))
+    assert any(c.code == "RRID-S16" and c.level == "reject" for c in check_log(with_signal(away, tau=wave)))  # a crest
 
 
 def test_a_joint_that_spins_for_ever_is_not_in_degrees() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.arm import Acting
+from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.effects.spring import Spring
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_gain import TorqueGain
@@ -42,6 +43,19 @@ def test_a_spring_mixes_into_the_channel_beside_it(motion: Motion) -> None:
     mixed = Acting.of(TorqueCrosstalk(3, from_joint=2.0), {"coefficient": _MIXED, "from_joint": 2.0})
     for order in permutations((spring(), mixed)):
         np.testing.assert_allclose(synthetic_arm().extended(*order).torque(motion), wanted, atol=1e-9)
+
+
+def test_a_late_drive_is_late_for_a_spring_too(motion: Motion) -> None:
+    """u = τ + T dτ/dt, and the spring is in τ."""
+    def at(x: Array) -> Array:
+        return np.asarray(np.gradient(x, motion.t[1] - motion.t[0]))
+
+    tau = sprung(motion)
+    late = Acting.of(DriveLag(2), {"time_constant": 1e-3})
+    found = [synthetic_arm().extended(*order).torque(motion)[:, 1] for order in permutations((spring(), late))]
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+    behind = 1e-3 * at(tau[:, 1])
+    np.testing.assert_allclose(found[0][5:-5], (tau[:, 1] + behind)[5:-5], atol=0.05 * np.abs(behind).max())
 
 
 def test_a_weak_drive_needs_more_command_for_a_spring_too(motion: Motion) -> None:
