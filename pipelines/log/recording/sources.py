@@ -45,7 +45,9 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
             _refuse_locked(handle, path)
-            data = file.read(_LARGEST + 1)
+            data = file.read(status.st_size + 1)  # as much is allocated as is asked for
+            if len(data) > status.st_size:  # it has grown meanwhile
+                data += file.read(_LARGEST + 1 - len(data))
     except OSError as problem:
         raise fault_of(problem, path) from None
     source = name or path.name
