@@ -174,9 +174,11 @@ def _stands_at(tau: Array) -> float | None:
     """The limit at which a torque (samples,) stands for a good part of the time; None where it has none."""
     size = np.abs(tau[np.isfinite(tau)])
     most = float(size.max(initial=0.0))
+    if most == 0.0:  # no sample, or no torque
+        return None
     there = float(np.mean(size >= _AT * most))
     near = float(np.mean((size >= _NEAR * most) & (size < _AT * most)))  # a wave is longer near its crest than on it
-    return most if most > 0.0 and there > max(_STANDS, near) else None
+    return most if there > max(_STANDS, near) else None
 
 
 def stopped(s: Subject) -> list[Check]:

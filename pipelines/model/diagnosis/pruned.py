@@ -119,10 +119,10 @@ def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
     return not others or by_chance(_without(found, others, case), found.final, case.judge, case.blocks)
 
 
-def _asked_again(found: Found, kept: list[int], vague: list[int], case: Case) -> tuple[list[int], Refined]:
-    """With those of `vague` that gain more than chance does beside `kept`, and the model with all of them."""
+def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) -> tuple[list[int], Refined]:
+    """With those of `doubted` that gain more than chance does beside `kept`, and the model with all of them."""
     final = _without(found, kept, case)
-    left = vague if kept else []
+    left = doubted if kept else []
     while left:
         others = []
         for k in left:

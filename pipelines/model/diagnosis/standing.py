@@ -27,6 +27,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
 from pipelines.model.diagnosis.screen import Screened, for_each, products_apart, screen, screen_event
 from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.wide import TIMES
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Chance", "Chosen", "apart", "bounds", "changes", "fit_changed", "joined", "standing_set"]
@@ -37,7 +38,7 @@ _MOST = 10
 _WORTH = 0.02  # of the squared residual of a joint, that a standing column takes away at least
 _NEAR = 0.6  # of an amplitude that physics gives
 _BLOCKS, _SEED = 10, 20040509  # of held-out time; of the draws
-_TIMES, _LEAST = 3.0, 0.02  # times what nothing gains; of the squared residual of a joint
+_LEAST = 0.02  # of the squared residual of a joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,5 +261,5 @@ def bounds(families: Sequence[Family], wanted: Sequence[bool], fit: Fit, later: 
     once = np.array([f.event for f in families])
     there = [own[(joint == j) & np.isfinite(own) & ~once] for j in range(fit.data.n_joints + 1)]
     usual = np.array([np.median(some) if len(some) else 0.0 for some in there])
-    gain = np.maximum(_TIMES * np.maximum(own, np.where(once, 0.0, usual[joint])), least[joint])
+    gain = np.maximum(TIMES * np.maximum(own, np.where(once, 0.0, usual[joint])), least[joint])
     return Thresholds(gain, own, "reference logs", fit.weight, tuple(f.joint for f in families))

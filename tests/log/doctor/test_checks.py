@@ -145,6 +145,14 @@ def test_a_drive_at_its_limit_is_no_log_of_another_run() -> None:
     assert any(c.code == "RRID-S16" and c.level == "reject" for c in check_log(with_signal(away, tau=wave)))  # a crest
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_reference_of_another_run_is_one_without_any_torque_too() -> None:
+    """S16 looks for a limit in what torque there is."""
+    log = good_log()
+    away = with_signal(log, q_ref=log.q[::-1], tau=np.full_like(log.tau, np.nan))
+    assert any(c.code == "RRID-S16" and c.level == "reject" for c in check_log(away))
+
+
 def test_a_joint_that_spins_for_ever_is_not_in_degrees() -> None:
     """40 rad of travel at a speed within its limit are 40 rad."""
     log = make_log(turning(4.0, 0), "free", duration=10.0)
