@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from pipelines.errors import InputRejected
-from pipelines.log.guard_child import Answer, Child, Lost, die_with_parent
+from pipelines.log.guard_answer import Answer, Garbled, longest_text
+from pipelines.log.guard_child import Child, Lost, die_with_parent
 
 __all__ = ["Answer", "Guard", "die_with_parent", "guarded"]
 
@@ -45,12 +46,12 @@ def guarded(work: Callable[[], Answer], path: Path, *, seconds: float | None = N
 
     Raises:
         RrridError: what `work` raised.
-        InputRejected: F03 where the library crashed or hung on the file.
+        InputRejected: F03 where the library crashed or hung on the file, or what it gave is nonsense.
     """
-    limit, budget = _limits(path, seconds, memory)
+    limit, budget, longest = _limits(path, seconds, memory)
     try:
-        return Child(lambda _: work()).ask(None, path, limit, budget, last=True)
-    except Lost as lost:
+        return Child(lambda _: work()).ask(None, path, limit, budget, longest, last=True)
+    except (Lost, Garbled) as lost:
         raise _told(lost, path, limit) from None
 
 
@@ -72,26 +73,26 @@ class Guard(threading.local):
             path: a relative one is always read by a fresh child: a kept one may stand in another folder.
             needs: the module that reads it, imported already: a child that was made without it is replaced.
             take: gives what is asked for, and whether the answer was verified: the child may be kept then. It raises where
-                the answer cannot be right.
+                the answer cannot be right: Garbled where it has not even the form of one.
 
         Raises:
             RrridError: what the work raised, or `take`.
-            InputRejected: F03 where the library crashed or hung on the file.
+            InputRejected: F03 where the library crashed or hung on the file, or what it gave is nonsense.
         """
-        limit, budget = _limits(path)
+        limit, budget, longest = _limits(path)
         began = time.monotonic()
         child = self._kept(needs, path)
         if child is not None:
             try:
-                return self._taken(child.ask(words, path, _PATIENCE * limit, budget), take)
+                return self._taken(child.ask(words, path, _PATIENCE * limit, budget, longest), take)
             except Exception:
                 self.let_go()  # it may be a trace of an earlier file: a fresh child decides, and tells
         self._child = Child(self._work)
         try:
-            answer = self._child.ask(words, path, limit - (time.monotonic() - began), budget)
-        except Lost as lost:
+            left = limit - (time.monotonic() - began)
+            return self._taken(self._child.ask(words, path, left, budget, longest), take)
+        except (Lost, Garbled) as lost:
             raise _told(lost, path, limit) from None
-        return self._taken(answer, take)
 
     def _taken(self, answer: Answer, take: Callable[[Answer], tuple[T, bool]]) -> T:
         thing, self._vouched = take(answer)
@@ -114,15 +115,21 @@ class Guard(threading.local):
             self._child = None
 
 
-def _limits(path: Path, seconds: float | None = None, memory: int | None = None) -> tuple[float, int]:
-    """[s] and [B] for a file."""
+def _limits(path: Path, seconds: float | None = None, memory: int | None = None) -> tuple[float, int, int]:
+    """[s] for a file, [B] of memory, and [B] that may be said of it beside its samples."""
     size = path.stat().st_size
     return (_SECONDS + size / _BYTES_A_SECOND if seconds is None else seconds,
-            min(_MEMORY + 1200 * size, 32 << 30) if memory is None else memory)
+            min(_MEMORY + 1200 * size, 32 << 30) if memory is None else memory, longest_text(size))
 
 
-def _told(lost: Lost, path: Path, limit: float) -> InputRejected:
+def _told(lost: Lost | Garbled, path: Path, limit: float) -> InputRejected:
     """F03: what became of the child."""
-    said = (f"reading did not end within {limit:.0f} s" if lost.signal is None else
-            f"the reading library crashed on it (signal {lost.signal})" if lost.signal else "the reading library ended its process")
+    if isinstance(lost, Garbled):
+        said = "what came of reading it makes no sense"
+    elif lost.signal is None:
+        said = f"reading did not end within {limit:.0f} s"
+    elif lost.signal:
+        said = f"the reading library crashed on it (signal {lost.signal})"
+    else:
+        said = "the reading library ended its process"
     return InputRejected("F03", f"{said}, the file is damaged", where=path, remedy="copy the file again")

@@ -4,8 +4,8 @@
     answer = child.ask(words, path, seconds, memory)     Lost where it crashed or did not end in time
     child.end()
 
-The child is a fork: it costs milliseconds, for the libraries are imported already. It hands samples over through memory that
-both share for the time of one question, and everything else as JSON: nothing that a hijacked child says is ever executed.
+The child is a fork: it costs milliseconds, for the libraries are imported already. How it hands over what it found, and how far
+it is believed: `guard_answer`.
 """
 
 from __future__ import annotations
@@ -15,38 +15,24 @@ import faulthandler
 import gc
 import json
 import os
-import select
 import signal
 import socket
-import struct
 import sys
 import time
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-import numpy as np
-
-from pipelines.errors import EnvironmentFault, InputRejected, RrridError, UsageError
+from pipelines.errors import RrridError
 from pipelines.log.atomic import fault_of
-from pipelines.log.experiment import Array
+from pipelines.log.guard_answer import LENGTH, Answer, TimeOut, answer_of, heard, shared_file, stored
 
-__all__ = ["Answer", "Child", "Lost", "die_with_parent"]
+__all__ = ["Child", "Lost", "die_with_parent"]
 
 _STOPPING: Final = (signal.SIGINT, signal.SIGTERM)
 _PR_SET_PDEATHSIG: Final = 1  # prctl(2)
 _PAUSE, _PAUSES = 0.005, 400  # [s] until a process that has closed everything is gone
-_LENGTH: Final = struct.Struct("<Q")  # before every text
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What the child found: a JSON object and named arrays."""
-
-    about: dict[str, Any]
-    arrays: Mapping[str, Array]
 
 
 class Lost(Exception):
@@ -83,51 +69,49 @@ class Child:
             theirs.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def ask(self, words: Any, path: Path, seconds: float, memory: int, *, last: bool = False) -> Answer:
+    def ask(self, words: Any, path: Path, seconds: float, memory: int, longest: int, *,
+            last: bool = False) -> Answer:
         """The answer to `words`, which can be written as JSON.
 
         Args:
             path: the file in question, for messages.
             seconds: the child is killed after so long.
             memory: [B] how much more than it has now the child may use.
+            longest: [B] what it may say beside samples.
             last: no other question follows; the child ends.
 
         Raises:
             Lost: it crashed or did not end in time.
-            RrridError: what `work` raised.
+            Garbled: what it said is no answer.
+            RrridError: what `work` raised; X05, it says more than that.
         """
         self.asked += 1
-        store = _shared_file()
+        store = shared_file()
         try:
-            text = self._answered({"words": words, "memory": memory}, store, time.monotonic() + seconds)
+            self._put({"words": words, "memory": memory}, store)
+            text = self._heard(time.monotonic() + seconds, longest, path)
             if last:
                 self.end()
-            return _answer(json.loads(text), store, path)
+            return answer_of(text, store, path, memory)
         except BaseException:
             self.end()
             raise
         finally:
             os.close(store)
 
-    def _answered(self, request: dict[str, Any], store: int, deadline: float) -> bytes:
+    def _put(self, request: dict[str, Any], store: int) -> None:
         text = json.dumps(request).encode()
-        with contextlib.suppress(BrokenPipeError):  # it is dead: seen below
-            socket.send_fds(self._ours, [_LENGTH.pack(len(text)), text], [store])
-        reply = b""
-        while len(reply) < _LENGTH.size or len(reply) < _LENGTH.size + _LENGTH.unpack_from(reply)[0]:
-            if not select.select([self._ours], [], [], max(0.0, deadline - time.monotonic()))[0]:
-                raise Lost(None)
-            part = self._heard()
-            if not part:
-                raise Lost(self._died())
-            reply += part
-        return reply[_LENGTH.size:]
+        with contextlib.suppress(BrokenPipeError):  # it is dead: heard next
+            socket.send_fds(self._ours, [LENGTH.pack(len(text)), text], [store])
 
-    def _heard(self) -> bytes:
+    def _heard(self, deadline: float, longest: int, path: Path) -> bytes:
         try:
-            return self._ours.recv(1 << 20)
-        except ConnectionResetError:  # it died with our question unread
-            return b""
+            reply = heard(self._ours, deadline, longest, path)
+        except TimeOut:
+            raise Lost(None) from None
+        if not reply:
+            raise Lost(self._died())
+        return reply
 
     def _died(self) -> int:
         """The signal that the child died of, which has closed its end; one that lives on all the same is killed for it."""
@@ -156,16 +140,6 @@ class Child:
             self.end()  # that of a thread which has ended
 
 
-def _shared_file() -> int:
-    """A file without a name that both processes can read and write."""
-    if hasattr(os, "memfd_create"):
-        return os.memfd_create("rrrid", os.MFD_CLOEXEC)
-    import tempfile
-
-    with tempfile.TemporaryFile() as file:
-        return os.dup(file.fileno())
-
-
 def die_with_parent() -> None:
     """Linux: when the process that made this one is killed, this one ends as well, and nobody's work goes on unseen."""
     import ctypes
@@ -192,7 +166,7 @@ def _serve(work: Callable[[Any], Answer], end: socket.socket, reader: int) -> No
             words, store = request
             text = json.dumps(_replied(work, words["words"], words["memory"], store)).encode()
             os.close(store)
-            end.sendall(_LENGTH.pack(len(text)) + text)
+            end.sendall(LENGTH.pack(len(text)) + text)
     finally:
         os._exit(0)
 
@@ -215,12 +189,12 @@ def _alone(end: int) -> None:
 def _received(end: socket.socket) -> tuple[dict[str, Any], int] | None:
     """The next question and where its arrays go; None where nobody asks any more."""
     text, store = b"", -1
-    while len(text) < _LENGTH.size or len(text) < _LENGTH.size + _LENGTH.unpack_from(text)[0]:
+    while len(text) < LENGTH.size or len(text) < LENGTH.size + LENGTH.unpack_from(text)[0]:
         part, handles, _, _ = socket.recv_fds(end, 1 << 16, 1)
         if not part:
             return None
         text, store = text + part, handles[0] if handles else store
-    found: dict[str, Any] = json.loads(text[_LENGTH.size:])
+    found: dict[str, Any] = json.loads(text[LENGTH.size:])
     return found, store
 
 
@@ -230,7 +204,7 @@ def _replied(work: Callable[[Any], Answer], words: Any, memory: int, store: int)
     try:
         lowered = _limit_memory(memory)
         answer = work(words)
-        return {"about": answer.about, "arrays": _store(answer.arrays, store)}
+        return {"about": answer.about, "arrays": stored(answer.arrays, store)}
     except RrridError as problem:
         return {"error": {"exit": problem.exit_code, **problem.as_dict()}}
     except OSError as problem:  # of the machine: what a file does to its library, `work` has told
@@ -258,41 +232,3 @@ def _limit_memory(budget: int) -> bool:
         resource.setrlimit(resource.RLIMIT_AS, (hard if lowered else wanted, hard))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     return lowered
-
-
-def _store(arrays: Mapping[str, Array], store: int) -> dict[str, list[int]]:
-    """Write the arrays one behind the other; name -> [offset, *shape]."""
-    places, offset = {}, 0
-    for name, values in arrays.items():
-        flat = np.ascontiguousarray(values, dtype=np.float64)
-        places[name] = [offset, *flat.shape]
-        view = flat.reshape(-1).view(np.uint8).data
-        while view:
-            written = os.pwrite(store, view, offset)
-            offset, view = offset + written, view[written:]
-    return places
-
-
-def _answer(reply: dict[str, Any], store: int, path: Path) -> Answer:
-    if "error" in reply:
-        kinds = {kind.exit_code: kind for kind in (UsageError, InputRejected, EnvironmentFault)}
-        error = reply["error"]
-        raise kinds.get(error["exit"], InputRejected)(error["code"].removeprefix("RRID-"), error["message"],
-                                                      where=error["where"] or path, remedy=error["remedy"])
-    if "internal" in reply:
-        raise RuntimeError(f"reading {path}: {reply['internal']}")
-    return Answer(reply["about"], {name: _copied(store, place) for name, place in reply["arrays"].items()})
-
-
-def _copied(store: int, place: list[int]) -> Array:
-    """The array at `place`, out of the child's reach. A map would hold a handle for as long as its log is needed."""
-    offset, *shape = place
-    values = np.empty(shape)
-    view = values.reshape(-1).view(np.uint8).data
-    while view:
-        got = os.preadv(store, [view], offset)
-        if not got:
-            raise ValueError("fewer samples than were told")
-        offset, view = offset + got, view[got:]
-    values.flags.writeable = False
-    return values

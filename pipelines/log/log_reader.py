@@ -14,6 +14,7 @@ from pipelines.errors import InputRejected
 from pipelines.log import canonical
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.guard import Answer, Guard
+from pipelines.log.guard_answer import Garbled
 
 __all__ = ["end_reader", "read_guarded"]
 
@@ -35,8 +36,10 @@ def read_guarded(path: Path, container: str, only: Collection[str] | None,
 
     def taken(answer: Answer) -> tuple[tuple[ExperimentLog, str | None], bool]:
         sound()
-        log = canonical.parse_log_text(answer.about["text"], answer.arrays, where=str(path))
-        digest = answer.about["digest"]
+        text, digest = answer.about.get("text"), answer.about.get("digest")
+        if not isinstance(text, str) or not isinstance(digest, str | None):
+            raise Garbled("no log")
+        log = canonical.parse_log_text(text, answer.arrays, where=str(path))
         if only is not None or digest is None:
             return (log, digest), False
         if digest != canonical.digest_of(log):

@@ -123,6 +123,13 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
         if problem.code == "RRID-F03":
             raise damaged(source) from None
         raise
+    try:
+        return _told(answer, source)
+    except (KeyError, TypeError, AttributeError, StopIteration):  # a child that a file has broken says anything
+        raise damaged(source) from None
+
+
+def _told(answer: Answer, source: str) -> RawTable:
     about = answer.about
     columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
     return RawTable(source, columns, np.arange(len(next(iter(columns.values())))), text=about["text"],
