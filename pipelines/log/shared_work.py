@@ -23,6 +23,7 @@ from pipelines.log.processors import processors
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
+    from types import FrameType
 
 __all__ = ["shared_out"]
 
@@ -55,8 +56,9 @@ def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[]
             found.update(answers)
             take(words)
     finally:
-        other.end()
-        os.close(places)
+        with _undisturbed():
+            other.end()
+            os.close(places)
     return [found[k] if k in found else work(piece) for k, piece in enumerate(pieces)]
 
 
@@ -123,15 +125,25 @@ class _Other:
 def _undisturbed() -> Iterator[None]:
     """No handler of this program runs meanwhile; what came is taken at the end.
 
-    A mask alone does not do it: another thread takes the signal then, and the handler runs here all the same.
+    A mask alone does not do it: another thread takes the signal then, and the handler runs here all the same. One that comes while
+    the handlers are put back is taken at once, and by whatever handler is not yet back as well.
     """
     came: list[int] = []
-    before = {number: handler for number in _STOPPING if (handler := signal.getsignal(number)) is not None}
+    waiting = True
+    before = {number: handler for number in _STOPPING if callable(handler := signal.getsignal(number))}
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        if waiting:
+            came.append(number)
+        else:
+            before[signal.Signals(number)](number, frame)
+
     try:
         for number in before:
-            signal.signal(number, lambda number, _: came.append(number))
+            signal.signal(number, hear)
         yield
     finally:
+        waiting = False
         for number, handler in before.items():
             signal.signal(number, handler)
         for one in came:

@@ -8,10 +8,12 @@ import signal
 import sys
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
 
+from pipelines.errors import Interrupted
 from pipelines.log import shared_work
 from pipelines.log.shared_work import shared_out
 
@@ -128,6 +130,45 @@ def test_ctrl_c_while_the_copy_is_made_leaves_nothing(beside: bool, monkeypatch:
     for child in started:
         with pytest.raises(ChildProcessError):
             os.waitpid(child, os.WNOHANG)
+
+
+@pytest.mark.row("P06")
+@pytest.mark.skipif(sys.platform != "linux", reason="counts handles in /proc")
+def test_a_second_ctrl_c_leaves_no_signal_unheard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """P06: it comes while the program's handlers are put back: each of them hears again, and no process and no pipe is left."""
+    started, fork, put, handles = list[int](), os.fork, signal.signal, _handles()
+
+    def stop(number: int, _frame: object) -> None:
+        raise Interrupted(number)
+
+    def interrupted() -> int:
+        if child := fork():
+            started.append(child)
+            os.kill(os.getpid(), signal.SIGINT)
+        return child
+
+    def put_back(number: int, handler: Any) -> Any:
+        found = put(number, handler)
+        if handler is stop:
+            os.kill(os.getpid(), signal.SIGINT)
+        return found
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    monkeypatch.setattr(os, "fork", interrupted)
+    monkeypatch.setattr(signal, "signal", put_back)
+    try:
+        with pytest.raises(Interrupted):
+            shared_out(slowly, PIECES)
+        for number in before:
+            with pytest.raises(Interrupted):
+                signal.raise_signal(number)
+    finally:
+        for number, handler in before.items():
+            put(number, handler)
+    assert _handles() == handles
+    assert len(started) == 1
+    with pytest.raises(ChildProcessError):
+        os.waitpid(started[0], os.WNOHANG)
 
 
 def test_where_no_process_can_be_had_all_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
