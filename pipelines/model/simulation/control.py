@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.simulation.experiment import Experiment
 
-__all__ = ["Controlling"]
+__all__ = ["Controlling", "feedforward_of"]
 
 _RIGID = ("inertia", "coriolis", "gravity")
 
@@ -36,7 +36,7 @@ class Controlling:
         self._estimate = _estimator(experiment, replicas)
         self._seen = _Observer.of(experiment, replicas) if law.law == "computed-torque" else None
         self._rigid = _among(law.feedforward, _RIGID)
-        self._feedforward = _feedforward(experiment)
+        self._feedforward = feedforward_of(experiment)
         self._waiting = np.repeat(experiment.tau0[:, None], replicas, axis=1)  # of a delayed command
         self._limit = None if law.output_limit is None else law.output_limit[:, None]
         self._resolution = _steps(law.torque_resolution)
@@ -93,7 +93,7 @@ def _steps(resolution: Array | None) -> tuple[Array, Array] | None:
     return step, 1.0 / step
 
 
-def _feedforward(experiment: Experiment) -> Array | None:
+def feedforward_of(experiment: Experiment) -> Array | None:
     """The model's torque on the reference [N m] (N, n), eq. (24): it does not depend on what the arm does."""
     law = experiment.controller
     named = {"pd+feedforward": law.feedforward or (), "computed-torque": _among(law.feedforward, ("friction",))}.get(law.law, ())

@@ -96,7 +96,7 @@ class OneRRR:
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
         """`plant` as `fits` it; `steps` of equal size make one control sample."""
-        self._step = _compiled(plant, sample_time / steps)
+        self.step = _compiled(plant, sample_time / steps)  # of (q1, q2, q3, v1, v2, v3, u1, u2, u3): the first six after it
         self._steps = steps
 
     @staticmethod
@@ -106,7 +106,7 @@ class OneRRR:
     def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:
         """Move `state` (6, 1) on by one sample, in place; there are no memories, and nothing depends on time."""
         del t
-        step, now, torque = self._step, state[:, 0].tolist(), command[:, 0].tolist()
+        step, now, torque = self.step, state[:, 0].tolist(), command[:, 0].tolist()
         try:
             for _ in range(self._steps):
                 now = step(*now, *torque)

@@ -8,6 +8,7 @@ What a drive adds to the command is white torque noise, held over each sample; e
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,6 +19,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.control import Controlling
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.integrate import RungeKutta
+from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.one_rrr import OneRRR
 from pipelines.model.simulation.plant import MovingPlant, Plant
 
@@ -25,6 +27,7 @@ __all__ = ["Noise", "Simulated", "run", "run_together"]
 
 _CHUNK = 2048  # samples whose noise is drawn at once
 _POSTURES = 32  # of the reference in which the inertia matrix is looked at
+_FEW = 8  # robots that are simulated one after the other, where a loop without arrays can
 _RUNAWAY = 1e4  # [rad], [rad/s]: no arm is ever there
 
 
@@ -70,7 +73,10 @@ def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, no
     """
     drawn = tuple(seeds)
     every = [_Lane(plant, experiment, noise or Noise.none(experiment.n_joints), drawn) for experiment in experiments]
-    active, k = sorted(every, key=lambda lane: -lane.experiment.n_samples), 0
+    alone = [lane for lane in every if len(every) * len(drawn) <= _FEW and OneLoop.fits(plant, lane.experiment)]
+    for lane in alone:
+        lane.run_alone(steps, drawn)
+    active, k = sorted((lane for lane in every if lane not in alone), key=lambda lane: -lane.experiment.n_samples), 0
     while active:
         own = plant if plant.p.ndim == 1 else replace(plant, p=np.tile(plant.p, (len(active), 1)))
         moving = own.prepared(len(drawn) * len(active))
@@ -117,7 +123,8 @@ class _Lane:
         self.states = moving.at_start(self.t, self.state[:n], self.state[n:])
         shape = (experiment.n_samples, n, replicas)
         self._counted, self._commanded, self._motion = np.empty(shape), np.empty(shape), np.empty((shape[0], 2 * n, replicas))
-        self._draws, self._count = _draws(noise, seeds, experiment.n_samples), _Encoder(experiment.resolution)
+        self._noise, self._draws = noise, _draws(noise, seeds, experiment.n_samples)
+        self._count = _Encoder(experiment.resolution)
         self._control = Controlling(experiment, replicas)
 
     def applied(self, k: int, state: Array, seen: Array) -> Array:
@@ -127,6 +134,15 @@ class _Lane:
         self._counted[k] = self._count(seen + extra_position)
         self._commanded[k] = command = self._control.command(k, self._counted[k])
         return command + extra_torque
+
+    def run_alone(self, steps: int, seeds: tuple[int, ...]) -> None:
+        """One replica after the other, each from the first to the last sample."""
+        experiment, loop = self.experiment, OneLoop(self.plant, self.experiment, steps)
+        for r, seed in enumerate(seeds):
+            pieces = _pieces(self._noise, (seed,), experiment.n_samples)
+            own = None if pieces is None else (piece[..., 0] for piece in pieces)
+            ran = loop.run(self.state[:, r], own, lambda now, k: _refuse_runaway(now[:, None], k, experiment.sample_time))
+            self._motion[..., r], self._counted[..., r], self._commanded[..., r] = ran
 
     def simulated(self, steps: int) -> Simulated:
         experiment, n = self.experiment, self.experiment.n_joints
@@ -149,20 +165,25 @@ def _seen(moving: MovingPlant, q: Array, states: Array) -> Array:
 
 
 def _draws(noise: Noise, seeds: tuple[int, ...], samples: int) -> Iterator[tuple[Array | float, Array | float]]:
-    """Torque and position noise of each sample (joints, replicas). Every replica has a generator of its own, so that it
-    does the same alone and among others."""
-    n = len(noise.torque)
+    """Torque and position noise of each sample (joints, replicas)."""
+    pieces, n = _pieces(noise, seeds, samples), len(noise.torque)
+    if pieces is None:
+        yield from itertools.repeat((0.0, 0.0), samples)
+    else:
+        yield from ((one[:n], one[n:]) for piece in pieces for one in piece)
+
+
+def _pieces(noise: Noise, seeds: tuple[int, ...], samples: int) -> Iterator[Array] | None:
+    """Noise of some samples at a time, (samples, 2 joints, replicas), of torques, then of positions; None where there is none.
+
+    Every replica has a generator of its own, so that it does the same alone and among others.
+    """
     size = np.concatenate([noise.torque, noise.position])
     if not size.any():
-        for _ in range(samples):
-            yield 0.0, 0.0
-        return
+        return None
     generators = [np.random.default_rng(seed) for seed in seeds]
-    for first in range(0, samples, _CHUNK):
-        count = min(_CHUNK, samples - first)
-        drawn = np.stack([g.standard_normal((count, 2 * n)) * size for g in generators], axis=-1)
-        for one in drawn:
-            yield one[:n], one[n:]
+    counts = (min(_CHUNK, samples - first) for first in range(0, samples, _CHUNK))
+    return (np.stack([g.standard_normal((count, len(size))) * size for g in generators], axis=-1) for count in counts)
 
 
 class _Encoder:

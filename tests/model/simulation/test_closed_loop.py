@@ -17,6 +17,7 @@ from tests.model.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_f
 from tests.model.simulation.pinocchio_loop import Loop, TransferObserver
 
 SAMPLES = 500
+MANY = 9  # robots that are simulated side by side, in arrays
 NOISE = Noise(np.array([0.020, 0.010, 0.005]), np.zeros(3))
 Law = Callable[[int, Array], Array]
 
@@ -45,13 +46,14 @@ def plain(**changes: object) -> Controller:
 
 
 def agree(controller: Controller, law: Law, atol: float = 1e-8, **changes: Array) -> Array:
-    """Ours and Pinocchio's, with 8 steps a sample each: position within 1e-8 rad. Returns the torque."""
-    found = run(Plant.of(rrr().arm), experiment(controller, SAMPLES, **changes), 8)
+    """Ours, alone and as one of many, and Pinocchio's, with 8 steps a sample each: position within 1e-8 rad. Returns the torque."""
     q, dq, tau = pinocchio_run(law)
-    assert np.abs(found.true_q[0] - q).max() < atol
-    assert np.abs(found.true_dq[0] - dq).max() < 1e3 * atol
-    assert np.abs(found.tau[0] - tau).max() < 1e5 * atol
-    np.testing.assert_array_equal(found.q, found.true_q)
+    for replicas in (1, MANY):
+        found = run(Plant.of(rrr().arm), experiment(controller, SAMPLES, **changes), 8, seeds=range(replicas))
+        assert np.abs(found.true_q[-1] - q).max() < atol
+        assert np.abs(found.true_dq[-1] - dq).max() < 1e3 * atol
+        assert np.abs(found.tau[-1] - tau).max() < 1e5 * atol
+        np.testing.assert_array_equal(found.q, found.true_q)
     return tau
 
 
@@ -162,24 +164,26 @@ def test_encoder_and_command_count_in_steps() -> None:
 def test_noise_is_each_replicas_own() -> None:
     """A seed gives the same run alone, among others and without arrays; another seed another one; its size is as asked."""
     plant, asked = Plant.of(rrr().arm), experiment(plain(), 400)
-    many = run(plant, asked, 2, NOISE, (4, 5, 6))
-    alone = run(plant, asked, 2, NOISE, (5,))
-    np.testing.assert_allclose(alone.true_q[0], many.true_q[1], atol=1e-12)
+    seeds = range(4, 4 + MANY)
+    many = run(plant, asked, 2, NOISE, seeds)
+    for some in ((5,), (7, 5)):
+        np.testing.assert_allclose(run(plant, asked, 2, NOISE, some).true_q[-1], many.true_q[1], atol=1e-12)
     assert np.abs(many.true_q[0] - many.true_q[1]).max() > 1e-7
-    loud = run(plant, asked, 2, Noise(2 * NOISE.torque, NOISE.position), (4, 5, 6))
+    loud = run(plant, asked, 2, Noise(2 * NOISE.torque, NOISE.position), seeds)
     calm = run(plant, asked, 2)
     spread = [np.sqrt(np.mean((x.true_q - calm.true_q) ** 2)) for x in (many, loud)]
     assert spread[1] / spread[0] == pytest.approx(2.0, rel=0.05)
 
 
 def test_experiments_side_by_side_do_what_they_do_alone() -> None:
-    """Three experiments of different length and reference, two replicas each, run at once: bit for bit the same."""
+    """Three experiments of different length and reference, many replicas each, run at once: bit for bit the same."""
     plant = Plant.of(rrr().arm)
     several = [experiment(plain(), samples) for samples in (60, 90, 40)]
     several[1] = replace(several[1], q_ref=several[1].q_ref[::-1].copy(), dq_ref=-several[1].dq_ref[::-1],
                          q0=several[1].q_ref[-1],
                          dq0=-several[1].dq_ref[-1])
-    for one, alone in zip(run_together(plant, several, 2, NOISE, (3, 4)), [run(plant, one, 2, NOISE, (3, 4)) for one in several],
+    seeds = range(MANY)
+    for one, alone in zip(run_together(plant, several, 2, NOISE, seeds), [run(plant, one, 2, NOISE, seeds) for one in several],
                           strict=True):
         np.testing.assert_array_equal(one.q, alone.q)
         np.testing.assert_array_equal(one.tau, alone.tau)
