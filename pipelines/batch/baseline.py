@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from pipelines.batch.drift import LIMIT
@@ -38,23 +38,49 @@ def against(record: Record, baseline: ModelFile) -> Record:
 
 
 def unheld(stage: str, records: Iterable[Record], baseline: ModelFile) -> tuple[Check, ...]:
-    """What of the baseline no item of `stage` can be held against: that nothing is said of it does not mean that it is the same."""
+    """What of the baseline no item of `stage` can be held against: that nothing is said of it does not mean that it is the same.
+
+    Where that is all of it, the check is a gate: what was asked for has not been done.
+    """
     done = [record for record in records if record.status in ("ok", "found")]
-    judged = [record for record in done if _robot(baseline) in ("", record.robot)]
+    others = [record.name for record in done if _robot(baseline) not in ("", record.robot)]
+    judged = [record for record in done if record.name not in set(others)]
     if not judged:
         return (_warned(f"the baseline is of {_robot(baseline)}, and no item is: nothing is held against it",
-                        "give a model of this robot"),) if done else ()
-    parts = {"base parameters": dataclasses.replace(baseline, friction=(), effects=()),
-             "friction": dataclasses.replace(baseline, base_parameters=(), effects=())}
-    missing = [name for name, part in parts.items()
-               if _spelled(part) and not any(known_figures(part, record.figures) for record in judged)]
-    return (_warned(f"of the baseline, {' and '.join(missing)} met nothing to be held against: {stage} gives none by those names",
-                    "run 'rrrid batch' with --stage run or estimate-bps, and with the friction laws of the baseline"),
-            ) if missing else ()
+                        "give a model of this robot", gate=True),) if done else ()
+    said = []
+    if others:
+        said.append(_warned(f"{len(others)} of {len(done)} items are of another robot than the baseline, and not held against it: "
+                            f"{', '.join(others[:3])}", "give the folders of each robot a batch of their own"))
+    missing = [name for name, part in _parts(baseline).items() if not _met(part, judged)]
+    nothing = not any(record.diagnosed or known_figures(baseline, record.figures) for record in judged)
+    if missing:
+        said.append(_warned(f"of the baseline, {_listed(missing)} met nothing to be held against: {stage} names none of them",
+                            "run 'rrrid batch' with --stage run, and with the friction laws of the baseline", gate=nothing))
+    elif nothing:
+        said.append(_warned(f"the baseline has no number with an uncertainty, and {stage} names no causes: nothing is held to it",
+                            "give a model.json that a command has fitted", gate=True))
+    return tuple(said)
 
 
-def _warned(message: str, remedy: str) -> Check:
-    return Check.of("C06", "warn", message, where="--baseline", remedy=remedy)
+def _parts(baseline: ModelFile) -> dict[str, ModelFile]:
+    return {"base parameters": dataclasses.replace(baseline, friction=(), effects=()),
+            "friction": dataclasses.replace(baseline, base_parameters=(), effects=()),
+            "effects": dataclasses.replace(baseline, base_parameters=(), friction=())}
+
+
+def _met(part: ModelFile, judged: Iterable[Record]) -> bool:
+    """Whether there was something to hold what there is of `part` against: an effect is met by what names causes as well."""
+    asked = part.effects or _spelled(part)
+    return not asked or any(known_figures(part, record.figures) or (part.effects and record.diagnosed) for record in judged)
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
+
+
+def _warned(message: str, remedy: str, gate: bool = False) -> Check:
+    return Check.of("C06", "warn", message, where="--baseline", remedy=remedy, gate=gate)
 
 
 def _robot(baseline: ModelFile) -> str:

@@ -28,7 +28,7 @@ from pipelines.batch.result import result_of
 from pipelines.batch.signals import Listener
 from pipelines.batch.summary import Summary, summary_report
 from pipelines.batch.work import undone
-from pipelines.errors import Check, EnvironmentFault, UsageError
+from pipelines.errors import Check, EnvironmentFault, NothingMatched, UsageError
 from pipelines.log.model_file import ModelFile, read_model
 from pipelines.log.places import keep_apart, slug, tilde
 from pipelines.log.results import encode
@@ -120,6 +120,8 @@ def _exit_code(summary: Summary, done: _Done) -> int:
         return UsageError.exit_code  # no item is to blame: what was asked of them all cannot be
     if summary.count("rejected", "failed"):
         return 4
+    if any(check.gate for check in summary.checks):
+        return NothingMatched.exit_code  # the baseline met nothing: that nothing is beyond it is no news
     return 1 if done.wanted.check and summary.count("found") else 0
 
 

@@ -14,10 +14,14 @@ __all__ = ["junit_xml"]
 
 
 def junit_xml(summary: Summary, check: bool) -> str:
-    """The report of `summary`; what was found is a failure with `check`, what was rejected or failed an error in any case."""
+    """The report of `summary`; what was found is a failure with `check`, what was rejected or failed an error in any case.
+
+    What could not be done for the batch as a whole is a case of its own, and an error.
+    """
     found = summary.count("found") if check else 0
-    suite = ElementTree.Element("testsuite", name=f"rrrid batch {summary.stage}", tests=str(len(summary.records)),
-                                failures=str(found), errors=str(summary.count("rejected", "failed")), skipped="0")
+    undone = [one for one in summary.checks if one.gate]
+    suite = ElementTree.Element("testsuite", name=f"rrrid batch {summary.stage}", tests=str(len(summary.records) + len(undone)),
+                                failures=str(found), errors=str(summary.count("rejected", "failed") + len(undone)), skipped="0")
     for record in summary.records:
         case = ElementTree.SubElement(suite, "testcase", classname=f"rrrid.{summary.stage}", name=_plain(record.name))
         if record.error is not None:
@@ -27,6 +31,10 @@ def junit_xml(summary: Summary, check: bool) -> str:
             ElementTree.SubElement(case, "failure", type="found", message=_plain(record.verdict))
         elif record.status in ("rejected", "failed"):
             ElementTree.SubElement(case, "error", type=record.status, message=_plain(record.verdict))
+    for one in undone:
+        case = ElementTree.SubElement(suite, "testcase", classname=f"rrrid.{summary.stage}", name=_plain(one.where))
+        words = ElementTree.SubElement(case, "error", type=one.code, message=_plain(one.message))
+        words.text = _plain(f"{one.message}. {one.remedy}")
     ElementTree.indent(suite)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{ElementTree.tostring(suite, encoding="unicode")}\n'
 

@@ -40,6 +40,7 @@ class Record:
     figures: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)  # name -> value, std, unit
     residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     findings: tuple[Mapping[str, Any], ...] = ()  # of a diagnosis: cause, joint, parameters
+    diagnosed: bool = False  # its result names causes, be it none
     accepts: bool = False  # the diagnosis's causes are all that kept it from "ok"
     inputs: Mapping[str, str] = field(default_factory=dict)  # file, relative to the root where it lies below -> SHA-256
     logs: tuple[str, ...] = ()

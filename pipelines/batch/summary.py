@@ -66,7 +66,7 @@ def summary_report(summary: Summary, figures: bool = True) -> Report:
     Args:
         figures: draw them; without, the page is there at once.
     """
-    tone: Tone = "bad" if summary.count("rejected", "failed") or summary.interrupted else (
+    tone: Tone = "bad" if summary.count("rejected", "failed") or summary.interrupted or _unmet(summary) else (
         "attention" if summary.count("found") else "good")
     words: dict[Status, str] = {"ok": "in order", "found": "something found", "rejected": "rejected", "failed": "failed"}
     counts = Table(("items", "number"), tuple((said, summary.count(status)) for status, said in words.items()))
@@ -81,6 +81,7 @@ def _verdict(summary: Summary) -> str:
     said += f", in {found} something was found" if found else ""
     said += f", {wrong} {'was' if wrong == 1 else 'were'} rejected or failed" if wrong else ""
     begun = "Interrupted; what is missing is done with --resume. " if summary.interrupted else ""
+    begun += "Nothing was held against the baseline. " if _unmet(summary) else ""
     moved = [(c, d) for d in summary.drifts for c in d.figures if c.moved]
     if not moved:
         return f"{begun}{said}."
@@ -89,6 +90,11 @@ def _verdict(summary: Summary) -> str:
     of = f" of {drift.robot}" if len(summary.drifts) > 1 else ""
     by = f"{format_number(abs(float(course.away[far])), 2)} std in {course.items[far]}"
     return f"{begun}{said}. What moved most{of} is {course.name}: {by}."
+
+
+def _unmet(summary: Summary) -> bool:
+    """Whether the baseline, where there is one, met nothing at all."""
+    return any(check.gate for check in summary.checks)
 
 
 def _wrong(summary: Summary) -> list[Section]:

@@ -115,7 +115,8 @@ def _record(item: Item, warm: _Warm, outcome: Outcome[Any], inputs: Inputs, root
     return Record(
         clean(item.name), item.slug, status, outcome.exit_code, error, clean(outcome.report.verdict, 1000),
         inputs.robot_name, min((opened.log.recorded for opened in inputs.logs if opened.log.recorded), default=""),
-        fitted(outcome.json), residuals(outcome.json), _findings(outcome.json), _only_causes(outcome.json), hashes,
+        fitted(outcome.json), residuals(outcome.json), _findings(outcome.json),
+        outcome.json.get("findings") is not None, _only_causes(outcome.json), hashes,
         tuple(relative(log, root) for log in item.logs), hash_file(outcome.folder / PROVENANCE), warm.key, seconds)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from xml.etree import ElementTree
 
 import jsonschema
 import numpy as np
@@ -136,20 +137,43 @@ def test_friction_is_held_against_the_baseline_by_any_name() -> None:
 
 
 def test_what_no_item_can_be_held_against_is_said() -> None:
-    """A diagnosis names causes, and gives no base parameters and no friction: their silence is no agreement."""
+    """A diagnosis names causes, and gives no base parameters and no friction; estimate-bps no effects: silence is no agreement."""
     viscous = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.6, 0.01, "N m s/rad", "fitted")})
     baseline = dataclasses.replace(_baseline(), friction=(viscous,))
-    diagnosed = Record("a", "a", "found", 1, figures={"cogging joint 2 amplitude": (0.5, 0.01, "N m")}, robot="arm")
+    diagnosed = Record("a", "a", "ok", 0, robot="arm", diagnosed=True)
     (said,) = unheld("diagnose", [diagnosed], baseline)
-    assert (said.level, said.where) == ("warn", "--baseline")
-    assert "of the baseline, base parameters and friction met nothing to be held against: diagnose gives none" in said.message
+    assert (said.level, said.where, said.gate) == ("warn", "--baseline", False)
+    assert "of the baseline, base parameters and friction met nothing to be held against: diagnose names none" in said.message
     estimated = Record("b", "b", "ok", 0, figures={"p1": (1.0, STD, "kg m^2")}, robot="arm")
-    assert ["baseline, friction met" in one.message for one in unheld("estimate-bps", [diagnosed, estimated], baseline)] == [True]
+    (said,) = unheld("estimate-bps", [estimated], baseline)
+    assert ("baseline, friction and effects met" in said.message, said.gate) == (True, False)
+    assert ["baseline, friction met" in one.message for one in unheld("run", [diagnosed, estimated], baseline)] == [True]
     whole = dataclasses.replace(estimated, figures={**estimated.figures, "viscous:1:coefficient": (0.6, 0.01, "N m s/rad")})
-    assert unheld("run", [whole], baseline) == ()
-    (other,) = unheld("run", [whole], dataclasses.replace(baseline, robot='name = "another"'))
-    assert "the baseline is of another, and no item is" in other.message
+    assert unheld("run", [whole, diagnosed], baseline) == ()
+    extended = dataclasses.replace(whole, figures={**whole.figures, "cogging joint 2 amplitude": (0.5, 0.01, "N m")})
+    assert unheld("simulate", [extended], baseline) == ()
     assert unheld("run", [Record("a", "a", "rejected", 3)], baseline) == ()
+
+
+def test_a_baseline_that_meets_nothing_is_a_gate() -> None:
+    """Another robot's, a stage without figures, a model without uncertainties: what was asked for cannot be done at all."""
+    baseline = dataclasses.replace(_baseline(), robot='name = "arm"')
+    mine, other = (Record(name, name, "ok", 0, figures={"p1": (1.0, STD, "kg m^2")}, robot=name, diagnosed=True)
+                   for name in ("arm", "another"))
+    silent = Record("silent", "silent", "ok", 0, robot="arm")
+    given = dataclasses.replace(baseline, effects=(), base_parameters=(
+        StoredParameter("p1", 1.0, None, "kg m^2", True, "given", "J"),))
+    for stage, records, model, words in (
+            ("run", [other], baseline, "the baseline is of arm, and no item is"),
+            ("inspect", [silent], baseline, "base parameters and effects met nothing"),
+            ("estimate-bps", [dataclasses.replace(mine, diagnosed=False)], given, "no number with an uncertainty")):
+        (said,) = unheld(stage, records, model)
+        assert words in said.message
+        assert said.gate
+    (said,) = unheld("run", [mine, other], baseline)
+    assert said.message == "1 of 2 items are of another robot than the baseline, and not held against it: another"
+    assert not said.gate
+    assert unheld("diagnose", [dataclasses.replace(mine, figures={})], given) == ()
 
 
 def test_a_phase_is_the_same_after_a_whole_turn() -> None:
@@ -177,6 +201,14 @@ def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Pa
     write_model(tmp_path / "friction.json", ModelFile("known", rrr, _baseline().base_parameters, friction=(viscous,)))
     (said,) = obey(root, baseline=str(tmp_path / "friction.json")).checks
     assert said.message.startswith("of the baseline, friction met nothing")
+    write_model(tmp_path / "other.json", ModelFile("other", rrr.replace("rrr-tue", "rrr-other"), _baseline().base_parameters))
+    for check in (False, True):
+        unmet = obey(root, baseline=str(tmp_path / "other.json"), check=check)
+        assert unmet.exit_code == 5  # as where a pattern matches no log, and `compare` no figure
+        assert unmet.report.verdict.startswith("Nothing was held against the baseline.")
+    (case,) = [one for one in ElementTree.parse(unmet.folder / "junit.xml").iter("testcase") if one.get("name") == "--baseline"]
+    assert [wrong.tag for wrong in case] == ["error"]
+    assert obey(lay({"2": "reject"}), baseline=str(tmp_path / "other.json")).exit_code == 4
     assert outcome.exit_code == 1
     assert {item["name"]: item["status"] for item in outcome.json["items"]} == {"0": "ok", "1": "found", "2": "ok"}
     assert outcome.json["drift"][0]["figures"][0]["moved"] == ["1"]
