@@ -206,8 +206,13 @@ class Data:
 
     def rms(self, x: Array) -> Array:
         """(joints,) root mean square of `x` (rows,) over the rows that count."""
-        power = np.bincount(self.joint, np.where(self.counts, x, 0.0) ** 2, minlength=self.n_joints)
-        return np.asarray(np.sqrt(power / np.maximum(np.bincount(self.joint[self.counts], minlength=self.n_joints), 1)))
+        power, count = self.power(x)
+        return np.asarray(np.sqrt(power / np.maximum(count, 1)))
+
+    def power(self, x: Array) -> tuple[Array, Indices]:
+        """(joints,) sum of squares of `x` (rows,) over the rows that count, and how many these are."""
+        square = np.bincount(self.joint, np.where(self.counts, x, 0.0) ** 2, minlength=self.n_joints)
+        return np.asarray(square, dtype=np.float64), np.bincount(self.joint[self.counts], minlength=self.n_joints)
 
     def _counted(self, x: Array) -> Array:
         return x if self.counts.all() else np.where(self.counts, x, 0.0)

@@ -17,9 +17,9 @@ torque exactly, and its strength raised until it passes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -131,7 +131,7 @@ def smallest(family: Family, bound: float, probe: Probe) -> Hidden | None:
     strength = chosen.strength
     against = [one for one in (chosen, replace(chosen, direction=-chosen.direction)) if not np.isfinite(strength)
                or one.effect.possible(one.effect.values(strength * one.direction))]
-    for factor in (_exactly(chosen, family, bound, probe), *(_held_out(one, probe) for one in against)):
+    for factor in (_exactly(chosen, family, bound, probe), *_held_out(chosen, [one.direction for one in against], probe)):
         strength = _raised(factor, strength)
     found = bool(np.isfinite(strength))
     return Hidden(chosen.effect, (strength if found else 1.0) * chosen.direction, found)
@@ -234,8 +234,9 @@ def _exactly(one: _Draw, family: Family, bound: float, probe: Probe) -> Callable
     return factor
 
 
-def _held_out(one: _Draw, probe: Probe) -> Callable[[float], float]:
-    """How much more it takes until what is held out becomes smaller by more than chance does, when the cause is fitted."""
+def _held_out(one: _Draw, directions: Sequence[Array], probe: Probe) -> list[Callable[[float], float]]:
+    """Of each direction how much more it takes until what is held out becomes smaller by more than chance does, when the cause is
+    fitted."""
     final, held = probe.final, probe.held
     data = held.data
     there = one.columns if held is final else lay_one(data, one.effect, final.model.arm)
@@ -247,8 +248,8 @@ def _held_out(one: _Draw, probe: Probe) -> Callable[[float], float]:
 
     weights = final.weight[data.joint]
 
-    def factor(strength: float) -> float:
-        before = held.left + strength * (one.direction @ seen)
+    def factor(strength: float, direction: Array) -> float:
+        before = held.left + strength * (direction @ seen)
         if np.linalg.norm(after * weights) >= np.linalg.norm(before * weights):
             return _RAISED
         for joint in joints:
@@ -259,4 +260,4 @@ def _held_out(one: _Draw, probe: Probe) -> Callable[[float], float]:
                 return 1.0
         return _RAISED
 
-    return factor
+    return [partial(factor, direction=direction) for direction in directions]

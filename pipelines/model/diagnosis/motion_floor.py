@@ -13,10 +13,11 @@ leave more than their own replicas do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog
@@ -27,9 +28,12 @@ from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.twin import drive_noise, imperfect, replayable, replica
 from pipelines.model.estimation.logs import Motions, Recipe
-from pipelines.model.simulation import Experiment, Noise, Simulated, simulate
+from pipelines.model.motion import Reconstructed
+from pipelines.model.simulation import Experiment, Noise, Plant, choose_step, simulate
 
 __all__ = ["motion_floor", "noise_in"]
+
+Indices = npt.NDArray[np.intp]
 
 
 def motion_floor(model: Exact, arm: Arm, noise: Array, motions: Motions, data: Data, prepared: Prepared, before: Array,
@@ -43,32 +47,54 @@ def motion_floor(model: Exact, arm: Arm, noise: Array, motions: Motions, data: D
         motions: the logs, held out or fitted; `data` their rows.
         before: (joints,) [N m] what the reference logs leave, where there are any.
     """
+    order = _InOrder(replace(model, effects=()), arm, noise, prepared.recipe, seed)
     asked = [(motions, data)]
     if prepared.reference is not None:
         asked.append((prepared.referring, prepared.reference))
-    logs = [log for some, _ in asked for log, _ in some]
-    if not len(replayable(logs)) == len(logs) > 0:
+    pieces = [(rows, place, one) for some, rows in asked for place, one in enumerate(some)]
+    logs = [log for _, _, (log, _) in pieces]
+    if not len(replayable(logs)) == len(pieces) > 0:
         return None
-    bare = replace(model, effects=())
-
-    def run(log: ExperimentLog) -> Simulated:
-        return simulate(bare.nominal, Experiment.of_log(log), Noise(noise, np.zeros_like(noise)), (seed,))
-
     try:
-        done = iter(shared_out(run, logs))
-        left = [_left(bare, arm, noise, [next(done) for _ in some], some, rows, prepared.recipe, seed) for some, rows in asked]
+        steps = order.steps(logs)
+        powers = shared_out(lambda piece: order.power(*piece, steps), pieces)
     except InputRejected:  # D15, D17, T04
         return None
-    misfit = np.maximum(np.square(before) - np.square(left[1]), 0.0) if len(left) > 1 else 0.0
-    return np.asarray(np.sqrt(np.square(left[0]) + misfit))
+    left = []
+    for _, rows in asked:
+        square, count = np.sum([power for (own, _, _), power in zip(pieces, powers, strict=True) if own is rows], axis=0)
+        left.append(square / np.maximum(count, 1.0))
+    misfit = np.maximum(np.square(before) - left[1], 0.0) if len(left) > 1 else 0.0
+    return np.asarray(np.sqrt(left[0] + misfit))
 
 
-def _left(bare: Exact, arm: Arm, noise: Array, done: Sequence[Simulated], motions: Motions, data: Data, recipe: Recipe,
-          seed: int) -> Array:
-    """(joints,) [N m] root mean square of what the model leaves of its own replicas of these logs."""
-    parts = tuple(replica(one, simulated, 0, recipe) for one, simulated in zip(motions, done, strict=True))
-    own = gather(parts, bare.columns, recipe, [one.equations.rows for one in data.logs])
-    return own.rms(own.y + own.lay_each(imperfect(arm, noise, own, seed)) - bare.torque(own))
+@dataclass(frozen=True, eq=False)
+class _InOrder:
+    """An arm without a fault, and how it is looked at."""
+
+    bare: Exact
+    arm: Arm
+    noise: Array  # (joints,) [N m]
+    recipe: Recipe
+    seed: int
+
+    def steps(self, logs: Sequence[ExperimentLog]) -> dict[float, int]:
+        """Steps of the integrator a sample, for each sample time: what suffices for an arm in a log suffices in the next."""
+        plant, first = Plant.of(self.bare.nominal), {log.sample_time: log for log in reversed(logs)}
+        return {time: choose_step(plant, Experiment.of_log(log), self._drives).per_sample for time, log in first.items()}
+
+    def power(self, data: Data, place: int, log: tuple[ExperimentLog, Reconstructed],
+              steps: Mapping[float, int]) -> tuple[Array, Indices]:
+        """(joints,) [N m^2] sum of squares, and count, of what the model leaves of its own replica of log number `place`."""
+        experiment = Experiment.of_log(log[0])
+        done = simulate(self.bare.nominal, experiment, self._drives, (self.seed,), steps=steps[experiment.sample_time])
+        copy = replica(log, done, 0, self.recipe)
+        own = gather((copy,), self.bare.columns, self.recipe, [data.logs[place].equations.rows], place)
+        return own.power(own.y + own.lay_each(imperfect(self.arm, self.noise, own, self.seed)) - self.bare.torque(own))
+
+    @property
+    def _drives(self) -> Noise:
+        return Noise(self.noise, np.zeros_like(self.noise))
 
 
 def noise_in(model: Exact, data: Data, left: Array, motions: Motions, recipe: Recipe, seed: int) -> Array | None:

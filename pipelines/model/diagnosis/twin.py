@@ -149,7 +149,7 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
 def imperfect(arm: Arm, noise: Array, own: Data, seed: int) -> Callable[[int, Motion], Array]:
     """Small loads (samples, joints) [N m] of a replica in each of its logs `own`, drawn by `seed`."""
     def loads(log: int, motion: Motion) -> Array:
-        step = own.logs[log].log.sample_time
+        step = own.logs[log - own.first].log.sample_time
         return small_loads(motion, arm, noise, step, np.random.default_rng([_NUISANCE, seed]),
                            np.random.default_rng([_NUISANCE, seed, log]))
 
