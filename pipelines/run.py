@@ -33,11 +33,11 @@ from pipelines.report.run_report import run_report
 from pipelines.report.run_result import Group, Result, Step
 from pipelines.stage import Beside, Inputs, Request, Stage, default_out, read_logs, result_type, slug
 
-__all__ = ["STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report", "restored"]
+__all__ = ["MODULES", "STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report", "restored"]
 
 # Modules of the stages, in the order they are run.
 STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing", "frf", "diagnose", "extend")
-_MODULES = tuple(f"pipelines.{module}" for module in ("run", *STEPS))
+MODULES = tuple(f"pipelines.{module}" for module in ("run", *STEPS))
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     names = short_names(request.named)
     if request.roles:
         options["roles"] = {str(renamed(str(opened.path), names)): opened.log.role for opened in inputs.logs}
-    pictures = Pictures(out, {}) if settings.fresh else pictures_of(out, _MODULES)
+    pictures = Pictures(out, {}) if settings.fresh else pictures_of(out, MODULES)
     beside = {stage.name: stage.beside(own, request) for stage, own in _wanted(settings) if stage.beside is not None}
     return dataclasses.replace(
         inputs, material=Material(Store(out, settings.fresh), pictures, names, options, beside, request),
@@ -241,7 +241,7 @@ def write(result: Result, folder: Path, request: Request) -> None:
         for step in group.stages:
             step.kept.put(folder, _place(group.name, step.name))
     if not request.no_report:
-        write_drawing(folder, _MODULES)
+        write_drawing(folder, MODULES)
 
 
 def _exit_code(result: Result, check: bool) -> int:

@@ -16,9 +16,9 @@ from pipelines.recall.key import digest_of_json
 from pipelines.recall.store import CACHE
 from pipelines.report.report import Report
 
-__all__ = ["Pictures", "pictures_of", "with_pictures", "write_drawing"]
+__all__ = ["DRAWING", "Pictures", "pictures_of", "with_pictures", "write_drawing"]
 
-_DRAWING = "drawing.json"
+DRAWING = "drawing.json"  # in the cache of an output: what its figures were drawn by
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def drawing(modules: tuple[str, ...]) -> str:
 def pictures_of(out: Path, modules: tuple[str, ...]) -> Pictures:
     """The figures of the run in `out`; none where they were drawn by other code."""
     try:
-        same = json.loads((out / CACHE / _DRAWING).read_text(encoding="utf-8"))["drawing"] == drawing(modules)
+        same = json.loads((out / CACHE / DRAWING).read_text(encoding="utf-8"))["drawing"] == drawing(modules)
         outputs = json.loads((out / PROVENANCE).read_text(encoding="utf-8"))["outputs"] if same else {}
         known = {name.removeprefix("figures/"): str(value) for name, value in outputs.items() if name.startswith("figures/")}
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -64,7 +64,7 @@ def with_pictures(report: Report, pictures: Pictures) -> Report:
 
 def write_drawing(folder: Path, modules: tuple[str, ...]) -> None:
     """Note in an output what its figures were drawn by."""
-    write_file(folder / CACHE / _DRAWING, lambda draft: _text(draft, json_text({"drawing": drawing(modules)})))
+    write_file(folder / CACHE / DRAWING, lambda draft: _text(draft, json_text({"drawing": drawing(modules)})))
 
 
 def _text(path: Path, text: str) -> None:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pipelines.log.atomic import write_file
 from pipelines.report.cells import are_numbers, column_texts
 from pipelines.report.report import Figure, Report, Section, Table, Tone
+from pipelines.report.settled import settle
 from pipelines.report.side_by_side import Picture, drawn
 from pipelines.report.style import figure_style, format_unit, printable
 
@@ -163,6 +164,7 @@ def _draw(figure: Figure, salt: str) -> tuple[str, bytes]:
         drawing = Drawing(figsize=figure.size, layout="constrained")
         figure.draw(drawing)
         _make_printable(drawing)
+        settle(drawing)
         if (layout := drawing.get_layout_engine()) is not None:
             layout.execute(drawing)
         drawing.set_layout_engine(None)  # already laid out: both shall be the same picture, with no trial drawing before them

@@ -17,6 +17,7 @@ from pipelines.report.run_result import Group, Result, Step
 __all__ = ["run_report"]
 
 _WORST: tuple[Tone, ...] = ("neutral", "good", "attention", "bad")
+_FIGURES = 12  # of one stage: ten logs drawn four times each are for who asks for that stage
 
 
 def run_report(result: Result) -> Report:
@@ -28,7 +29,8 @@ def run_report(result: Result) -> Report:
     sections = [] if single else [section for section in (
         ledger_section([(group.name, ledger_lines(group)) for group in result.groups]), _stages(steps), _lacking(steps)) if section]
     for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):
-        sections += _titled(step.report.sections, "" if single else " · ".join(filter(None, (name, step.name))))
+        own = step.report.sections if single else _fewer(step.report.sections, step.name)
+        sections += _titled(own, "" if single else " · ".join(filter(None, (name, step.name))))
     return Report(_title(result), " ".join(verdicts), tone, _key_figures([step for _, step in steps]), tuple(sections),
                   _advice(steps))
 
@@ -73,6 +75,22 @@ def _lacking(steps: Iterable[tuple[str, Step]]) -> Section | None:
     if not rows:
         return None
     return Section("What these logs lack", (), (Table(("logs", "stage", "why it was passed over", "what to record"), rows),))
+
+
+def _fewer(sections: Iterable[Section], stage: str) -> list[Section]:
+    """`sections` of one stage with its first figures; where others are left out, the words say what draws them."""
+    kept, drawn = list[Section](), 0
+    for section in sections:
+        if drawn + len(section.figures) > _FIGURES and drawn:
+            told = f"Not drawn here, for the length of this report: rrrid {stage}, on the same logs, draws {_these(section)}."
+            section = dataclasses.replace(section, text=(*section.text, told), figures=())
+        drawn += len(section.figures)
+        kept.append(section)
+    return kept
+
+
+def _these(section: Section) -> str:
+    return "the figure that belongs here" if len(section.figures) == 1 else f"the {len(section.figures)} figures that belong here"
 
 
 def _titled(sections: Iterable[Section], prefix: str) -> list[Section]:

@@ -1,11 +1,14 @@
-"""Draw the report of a stored result again: by newer code, where it was left out, or where it was lost. Nothing is computed."""
+"""Draw the report of a stored result again: by newer code, where it was left out, or where it was lost. Nothing is computed.
+
+A figure of a run that lies there as this very code has drawn it of this very result is not drawn once more.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path, PurePath
 from typing import Any
@@ -17,6 +20,8 @@ from pipelines.log.files import PROVENANCE, hash_file
 from pipelines.log.places import keep_apart, refuse_foreign, tilde
 from pipelines.log.results import decode, json_text, read_foreign_series
 from pipelines.log.stored_result import StoredResult, listed_outputs, read_result
+from pipelines.recall.pictures import DRAWING, pictures_of, with_pictures, write_drawing
+from pipelines.recall.store import CACHE
 from pipelines.report.render import write_report
 from pipelines.report.report import Report
 from pipelines.stage import Stage, footer_of, result_type
@@ -41,11 +46,14 @@ def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[
     refuse_foreign(home if out is None else out, force)
     report = tilde(_report(stored))
     about = _provenance(home)
+    report = _with_figures(report, stored, about)
     target = home if out is None else out
     staging = staging_folder(target)
     try:
         if out is None:
             _keep(home, staging, (name for name in about.get("outputs", {}) if not _drawn(name)))
+            if stored.command == "run":
+                write_drawing(staging, _run_modules())
         write_report(report, staging, footer_of(stored.command, about.get("inputs", {})))
         outputs = {path.relative_to(staging).as_posix(): hash_file(path) for path in sorted(staging.rglob("*")) if path.is_file()}
         told = about | {"outputs": outputs} if out is None else {
@@ -76,6 +84,18 @@ def _report(stored: StoredResult) -> Report:
                             where=stored.path, remedy=f"it was written by another version; {_AGAIN}") from problem
 
 
+def _with_figures(report: Report, stored: StoredResult, about: Mapping[str, Any]) -> Report:
+    """`report` with the figures that a run has left there, where they are of what it stored and were drawn by this code."""
+    if stored.command != "run":
+        return report
+    home = stored.path.parent
+    listed = about.get("outputs", {}).items()
+    of = {name: sha for name, sha in listed if name.startswith(f"{CACHE}/") and not name.endswith(DRAWING)}
+    if not of or any(not (home / name).is_file() or hash_file(home / name) != sha for name, sha in of.items()):
+        return report
+    return with_pictures(report, pictures_of(home, _run_modules()))
+
+
 def _result(stage: Stage[Any, Any], stored: StoredResult) -> Any:
     if stored.command == "run":
         from pipelines.run import restored
@@ -103,6 +123,12 @@ def _refers(value: Any) -> bool:
     if isinstance(value, dict):
         return "$series" in value or any(map(_refers, value.values()))
     return isinstance(value, list) and any(map(_refers, value))
+
+
+def _run_modules() -> tuple[str, ...]:
+    from pipelines.run import MODULES
+
+    return MODULES
 
 
 def _provenance(folder: Path) -> dict[str, Any]:

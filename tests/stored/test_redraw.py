@@ -11,6 +11,8 @@ import pytest
 from pipelines import inspect, run
 from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.log.files import write_log
+from pipelines.report import render
+from pipelines.report.report import Figure
 from pipelines.stage import Request, run_stage
 from pipelines.stored.redraw import redraw
 from tests.cli.commands import rrrid
@@ -45,6 +47,34 @@ def test_a_lost_report_comes_back(results: Path, tmp_path: Path, command: str) -
     drawn = {name: content for name, content in contents(tmp_path / "there").items() if name != "provenance.json"}
     assert drawn == {name: content for name, content in before.items() if name == "report.html" or name.startswith("figures/")}
     assert contents(tmp_path / "here") == before
+
+
+def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """None where a run's lie there; the one that is lost or damaged; all where other code drew them. The bytes are the same."""
+    shutil.copytree(results / "run", tmp_path / "a")
+    before, names = contents(results / "run"), list[str]()
+    figures = sorted(name[8:-4] for name in before if name.startswith("figures/") and name.endswith(".png"))
+    own = render._draw
+
+    def noted(figure: Figure, name: str) -> tuple[str, bytes]:
+        names.append(name)
+        return own(figure, name)
+
+    monkeypatch.setattr(render, "_draw", noted)
+    monkeypatch.setattr("pipelines.log.shared_work.processors", lambda: 1)
+    redraw(tmp_path / "a")
+    assert (len(figures) > 4, names) == (True, [])
+    (tmp_path / f"a/figures/{figures[0]}.svg").unlink()
+    redraw(tmp_path / "a")
+    assert names == figures[:1]
+    (tmp_path / f"a/figures/{figures[2]}.png").write_bytes(b"no picture")
+    redraw(tmp_path / "a", force=True)
+    assert names == [figures[0], figures[2]]
+    assert contents(tmp_path / "a") == before
+    (tmp_path / "a/.cache/drawing.json").write_text('{"drawing": "another version"}')
+    redraw(tmp_path / "a", tmp_path / "b")
+    assert sorted(names[2:]) == figures
+    assert all(before[name] == content for name, content in contents(tmp_path / "b").items() if name.startswith("figures/"))
 
 
 def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) -> None:
