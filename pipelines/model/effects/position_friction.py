@@ -65,7 +65,8 @@ class PositionFriction(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Whole orders; also halves where the joint moves over more than a turn. A slide has as many half waves in its travel.
 
-        A refit takes no more harmonics than half waves were travelled: more would be any curve there, and another one beyond.
+        A refit takes no more harmonics than half waves were travelled, unless held-out motion asks for them: more may be any curve
+        there, and another one beyond.
         """
         travel = float(np.ptp(self.own(motion.q))) or 1.0
         turns = arm.robot.revolute[self._index]
@@ -84,8 +85,9 @@ class PositionFriction(Effect):
         return replace(self, harmonics=self.most)
 
     def forms(self) -> tuple[Self, ...]:
-        """Behind a gear."""
-        return (replace(self, whole=False),) if self.whole else ()
+        """With more harmonics than half waves were travelled, as held-out motion bears them out; behind a gear."""
+        finer = tuple(replace(self, harmonics=m, most=m) for m in range(self.most + 1, len(_TAILS) + 1))
+        return (*finer, replace(self, whole=False)) if self.whole else finer
 
     def own_load(self, values: Values) -> OwnLoad:
         shaped, sharpness = self.at(values), values["sharpness"]

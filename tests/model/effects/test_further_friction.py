@@ -116,8 +116,28 @@ def test_a_wave_of_position_friction_is_held_where_it_is_whole() -> None:
         full = shape.full()
         assert full.order.is_integer()
         assert full.free == ("sharpness",)
-        assert [form.free for form in full.forms()] == [("order", "sharpness")]
+        *finer, geared = full.forms()
+        assert geared.free == ("order", "sharpness")
+        assert [form.harmonics for form in finer] == list(range(full.harmonics + 1, 4))
         assert full.harmonics == max(1, min(3, int(full.order * np.ptp(motion.q[:, 1]) / np.pi)))
+
+
+def test_bands_of_wear_need_no_whole_turn() -> None:
+    """Where it rubs in one band, ¼ (1 + cos q)² along the turn, less than half a turn of it is no sine, and the second harmonic is
+    all that lacks."""
+    narrow, arm = swinging(), synthetic_arm()
+    motion = replace(narrow, q=4.0 * narrow.q, dq=4.0 * narrow.dq, ddq=4.0 * narrow.ddq)
+    q, turned = motion.q[:, 1], np.tanh(100.0 * motion.dq[:, 1])
+    rubs = (3.0 / 8.0 + 0.5 * np.cos(q - 0.2) + np.cos(2.0 * (q - 0.2)) / 8.0) * turned
+    first = next(iter(PositionFriction(2).shapes(motion, arm)))
+
+    def left(form: PositionFriction) -> float:
+        table = np.column_stack([turned, form.columns(motion, arm)[:, 1]])
+        return float(np.abs(rubs - table @ np.linalg.lstsq(table, rubs, rcond=None)[0]).max())
+
+    assert np.ptp(q) < np.pi
+    assert left(first.full()) > 0.05
+    assert left(next(form for form in first.full().forms() if form.harmonics == 2)) < 1e-9
 
 
 def test_asymmetric_friction_adds_half_to_each_side() -> None:
