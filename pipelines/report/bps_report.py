@@ -11,6 +11,7 @@ from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
 from pipelines.report.bps import convergence_figure, torque_figure
+from pipelines.report.diagnosis_words import without_keys as plain
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.style import format_number, format_unit, with_std
 
@@ -127,8 +128,8 @@ def _key_figures(result: Result) -> Table:
 def _parameter_section(result: Result) -> Section:
     known = any(p.known is not None for p in result.parameters)
     columns = ("parameter", "value ± std", "unit", "seen", *(("described",) if known else ()), "stands for")
-    rows = [(p.name, "not determined" if p.value is None or p.std is None else with_std(p.value, p.std), format_unit(p.unit),
-             _seen(p), *((p.known,) if known else ()), p.combination)
+    rows = [(plain(p.name), "not determined" if p.value is None or p.std is None else with_std(p.value, p.std),
+             format_unit(p.unit), _seen(p), *((p.known,) if known else ()), p.combination)
             for p in result.parameters]
     tones: tuple[Tone, ...] = tuple(
         "good" if p.visible else "bad" if p.value is None else "attention" for p in result.parameters)
@@ -150,7 +151,7 @@ def _described_words(result: Result) -> tuple[str, ...]:
     if not far:
         return (f"All {len(apart)} values of the described links lie within {ALONE:g} standard deviations of the estimate.",)
     return (f"{len(far)} of {len(apart)} values of the described links lie more than {ALONE:g} standard deviations from the "
-            f"estimate, those of {', '.join(far[:4])} farthest.",)
+            f"estimate, those of {', '.join(map(plain, far[:4]))} farthest.",)
 
 
 def _rotor_words(result: Result) -> tuple[str, ...]:
@@ -185,7 +186,8 @@ def _torque_unit(result: Result) -> str:
 
 def _trust_section(result: Result) -> Section:
     weak = Table(("singular value", "combination"), tuple(
-        (d.singular_value, " ".join(f"{weight:+.2f} {name}" for name, weight in d.parameters[:4])) for d in result.hard_to_see),
+        (d.singular_value, " ".join(f"{weight:+.2f} {plain(name)}" for name, weight in d.parameters[:4]))
+        for d in result.hard_to_see),
         "The directions that these logs show worst; 1 is a column on its own.")
     tables = [weak]
     if result.consistency is not None and result.consistency.inequalities:
@@ -197,7 +199,7 @@ def _trust_section(result: Result) -> Section:
     growth = convergence_figure(
         "convergence", "Estimates as samples come in, each in units of its final value; every one ends at 1. What matters is "
         "the second half: the frame is set by it, and cuts earlier parts off. Parameters that move least are grey.",
-        result.convergence_samples, result.convergence, result.convergence_std, tuple(p.name for p in result.parameters))
+        result.convergence_samples, result.convergence, result.convergence_std, tuple(plain(p.name) for p in result.parameters))
     return Section("What the estimate rests on", (*_balance_words(result), *_settling_words(result)), tuple(tables), (growth,))
 
 
@@ -210,7 +212,7 @@ def _settling_words(result: Result) -> tuple[str, ...]:
     k = int(np.argmax(moved))
     if not moved[k] > 0.0:
         return ()
-    words = f"The second half of the samples moves {result.parameters[k].name} most, by {moved[k]:.1f} standard deviations"
+    words = f"The second half of the samples moves {plain(result.parameters[k].name)} most, by {moved[k]:.1f} standard deviations"
     return (f"{words}; below {ALONE:g} the largest of so many may be chance." if moved[k] < ALONE else
             f"{words}: more than noise explains. The model lacks something, or it changed during the experiment.",)
 
@@ -234,7 +236,7 @@ def _balance_words(result: Result) -> tuple[str, ...]:
     meanings = [unlike] if balance.closure > CLOSED else []
     if abs(balance.delay) > ALONE * balance.delay_std:
         meanings.append(f"{late}: a drive or a filter delays one of them, or their clocks differ.")
-    if differing := [name for name, apart in zip(balance.names, balance.apart, strict=True) if apart > ALONE]:
+    if differing := [plain(name) for name, apart in zip(balance.names, balance.apart, strict=True) if apart > ALONE]:
         meanings.append(f"too far apart: {', '.join(differing)}. Either the reconstructed acceleration is too small or too large, "
                         "or the model lacks an effect.")
     if not meanings:
@@ -253,7 +255,7 @@ def _balance_table(result: Result) -> Table | None:
     if result.balance is None:
         return None
     fitted, balance = {p.name: p for p in result.parameters}, result.balance
-    rows = [(name, with_std(p.value, p.std) if (p := fitted[name]).value is not None and p.std is not None else "not determined",
+    rows = [(plain(name), "not determined" if (p := fitted[name]).value is None or p.std is None else with_std(p.value, p.std),
              with_std(value, std), format_unit(p.unit), round(apart, 1))
             for name, value, std, apart in zip(balance.names, balance.value, balance.std, balance.apart, strict=True)]
     rows.append(("torque behind position", "taken for 0", with_std(1e3 * balance.delay, 1e3 * balance.delay_std), "ms",
@@ -292,7 +294,7 @@ def _comparison_section(result: Result) -> Section:
                    "Relative torque error on the same equations. The differences are intervals of 95 %, by drawing the held-out "
                    "stretches of time anew, the same ones for both.")
     good = [c for c in result.comparison if c.value]
-    values = tuple((p.name, *(with_std(c.value[k], c.std[k]) for c in good))
+    values = tuple((plain(p.name), *(with_std(c.value[k], c.std[k]) for c in good))
                    for k, p in enumerate(result.parameters[:len(good[0].value) if good else 0]))
     beside = Table(("parameter", *(c.method for c in good)), values, "The same parameters, value ± std.")
     return Section("Four ways to reconstruct the motion", (_winner(result.comparison),), (errors, beside) if good else (errors,))

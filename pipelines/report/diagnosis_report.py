@@ -9,8 +9,9 @@ import numpy as np
 
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.responding import BELOW
-from pipelines.model.diagnosis.result import Detectable, Finding, Gain, Trial
+from pipelines.model.diagnosis.result import Finding, Gain, Trial
 from pipelines.model.effects import find_effect
+from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_words import (
@@ -19,22 +20,24 @@ from pipelines.report.diagnosis_words import (
     held_out_floor,
     held_out_words,
     in_order,
+    meaning_of,
+    named,
     per_joint,
+    spoken,
     title_of,
     told_value,
     told_values,
+    unit_or_dash,
+    without_keys,
 )
 from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number, format_unit, to_one_place
+from pipelines.report.style import format_number, to_one_place
 
 __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
 _LEDGER = 40  # lines
-_WAY = {"injected": "hidden", "analytic": "worked out"}  # how a detection limit was found
-_FOUND = ("With 95 %, had it been there; nothing smaller can be excluded. Hidden: put into these logs and found; worked out: by a "
-          "formula. Cannot be seen: nothing that is physically likely would show.")
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
 
 
@@ -43,7 +46,7 @@ def diagnosis_report(result: Result) -> Report:
     found = [section for number, one in enumerate(result.findings, 1)
              for section in (finding_section(number, one), numbers_section(number, one))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
-                *_limits(result), _basis(result), *_doctor(result)]
+                *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
                   errors_table(result.residual_rms, result.after_rms, result.rated, *held_out_floor(result)),
                   tuple(sections), _advice(result))
@@ -53,24 +56,24 @@ def _verdict(result: Result) -> str:
     """One sentence; what to check stands in the first section."""
     if result.verdict == "nothing-wrong":
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
-        caveat = f" {_sentence(result.reason)}" if result.reason else ""
+        caveat = f" {_sentence(without_keys(result.reason))}" if result.reason else ""
         return f"Nothing{since}, as far as these logs can tell: what they could have shown stands below.{caveat}"
     if result.verdict == "unknown":
-        return f"Something is wrong that has no name here: {result.reason}."
+        return f"Something is wrong that has no name here: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
-    others = f"; and {', '.join(cause_at(one.cause, one.joint) for one in more)}" if more else ""
+    others = f"; and {', '.join(named(one.cause, one.joint) for one in more)}" if more else ""
     size = f", {_size(first)}" if math.isfinite(first.torque_rms) else ""
     tip = first.gain.tip_error_rms
     moved = f"; for it the simulated tip is {format_number(1e3 * tip.before, 2)} mm off" if tip is not None else ""
-    rest = f" Beside it, {result.reason}." if result.reason else ""
+    rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
     return f"{changed}{first.title}{_at(first.joint)}{size}{moved}{others}.{rest}"
 
 
 def _advice(result: Result) -> tuple[str, ...]:
     """What to look at on the machine, finding by finding."""
     several = len(result.findings) > 1
-    return tuple(f"What to check{f' for {cause_at(one.cause, one.joint)}' if several else ''}: "
+    return tuple(f"What to check{f' for {named(one.cause, one.joint)}' if several else ''}: "
                  f"{_sentence(find_effect(one.cause).remedy)}" for one in result.findings)
 
 
@@ -104,11 +107,11 @@ def finding_section(number: int, one: Finding, offer: bool = True, floor: str = 
                     f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
                     "torque worked out from the encoder is mostly noise")
     if one.doubt:
-        text.append(f"The extended model goes without it: {one.doubt}")
+        text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
     if offer and not one.doubt and not _happens_once(one):
         text.append(f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it")
     if one.rivals:
-        names = ", ".join(f"{cause_at(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
+        names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
     return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text),
                    figures=tuple(proof_figures(number, one)))
@@ -152,8 +155,9 @@ def _worth(one: Finding, floor: str) -> str:
 
 
 def _numbers(one: Finding) -> Table:
-    rows = tuple((name, told_value(value), format_unit(value.unit)) for name, value in in_order(one.cause, one.parameters))
-    return Table(("parameter", "value ± std", "unit"), rows, "What was identified.")
+    rows = tuple((spoken(name), told_value(value), unit_or_dash(value.unit), meaning_of(one.cause, name))
+                 for name, value in in_order(one.cause, one.parameters))
+    return Table(("parameter", "value ± std", "unit", "what it is"), rows, "What was identified.")
 
 
 def gain_table(gain: Gain, caption: str) -> Table:
@@ -175,10 +179,10 @@ def _unknown(result: Result) -> list[Section]:
     if result.verdict != "unknown":
         return []
     near = sorted(_nearest(result.ledger).items(), key=lambda one: -one[1])[:5]
-    names = ", ".join(f"{cause_at(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
+    names = ", ".join(f"{named(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
     tried = f" The nearest explanations, none of them good enough: {names}." if near else ""
     return [Section("Why there is no name", (
-        _sentence(result.reason) + tried, *_follows(result),
+        _sentence(without_keys(result.reason)) + tried, *_follows(result),
         "A wrong name costs more than none. What follows shows where and when the residual stands above its floor."))]
 
 
@@ -215,13 +219,13 @@ def _others(result: Result) -> list[Section]:
     """Rejected hypotheses and the ledger."""
     sections = []
     if result.rejected:
-        why = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
+        why = tuple((title_of(one.cause), one.joint, without_keys(one.reason)) for one in result.rejected)
         sections.append(Section("Rejected", ("They came close, and are not believed.",), (Table(("cause", "joint", "why"), why),)))
     shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
         rows = tuple((t.step, title_of(t.cause), t.joint, _rounded(100.0 * t.gain), _rounded(100.0 * t.threshold),
-                      _rounded(100.0 * t.exact_gain), _rounded(t.visibility), "accepted" if t.accepted else t.reason)
+                      _rounded(100.0 * t.exact_gain), _rounded(t.visibility), "accepted" if t.accepted else without_keys(t.reason))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
         more = len(result.ledger) - len(rows)
@@ -239,29 +243,6 @@ def _alike(joints: int) -> str:
         return ""
     return (f" Each joint is weighed by its own residual: of {joints} joints, what explains all at one and nothing elsewhere takes "
             f"away {format_number(100.0 / joints, 2)} %.")
-
-
-def _limits(result: Result) -> list[Section]:
-    """What these logs can and cannot tell."""
-    sections = []
-    if result.detectable:
-        rows = tuple((title_of(one.cause), one.joint, one.parameter, *_smallest(one)) for one in result.detectable)
-        sections.append(Section("What would have been found", (_FOUND,),
-                                (Table(("cause", "joint", "parameter", "smallest", "unit", "at", "by"), rows),)))
-    if result.not_testable:
-        hidden = tuple((title_of(one.cause), one.joint, one.reason, one.record) for one in result.not_testable)
-        sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
-                                (Table(("cause", "joint", "why", "what to record"), hidden),)))
-    return sections
-
-
-def _smallest(one: Detectable) -> tuple[str, ...]:
-    """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
-    value = one.smallest.value
-    expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
-    if isinstance(value, float) and expected and value >= min(expected):
-        return "cannot be seen", "", "", ""
-    return told_value(one.smallest), format_unit(one.smallest.unit), told_values(one.at.items()), _WAY[one.way]
 
 
 def _basis(result: Result) -> Section:

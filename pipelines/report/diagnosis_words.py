@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -13,8 +14,12 @@ from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, with_std
 
-__all__ = ["cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "per_joint", "title_of",
-           "told_value", "told_values", "torque_errors"]
+__all__ = ["cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "meaning_of", "named",
+           "per_joint", "spoken", "title_of", "told_value", "told_values", "torque_errors", "unit_or_dash", "without_keys"]
+
+_PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
+_COUNTED = {"_2": "second ", "_3": "third "}  # harmonics
+_KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+))?\b")
 
 _FLOORS = {
     "twin": "The floor is what the simulated twin leaves: the fitted model run through the same experiment and the same analysis.",
@@ -42,6 +47,39 @@ def title_of(cause: str) -> str:
     return find_effect(cause).title if cause in effect_names() else cause
 
 
+def named(cause: str, joint: int | None) -> str:
+    """A cause and its joint within a sentence: "cogging at joint 2"; as it is typed it is `cause_at`."""
+    title = title_of(cause)
+    words = title if title.startswith(_PERSONS) else f"{title[:1].lower()}{title[1:]}"
+    return words if joint is None else f"{words} at joint {joint}"
+
+
+def spoken(parameter: str) -> str:
+    """A parameter's key in words: "second amplitude" for "amplitude_2", "gain error" for "gain_error"."""
+    count = _COUNTED.get(parameter[-2:], "")
+    return f"{count}{parameter.removesuffix(parameter[-2:]) if count else parameter}".replace("_", " ")
+
+
+def meaning_of(cause: str, parameter: str) -> str:
+    """What a parameter of an effect stands for, as the effect says; "" where it does not."""
+    known = find_effect(cause).parameters if cause in effect_names() else ()
+    meaning = next((q.meaning for q in known if q.name == parameter), "")
+    for q in known:
+        meaning = meaning.replace(q.name, spoken(q.name)) if "_" in q.name else meaning
+    return meaning
+
+
+def without_keys(text: str) -> str:
+    """A stored reason as people read it: "cogging at joint 2" for "cogging:2", "torque offset" for "torque_offset"."""
+    def in_words(found: re.Match[str]) -> str:
+        cause, joint = found[1], found[2]
+        if cause not in effect_names() or (joint is None and "_" not in cause):
+            return found[0]
+        return named(cause, None if joint is None else int(joint))
+
+    return _KEY.sub(in_words, text)
+
+
 def told_value(value: Value) -> str:
     """"0.102 ± 0.003", or three of them."""
     values = value.value if isinstance(value.value, tuple | list) else (value.value,)
@@ -51,8 +89,13 @@ def told_value(value: Value) -> str:
 
 def told_values(named: Iterable[tuple[str, Value]]) -> str:
     """"order 18 1/rev, exponent 2": names, values and units in one line; a pure number has no unit to show."""
-    return ", ".join(f"{name} {told_value(value)} {'' if value.unit == '1' else format_unit(value.unit)}".strip()
+    return ", ".join(f"{spoken(name)} {told_value(value)} {'' if value.unit == '1' else format_unit(value.unit)}".strip()
                      for name, value in named)
+
+
+def unit_or_dash(unit: str) -> str:
+    """In a table: a pure number has no unit to show."""
+    return "–" if unit == "1" else format_unit(unit)
 
 
 def in_order(cause: str, parameters: Mapping[str, Value]) -> list[tuple[str, Value]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.report.diagnosis_report import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_words import cause_at, held_out_words, title_of, torque_errors
+from pipelines.report.diagnosis_words import held_out_words, named, title_of, torque_errors, without_keys
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
@@ -21,7 +21,7 @@ def extension_report(result: Extension) -> Report:
     sections = [section for number, one in enumerate(result.findings, 1)
                 for section in (finding_section(number, one, offer=False, floor="the noise"), numbers_section(number, one))]
     if result.rejected:
-        rows = tuple((title_of(one.cause), one.joint, one.reason) for one in result.rejected)
+        rows = tuple((title_of(one.cause), one.joint, without_keys(one.reason)) for one in result.rejected)
         sections.insert(0, Section("Not accepted", ("The held-out logs do not bear it out. There is no way around that.",),
                                    (Table(("cause", "joint", "why"), rows),)))
     sections.append(_basis(result))
@@ -33,10 +33,10 @@ def extension_report(result: Extension) -> Report:
 
 
 def _verdict(result: Extension) -> str:
-    refused = ", ".join(cause_at(one.cause, one.joint) for one in result.rejected)
+    refused = ", ".join(named(one.cause, one.joint) for one in result.rejected)
     if not result.findings:
         return f"Not accepted: {refused}; no model was written. {_first_reason(result)}"
-    named = ", ".join(cause_at(one.cause, one.joint) for one in result.findings)
+    found = ", ".join(named(one.cause, one.joint) for one in result.findings)
     gain = result.gain
     told = ""
     if gain is not None and gain.tip_error_rms is not None:
@@ -44,11 +44,12 @@ def _verdict(result: Extension) -> str:
         after, before = (format_number(1e3 * x, 2) for x in (tip.after, tip.before))
         told = f"; the simulated tip is {after} mm off instead of {before} mm"
     but = f" Not accepted: {refused}." if refused else ""
-    return f"The model with {named} is better on held-out logs{told}.{but}"
+    return f"The model with {found} is better on held-out logs{told}.{but}"
 
 
 def _first_reason(result: Extension) -> str:
     reason = result.rejected[0].reason if result.rejected else "no cause was named"
+    reason = without_keys(reason)
     return f"{reason[:1].upper()}{reason[1:]}."
 
 
@@ -58,7 +59,7 @@ def _basis(result: Extension) -> Section:
             "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the "
             "measured one."]
     if result.standing:
-        text.append(f"The reference logs show as well, and the model has: {', '.join(result.standing)}.")
+        text.append(f"The reference logs show as well, and the model has: {', '.join(map(without_keys, result.standing))}.")
     if result.model is not None:
         text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --like LOG\" "
                     "simulates it.")

@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.result import Diagnosis, Gain
 from pipelines.model.estimation.result import Result as Estimate
 from pipelines.report import style
-from pipelines.report.diagnosis_words import cause_at, title_of
+from pipelines.report.diagnosis_words import named
 from pipelines.report.report import Figure, Section, Table, Tone
 from pipelines.report.run_result import Group
 from pipelines.report.style import format_number, to_one_place
@@ -61,10 +61,10 @@ def _of(result: Any, stage: str) -> Iterator[Line]:
             nominal = tuple(map(float, result.residual_rms.validate))
             yield Line("rigid body and friction, as diagnose fits them", stage, nominal, None, None)
         for one in found:
-            yield _with(f"+ {title_of(one.cause)} ({cause_at(one.cause, one.joint)})", stage, one.gain)
+            yield _with(f"+ {named(one.cause, one.joint)}", stage, one.gain)
     elif isinstance(result, Extension) and result.gain is not None and result.findings and _whole(result.gain):
-        named = ", ".join(cause_at(one.cause, one.joint) for one in result.findings)
-        whole = _with(f"the model with {named}, everything refitted", stage, result.gain)
+        causes = ", ".join(named(one.cause, one.joint) for one in result.findings)
+        whole = _with(f"the model with {causes}, everything refitted", stage, result.gain)
         # the model that is written, as the key figures have it: a finding's own gain is that of the moment it was found
         now, was = (tuple(map(float, one.validate)) for one in (result.after_rms, result.residual_rms))
         yield replace(whole, rms=now, before=was)

@@ -1,0 +1,38 @@
+"""What logs can and cannot tell: the smallest of each cause that would have been found, and what to record for the others."""
+
+from __future__ import annotations
+
+from pipelines.model.diagnosis.result import Detectable, Diagnosis
+from pipelines.model.effects import find_effect
+from pipelines.report.diagnosis_words import spoken, title_of, told_value, told_values, unit_or_dash, without_keys
+from pipelines.report.report import Section, Table
+
+__all__ = ["limits_sections"]
+
+_WAY = {"injected": "hidden", "analytic": "worked out"}  # how a detection limit was found
+_FOUND = ("With 95 %, had it been there; nothing smaller can be excluded. Hidden: put into these logs and found; worked out: by a "
+          "formula. Cannot be seen: nothing that is physically likely would show.")
+
+
+def limits_sections(result: Diagnosis) -> list[Section]:
+    """What these logs can and cannot tell."""
+    sections = []
+    if result.detectable:
+        rows = tuple((title_of(one.cause), one.joint, spoken(one.parameter), *_smallest(one)) for one in result.detectable)
+        sections.append(Section("What would have been found", (_FOUND,),
+                                (Table(("cause", "joint", "parameter", "smallest", "unit", "at", "by"), rows),)))
+    if result.not_testable:
+        hidden = tuple((title_of(one.cause), one.joint, without_keys(one.reason), without_keys(one.record))
+                       for one in result.not_testable)
+        sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
+                                (Table(("cause", "joint", "why", "what to record"), hidden),)))
+    return sections
+
+
+def _smallest(one: Detectable) -> tuple[str, ...]:
+    """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
+    value = one.smallest.value
+    expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
+    if isinstance(value, float) and expected and value >= min(expected):
+        return "cannot be seen", "", "", ""
+    return told_value(one.smallest), unit_or_dash(one.smallest.unit), told_values(one.at.items()), _WAY[one.way]

@@ -1,0 +1,55 @@
+"""What a reader of a diagnosis is told is words with units; keys are for files and commands."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis.result import Finding, Gain, Rival, TorqueGain, Value
+from pipelines.model.effects import effect_names, find_effect
+from pipelines.report.diagnosis_report import finding_section, numbers_section
+from pipelines.report.diagnosis_words import named, spoken, told_values, without_keys
+
+KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
+COMMAND = re.compile(r'"rrrid [^"]*"')
+
+
+def found(cause: str) -> Finding:
+    """A finding with every parameter that its effect has."""
+    three = np.ones(3)
+    gain = Gain(TorqueGain(three, 0.5 * three, np.zeros((3, 2))), None, "none", None)
+    parameters = {q.name: Value(1.0, 0.1, q.unit) for q in find_effect(cause).parameters}
+    return Finding(cause, 2, find_effect(cause).title, parameters, 0.9, 0.8, (Rival("torque_offset", 1, 0.9),), "record more", gain,
+                   "residual", 0.2, 0.01, None)
+
+
+@pytest.mark.parametrize("cause", effect_names())
+def test_a_finding_is_told_in_words(cause: str) -> None:
+    """Of every effect: no key in what is said of it but in the command that is typed; each number with what it is."""
+    said = " ".join(finding_section(1, found(cause)).text)
+    assert "torque offset at joint 1" in said
+    assert KEY.findall(COMMAND.sub("", said)) == []
+    numbers = numbers_section(1, found(cause)).tables[0]
+    assert len(numbers.rows) == len(find_effect(cause).parameters)
+    for name, _, unit, meaning in numbers.rows:
+        assert KEY.findall(f"{name} {meaning}") == []
+        assert all((unit, meaning))
+
+
+def test_what_is_told_of_parameters_can_be_read_aloud() -> None:
+    """Harmonics are counted, pure numbers have no unit, and no two parameters of an effect get the same words."""
+    assert told_values([("amplitude_2", Value(0.12, None, "N m")), ("gain_error", Value(0.1, None, "1"))]) == (
+        "second amplitude 0.12 N m, gain error 0.1")
+    for cause in effect_names():
+        names = [spoken(q.name) for q in find_effect(cause).parameters]
+        assert len(set(names)) == len(names)
+
+
+def test_a_stored_reason_is_read_without_keys() -> None:
+    """Causes by their titles, with the joint where it is said; a person's name stays capital; other words stay."""
+    assert without_keys("absorbed by coulomb:1, p3 and torque_offset:2") == (
+        "absorbed by Coulomb friction at joint 1, p3 and torque offset at joint 2")
+    assert without_keys("spring and friction stay as they are: 3 of 4") == "spring and friction stay as they are: 3 of 4"
+    assert named("payload", None) == "a load at the tip"
