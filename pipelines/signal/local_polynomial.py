@@ -28,6 +28,7 @@ _FREEDOM = 10  # least degrees of freedom of a noise estimate: its own deviation
 _LEAST_FREEDOM = 4  # in one stretch
 _AT_ONCE = 2000  # windows solved together
 _EMPTY = 1e-10  # of the strongest amplitude: what is smaller is rounding, no source
+_LEAKED = 1e-6  # of the power in the strongest window: what is smaller has leaked from lines elsewhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +96,16 @@ def _of_stretch(x: Array, rate: float, frequency: Array, channels: list[int], or
 def _holding_lines(power: Array, at: Array, half: int, order: int) -> int:
     """The window, half or more bins to each side, in which the power of the source is that of lines enough.
 
-    (Σ power)² / Σ power² lines of equal power; half of the bins where the source is noise. Three quarters of the windows must
-    hold order + 3 of them; where no window does, as without excitation, it stays as it is.
+    (Σ power)² / Σ power² lines of equal power; half of the bins where the source is noise. Three quarters of the windows that
+    the source excites must hold order + 3 of them; where no window does, as without excitation, it stays as it is.
     """
     sums = np.cumsum(np.concatenate([np.zeros((1, 2)), np.stack([power, power**2], axis=1)]), axis=0)
     wide = half
     while 2 * wide + 3 <= len(power) // 8:
         middle = np.clip(np.rint(at).astype(np.int64), wide, len(power) - wide - 1)
         first, second = (sums[middle + wide + 1] - sums[middle - wide]).T
-        lines = first**2 / np.where(second > 0.0, second, 1.0)
-        if np.quantile(lines, 0.25) >= order + 3:
+        excited = (first > _LEAKED * first.max()) & (second > 0.0)
+        if excited.any() and np.quantile(first[excited] ** 2 / second[excited], 0.25) >= order + 3:
             return wide
         wide += max(1, wide // 4)
     return half

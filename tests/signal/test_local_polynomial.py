@@ -86,6 +86,26 @@ def test_a_periodic_source_gets_windows_that_hold_its_lines() -> None:
     assert np.max(np.abs(found.response / truth - 1.0)) < 1e-3
 
 
+def test_lines_are_counted_only_where_the_source_has_any() -> None:
+    """Two periods of lines every 0.25 Hz up to 250 Hz, asked for up to 340 Hz: what is empty above widens no window below.
+
+    An antiresonance 2 ζ f = 2.4 Hz wide shows its depth, 2 ζ to its own width: in windows of 20 Hz it would be filled up.
+    """
+    rng = np.random.default_rng(5)
+    spectrum = np.zeros(2001, dtype=complex)
+    spectrum[2:1001] = np.exp(2j * np.pi * rng.random(999))
+    v = np.resize(np.fft.irfft(spectrum, 4000), 16_000)
+    omega, damping = 2.0 * np.pi * 30.0, 0.04
+    zeros, poles = [1.0 / omega**2, 2.0 * damping / omega, 1.0], [1.0 / (3.0 * omega) ** 2, 0.2 / (3.0 * omega), 1.0]
+    b, a, _ = signal.cont2discrete((zeros, poles), 1.0 / RATE, method="bilinear")
+    y = signal.lfilter(b[0], a, v)[8000:]
+    found = local_polynomial((np.stack([v[8000:], y], axis=1),), RATE, np.arange(1.0, 340.0, 0.25), 0, (1,)).of(0)
+    near = found.within(25.0, 35.0)
+    _, truth = signal.freqz(b[0], a, near.frequency, fs=RATE)
+    assert found.resolution < 2.5
+    assert np.abs(near.response).min() == pytest.approx(np.abs(truth).min(), rel=0.1)
+
+
 def test_where_nothing_was_excited_nothing_is_known() -> None:
     """A source of lines below 100 Hz alone: NaN, no coherence, no end of variance above; the quotient too."""
     rng = np.random.default_rng(2)
