@@ -25,13 +25,13 @@ from pipelines.model.diagnosis.candidates import Family, families, place_of, who
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import BY_CHANCE, extended_arm, findings, held_finding, unlike
+from pipelines.model.diagnosis.findings import BY_CHANCE, extended_arm, findings, held_finding
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import vague
+from pipelines.model.diagnosis.pruned import at_odds, vague
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
@@ -177,7 +177,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     why: dict[tuple[str, int | None], str] = {}
     late = any(step.best is not None and step.best.effect.last for step in steps)
     for k, step in enumerate(steps):
-        if step.best is not None and (doubt := unlike(step, prepared, chosen.blocks) or
+        if step.best is not None and (doubt := at_odds(found, k, prepared, case) or
                                       farther(simulated[k], simulated[k + 1], late=late) or
                                       (BY_CHANCE if vague(found, k, prepared, case) else "")):
             why[step.best.effect.name, step.best.effect.joint] = doubt

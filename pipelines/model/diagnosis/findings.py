@@ -114,30 +114,25 @@ def by_chance(before: Refined, after: Refined, judge: Data | None, blocks: int) 
     return not (gain.ci95[:, 1] < 0.0).any() and not (gain.after**2 < _HALF * gain.before**2).any()
 
 
-def unlike(step: Step, prepared: Prepared, blocks: int) -> str:
-    """Why an accepted step does not do the same in every log; empty where it does."""
-    best = step.best
-    if best is None or best.log is not None:
-        return ""
-    data = best.done.data if prepared.judge is None else prepared.judge
-    if worse := worse_log(data, *(held_out_left(one, prepared.judge, blocks) for one in (step.before, best.done))):
+def unlike(before: Refined, after: Refined, place: int, prepared: Prepared, blocks: int) -> str:
+    """Why effect number `place` of `after`, which `before` lacks, does not do the same in every log; empty where it does."""
+    data = after.data if prepared.judge is None else prepared.judge
+    if worse := worse_log(data, *(held_out_left(one, prepared.judge, blocks) for one in (before, after))):
         return worse
-    off = [f"{scale:.2g}" for scale in agreement(step, best, prepared) if not _AGREE[0] < scale < _AGREE[1]]
+    off = [f"{scale:.2g}" for scale in agreement(after, place, prepared) if not _AGREE[0] < scale < _AGREE[1]]
     return f"logs do not agree on its size: {', '.join(off)} of it" if off else ""
 
 
-def agreement(step: Step, best: Tried, prepared: Prepared) -> list[float]:
+def agreement(done: Refined, place: int, prepared: Prepared) -> list[float]:
     """The amplitude that each log asks for by itself, in parts of the one found; of logs that can tell."""
     scales = []
     for data in (prepared.data, prepared.judge):
         if data is None:
             continue
-        place = len(best.done.model.effects) - 1
-        model = best.done.model
-        torque = model.torque(data)
-        share = torque - model.without(place).torque(data)
+        torque = done.model.torque(data)
+        share = torque - done.model.without(place).torque(data)
         left = data.y - torque
-        weights = best.done.weight[data.joint]
+        weights = done.weight[data.joint]
         for log in range(len(data.logs)):
             own = data.log_of == log
             s, r = share[own] * weights[own], left[own] * weights[own]

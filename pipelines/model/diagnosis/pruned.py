@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Settled", "settled", "unnamed", "vague"]
+__all__ = ["Settled", "at_odds", "settled", "unnamed", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
@@ -49,7 +49,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    doubts = {k: unlike(found.steps[k], prepared, case.blocks) or farther(simulated[k], simulated[k + 1], late=late)
+    doubts = {k: at_odds(found, k, prepared, case) or farther(simulated[k], simulated[k + 1], late=late)
               for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
@@ -117,6 +117,20 @@ def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
         return False
     others = [j for j, step in enumerate(found.steps) if step.best is not None and j != k]
     return not others or by_chance(_without(found, others, case), found.final, case.judge, case.blocks)
+
+
+def at_odds(found: Found, k: int, prepared: Prepared, case: Case) -> str:
+    """Why step `k` does not do the same in every log, neither when it was found nor beside all the others; empty where it does.
+
+    What was found after it stood in the residual then, and one log may have more of that than another.
+    """
+    step, accepted = found.steps[k], [j for j, one in enumerate(found.steps) if one.best is not None]
+    if step.best is None or step.best.log is not None:
+        return ""
+    why = unlike(step.before, step.best.done, k, prepared, case.blocks)
+    if not why or k == accepted[-1]:
+        return why
+    return unlike(_without(found, [j for j in accepted if j != k], case), found.final, k, prepared, case.blocks)
 
 
 def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) -> tuple[list[int], Refined]:

@@ -163,3 +163,18 @@ def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkey
     case = among(effect(one, 1), effect(other, 1))
     kept, final = pruned._asked_again(found, [1], [0], case)
     assert (kept, final) == ([1], (1,))
+
+
+@pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])
+def test_what_did_harm_in_a_log_when_it_was_found_is_asked_again_beside_what_was_found_after_it(
+        beside: str, odd: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second cause stood in the residual when the first was found, and one held-out log had more of it than the others."""
+    found = searched(left(0.5, 0.5, 0.01), (effect("spring", 1), left(0.4, 0.5, 0.01)),
+                     (effect("spring", 2), left(0.01, 0.01, 0.01)))
+    for step in found.steps:
+        step.best.log = None
+    monkeypatch.setattr(pruned, "_without", lambda *args: left(0.05, 0.01, 0.01))
+    monkeypatch.setattr(pruned, "unlike", lambda before, after, *args: beside if after is found.final else "worse in free-1")
+    case = SimpleNamespace(blocks=10)
+    assert bool(pruned.at_odds(found, 0, SimpleNamespace(), case)) is odd
+    assert pruned.at_odds(found, 1, SimpleNamespace(), case) == "worse in free-1"  # nothing was found after it
