@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.result import BeforeAfter, Gain, TipError, Torque
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Plant, choose_step, simulate, simulate_windows
+from pipelines.model.simulation import Experiment, Plant, choose_step, simulate_together, simulate_windows
 
 __all__ = ["Simulation", "farther", "gain_of", "simulation_errors", "torque_gain", "torque_gain_of", "worse_log"]
 
@@ -135,12 +135,9 @@ def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simula
 
 
 def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
-    steps, seconds = 1, _SOFT if soft else _LONGEST
     square, away = [], []
-    for place, (log, found) in enumerate(motions):
-        if closed and place == 0:  # one controller and one arm: what suffices for a log suffices for the next
-            steps = choose_step(Plant.of(arm), _first(log, seconds)).per_sample
-        q, seen = _closed(arm, log, steps, seconds) if closed else _windowed(arm, log, found)
+    pairs = _closed(arm, motions, _SOFT if soft else _LONGEST) if closed else [_windowed(arm, *one) for one in motions]
+    for q, seen in pairs:
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
         away.append(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known])), axis=1))
@@ -152,9 +149,12 @@ def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
                       float(np.sqrt(np.mean(np.concatenate(away)))), power, samples)
 
 
-def _closed(arm: Arm, log: ExperimentLog, steps: int, seconds: float) -> tuple[Array, Array]:
-    q = simulate(arm, _first(log, seconds), steps=steps).q[0]
-    return q, log.q[:len(q)]
+def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array]]:
+    """Simulated and measured positions of each log (samples, joints) [rad]."""
+    first = [_first(log, seconds) for log, _ in motions]
+    steps = choose_step(Plant.of(arm), first[0]).per_sample  # one controller and arm: what suffices for a log suffices for the next
+    done = simulate_together(arm, first, steps={one.sample_time: steps for one in first})
+    return [(one.q[0], log.q[:one.q.shape[1]]) for one, (log, _) in zip(done, motions, strict=True)]
 
 
 def _first(log: ExperimentLog, seconds: float) -> Experiment:

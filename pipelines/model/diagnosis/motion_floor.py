@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +30,7 @@ from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.twin import drive_noise, imperfect, replayable, replica
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed
-from pipelines.model.simulation import Experiment, Noise, Plant, choose_step, simulate
+from pipelines.model.simulation import Experiment, Noise, Plant, Simulated, choose_step, simulate_together
 
 __all__ = ["motion_floor", "noise_in"]
 
@@ -51,21 +52,41 @@ def motion_floor(model: Exact, arm: Arm, noise: Array, motions: Motions, data: D
     asked = [(motions, data)]
     if prepared.reference is not None:
         asked.append((prepared.referring, prepared.reference))
-    pieces = [(rows, place, one) for some, rows in asked for place, one in enumerate(some)]
-    logs = [log for _, _, (log, _) in pieces]
+    pieces = [_Piece(rows, place, *one) for some, rows in asked for place, one in enumerate(some)]
+    logs = [piece.log for piece in pieces]
     if not len(replayable(logs)) == len(pieces) > 0:
         return None
     try:
         steps = order.steps(logs)
-        powers = shared_out(lambda piece: order.power(*piece, steps), pieces)
+        shares = _shares(pieces)
+        powers = shared_out(lambda share: order.powers(share, steps), shares)
     except InputRejected:  # D15, D17, T04
         return None
+    known = list(zip(chain.from_iterable(shares), chain.from_iterable(powers), strict=True))
     left = []
     for _, rows in asked:
-        square, count = np.sum([power for (own, _, _), power in zip(pieces, powers, strict=True) if own is rows], axis=0)
+        square, count = np.sum([power for piece, power in known if piece.rows is rows], axis=0)
         left.append(square / np.maximum(count, 1.0))
     misfit = np.maximum(np.square(before) - left[1], 0.0) if len(left) > 1 else 0.0
     return np.asarray(np.sqrt(left[0] + misfit))
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A log that is replayed."""
+
+    rows: Data  # that it belongs to
+    place: int  # in these
+    log: ExperimentLog
+    found: Reconstructed
+
+
+def _shares(pieces: Sequence[_Piece]) -> list[list[_Piece]]:
+    """For two processes: each log, the longest first, to the one that has less."""
+    shares: tuple[list[_Piece], list[_Piece]] = ([], [])
+    for piece in sorted(pieces, key=lambda piece: -piece.log.n_samples):
+        min(shares, key=lambda share: sum(one.log.n_samples for one in share)).append(piece)
+    return [share for share in shares if share]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +104,15 @@ class _InOrder:
         plant, first = Plant.of(self.bare.nominal), {log.sample_time: log for log in reversed(logs)}
         return {time: choose_step(plant, Experiment.of_log(log), self._drives).per_sample for time, log in first.items()}
 
-    def power(self, data: Data, place: int, log: tuple[ExperimentLog, Reconstructed],
-              steps: Mapping[float, int]) -> tuple[Array, Indices]:
-        """(joints,) [N m^2] sum of squares, and count, of what the model leaves of its own replica of log number `place`."""
-        experiment = Experiment.of_log(log[0])
-        done = simulate(self.bare.nominal, experiment, self._drives, (self.seed,), steps=steps[experiment.sample_time])
-        copy = replica(log, done, 0, self.recipe)
-        own = gather((copy,), self.bare.columns, self.recipe, [data.logs[place].equations.rows], place)
+    def powers(self, pieces: Sequence[_Piece], steps: Mapping[float, int]) -> list[tuple[Array, Indices]]:
+        """Of each log (joints,) [N m^2] sum of squares of what the model leaves of its own replica, and of how many rows."""
+        experiments = [Experiment.of_log(one.log) for one in pieces]
+        done = simulate_together(self.bare.nominal, experiments, self._drives, (self.seed,), steps)
+        return [self._power(one, simulated) for one, simulated in zip(pieces, done, strict=True)]
+
+    def _power(self, piece: _Piece, done: Simulated) -> tuple[Array, Indices]:
+        copy, seen = replica((piece.log, piece.found), done, 0, self.recipe), piece.rows.logs[piece.place].equations.rows
+        own = gather((copy,), self.bare.columns, self.recipe, [seen], piece.place)
         return own.power(own.y + own.lay_each(imperfect(self.arm, self.noise, own, self.seed)) - self.bare.torque(own))
 
     @property

@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Array
@@ -43,9 +43,12 @@ def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds
     return run(plant, experiment, choose_step(plant, experiment, noise).per_sample if steps is None else steps, noise, seeds)
 
 
-def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None,
-                      seeds: Iterable[int] = (0,)) -> list[Simulated]:
+def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None, seeds: Iterable[int] = (0,),
+                      steps: Mapping[float, int] | None = None) -> list[Simulated]:
     """`simulate` of several experiments, side by side as far as their sample times agree; the step is fine enough for all.
+
+    Args:
+        steps: of the integrator, a sample, for each sample time [s]; by default as few as `choose_step` allows.
 
     Raises:
         InputRejected: D17, the arm runs away, or no step is small enough.
@@ -54,6 +57,6 @@ def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise 
     for time in dict.fromkeys(one.sample_time for one in experiments):
         places = [k for k, one in enumerate(experiments) if one.sample_time == time]
         some = [experiments[k] for k in places]
-        steps = max(choose_step(plant, one, noise).per_sample for one in some)
-        found |= dict(zip(places, run_together(plant, some, steps, noise, drawn), strict=True))
+        count = max(choose_step(plant, one, noise).per_sample for one in some) if steps is None else steps[time]
+        found |= dict(zip(places, run_together(plant, some, count, noise, drawn), strict=True))
     return [found[k] for k in range(len(experiments))]

@@ -16,7 +16,7 @@ from pipelines.errors import InputRejected
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.plant import Plant
-from pipelines.model.simulation.replicas import Noise, run
+from pipelines.model.simulation.replicas import Noise, run_together
 
 __all__ = ["Step", "choose_step"]
 
@@ -89,22 +89,21 @@ def _without_steps(experiment: Experiment) -> Experiment:
 
 def _positions(plant: Plant, stretches: list[Experiment], steps: int) -> list[Array]:
     """True positions (samples, joints) of each stretch; not a number where the arm runs away: the step is too large then."""
-    found = []
-    for stretch in stretches:
+    with np.errstate(all="ignore"):
         try:
-            with np.errstate(all="ignore"):
-                found.append(run(plant, stretch, steps).true_q[0])
+            return [one.true_q[0] for one in run_together(plant, stretches, steps)]
         except (InputRejected, OverflowError):
-            found.append(np.full(stretch.q_ref.shape, np.nan))
-    return found
+            if len(stretches) == 1:
+                return [np.full(stretches[0].q_ref.shape, np.nan)]
+    return [position for stretch in stretches for position in _positions(plant, [stretch], steps)]
 
 
 def _noise_difference(plant: Plant, stretches: list[Experiment], noise: Noise) -> Array:
     """Rms difference [rad] (joints,) of two runs with different noise."""
     if not (noise.torque.any() or noise.position.any()):
         return np.zeros(len(noise.torque))
-    some, others = ([run(plant, stretch, _AMPLE, noise, (seed,)).true_q[0] for stretch in stretches] for seed in (1, 2))
-    return _rms(some, others)
+    both = [one.true_q for one in run_together(plant, stretches, _AMPLE, noise, (1, 2))]
+    return _rms([some for some, _ in both], [other for _, other in both])
 
 
 def _rms(some: list[Array], others: list[Array]) -> Array:
