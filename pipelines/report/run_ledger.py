@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipelines.model.diagnosis.outcome import Extension
-from pipelines.model.diagnosis.result import Diagnosis, Gain
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain
 from pipelines.model.estimation.result import Result as Estimate
 from pipelines.report import style
 from pipelines.report.diagnosis_words import named
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Line", "ledger_lines", "ledger_section"]
 
+_SAME = 0.005  # three digits are shown
 _COLOURS = (style.BLUE, style.VERMILLION, style.GREEN)
 
 
@@ -49,25 +50,58 @@ class Line:
 
 def ledger_lines(group: Group) -> tuple[Line, ...]:
     """Every step that a group's stages have judged on held-out logs, in the order in which the model grows."""
-    return tuple(line for step in group.stages for line in _of(step.result, step.name))
+    lines = list[Line]()
+    for line in (line for step in group.stages for line in _of(step.result, step.name)):
+        if line.before is not None and not any(_alike(above.rms, line.before) for above in lines):
+            lines.append(Line(f"the model of {line.stage}, without it", line.stage, line.before, None, None))
+        lines.append(line)
+    return tuple(lines)
 
 
 def _of(result: Any, stage: str) -> Iterator[Line]:
     if isinstance(result, Estimate):
         yield from _nominal(result, stage)
     elif isinstance(result, Diagnosis):
-        found = [one for one in result.findings if _whole(one.gain)]
-        if found:  # what its gains are counted from: else they would seem to bring what another filter and other friction laws do
-            nominal = tuple(map(float, result.residual_rms.validate))
-            yield Line("rigid body and friction, as diagnose fits them", stage, nominal, None, None)
-        for one in found:
-            yield _with(f"+ {named(one.cause, one.joint)}", stage, one.gain)
+        yield from _found(result, stage)
     elif isinstance(result, Extension) and result.gain is not None and result.findings and _whole(result.gain):
         causes = ", ".join(named(one.cause, one.joint) for one in result.findings)
         whole = _with(f"the model with {causes}, everything refitted", stage, result.gain)
         # the model that is written, as the key figures have it: a finding's own gain is that of the moment it was found
         now, was = (tuple(map(float, one.validate)) for one in (result.after_rms, result.residual_rms))
         yield replace(whole, rms=now, before=was)
+
+
+def _found(result: Diagnosis, stage: str) -> Iterator[Line]:
+    """Every finding below the line that its gain is counted from, which is told where no line above it is that one.
+
+    Most are counted from the model fitted to these logs, and from one another. A load that the base parameters took in is counted
+    from the arm of the reference logs: fitted to these logs, the rigid body holds it already.
+    """
+    waiting = [one for one in result.findings if _whole(one.gain)]
+    nominal: tuple[float, ...] = tuple(map(float, result.residual_rms.validate))
+    last: tuple[float, ...] | None = None
+    while waiting:
+        one = next((one for one in waiting if _alike(_before(one), last or nominal)), waiting[0])
+        waiting.remove(one)
+        if last is None or not _alike(_before(one), last):
+            own = _alike(_before(one), nominal)
+            step = "rigid body and friction, as diagnose fits them" if own else f"the model of diagnose, without {_it(one)}"
+            yield Line(step, stage, _before(one), None, None)
+        yield (line := _with(f"+ {_it(one)}", stage, one.gain))
+        last = line.rms
+
+
+def _it(one: Finding) -> str:
+    return named(one.cause, one.joint)
+
+
+def _before(one: Finding) -> tuple[float, ...]:
+    return tuple(map(float, one.gain.validate_torque_rms.before))
+
+
+def _alike(x: tuple[float, ...], y: tuple[float, ...]) -> bool:
+    """Whether two lines show the same figures."""
+    return bool(np.allclose(x, y, rtol=_SAME))
 
 
 def _nominal(result: Estimate, stage: str) -> Iterator[Line]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.result import Finding, Gain, Rival, TorqueGain, Value
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, Rival, TorqueGain, Value
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_report import finding_section, numbers_section
-from pipelines.report.diagnosis_words import named, spoken, told_values, without_keys
+from pipelines.report.diagnosis_words import held_out_floor, named, spoken, told_values, torque_errors, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
@@ -53,3 +55,18 @@ def test_a_stored_reason_is_read_without_keys() -> None:
         "absorbed by Coulomb friction at joint 1, p3 and torque offset at joint 2")
     assert without_keys("spring and friction stay as they are: 3 of 4") == "spring and friction stay as they are: 3 of 4"
     assert named("payload", None) == "a load at the tip"
+
+
+def test_whether_an_error_is_in_order_is_said() -> None:
+    """Beside what an arm in order leaves: 1.18 times is in order, 9 times is not, and what is mended is told as mended."""
+    now, then = np.array([0.088, 0.27, 0.09]), np.array([0.088, 0.03, 0.08])
+    floor = np.array([0.0746, 0.03, 0.01])
+    nothing: Any = {field.name: None for field in fields(Diagnosis)} | {"floor_origin": "twin"}
+    known = held_out_floor(Diagnosis(**(nothing | {"held_out_floor": floor})))
+    before, after = ResidualRms(now, now, floor), ResidualRms(then, then, floor)
+    table = torque_errors(before, after, (50.0,) * 3, *known)
+    beside = [row[table.columns.index("beside it")] for row in table.rows]
+    assert beside == ["in order, 1.2 ×", "above it, 9 × → in order, 1 ×", "above it, 9 × → above it, 8 ×"]
+    assert "1.3 times" in table.caption
+    noise = held_out_floor(Diagnosis(**(nothing | {"residual_rms": before})))  # noise alone: any arm leaves more at its reversals
+    assert "beside it" not in torque_errors(before, after, (50.0,) * 3, *noise).columns

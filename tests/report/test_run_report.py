@@ -1,10 +1,17 @@
-"""The report of a run can be read to its end: it draws a few logs, and tells of all."""
+"""The report of a run can be read to its end: it draws a few logs, tells of all, and counts each gain from a line that is shown."""
 
 from __future__ import annotations
 
+from dataclasses import fields
+
+import numpy as np
+
+from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
+from pipelines.report.run_ledger import ledger_lines
 from pipelines.report.run_report import run_report
-from pipelines.report.run_result import Result, Step
+from pipelines.report.run_result import Group, Result, Step
 
 
 def of_logs(count: int, figures: int) -> Report:
@@ -32,3 +39,54 @@ def test_a_stage_asked_for_alone_shows_all_it_has() -> None:
     assert sum(len(section.figures) for section in alone.sections) == 32
     steps = tuple(Step(name, 0, object(), of_logs(1, 8), ()) for name in ("inspect", "reconstruct"))
     assert sum(len(section.figures) for section in run_report(Result(steps)).sections) == 16
+
+
+NOMINAL, RIPPLED, CARRYING, BARE = (np.array([error, 0.1]) for error in (0.5, 0.2, 0.18, 0.9))
+
+
+def gained(before: np.ndarray, after: np.ndarray) -> Gain:
+    return Gain(TorqueGain(before, after, np.tile([-0.4, -0.2], (2, 1))), None, "none", None)
+
+
+def finding(cause: str, joint: int | None, origin: str, before: np.ndarray, after: np.ndarray) -> Finding:
+    return Finding(cause, joint, cause, {}, 0.9, 0.9, (), None, gained(before, after), origin, 0.1, 0.01, None)  # type: ignore[arg-type]
+
+
+def told(*findings: Finding, was: np.ndarray = NOMINAL, now: np.ndarray = CARRYING) -> Group:
+    """A run whose diagnosis found these, and whose extension has them all."""
+    bare = {field.name: None for field in fields(Diagnosis)}
+    rms = ResidualRms(NOMINAL, NOMINAL, NOMINAL)
+    diagnosed = Diagnosis(**(bare | {"findings": findings, "residual_rms": rms}))  # type: ignore[arg-type]
+    blank = {field.name: None for field in fields(Extension)}
+    extended = Extension(**(blank | {"findings": findings, "gain": gained(was, now),  # type: ignore[arg-type]
+                                     "residual_rms": ResidualRms(was, was, was), "after_rms": ResidualRms(now, now, now)}))
+    return Group("", tuple(Step(name, 0, result, Report("", ""), ())
+                           for name, result in (("diagnose", diagnosed), ("extend", extended))))
+
+
+RIPPLE = finding("cogging", 2, "residual", NOMINAL, RIPPLED)
+DRAG = finding("quadratic_drag", 1, "residual", RIPPLED, CARRYING)
+LOAD = finding("payload", None, "base parameters", BARE, CARRYING)
+
+
+def test_every_gain_counts_from_a_line_above_it() -> None:
+    """A load's is that over the arm of the reference logs, not over a rigid body that holds it already; whatever is strongest."""
+    for findings, was in (((RIPPLE,), NOMINAL), ((LOAD,), BARE), ((LOAD, RIPPLE), BARE), ((RIPPLE, DRAG), NOMINAL),
+                          ((DRAG, RIPPLE), NOMINAL), ((RIPPLE, LOAD), 2.0 * BARE)):
+        lines = ledger_lines(told(*findings, was=was))
+        for k, line in enumerate(lines):
+            assert line.before is None or any(np.allclose(line.before, above.rms) for above in lines[:k])
+        assert [line.step.startswith("+") for line in lines].count(True) == len(findings)
+
+
+def test_a_load_alone_is_told_beside_the_arm_without_it() -> None:
+    """The model fitted to the loaded arm is no step towards the load: it does not stand in the ledger."""
+    bare, load, extended = ledger_lines(told(LOAD, was=BARE))
+    assert bare.step.endswith("without a load at the tip")
+    assert (bare.rms, load.before, extended.before) == (tuple(BARE),) * 3
+
+
+def test_findings_that_build_on_one_another_stand_in_that_order() -> None:
+    """The drag was found beside the cogging, and is the stronger: the cogging comes first all the same."""
+    steps = [line.step for line in ledger_lines(told(DRAG, RIPPLE))]
+    assert steps[:3] == ["rigid body and friction, as diagnose fits them", "+ cogging at joint 2", "+ quadratic drag at joint 1"]
