@@ -76,7 +76,7 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
     here, more = model.torque(data), []
     as_read = not any(one.effect.misread or one.effect.in_drive for one in model.effects)
     names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
-    for place, _, name in names:
+    for _, place, name in names:
         step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])
         more.append((model.moved(step, [(0, place, name)]).torque(data) - here)[None] / _DIFFERENCE)
     for place, one in enumerate(model.effects):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.slopes import slopes_of
 from pipelines.model.effects.cogging import Cogging
+from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
@@ -44,20 +46,23 @@ _FINE, _RATE, _SECONDS = 8000, 400, 10.0
 _LIBRARY = but("cogging", "torque_lag", "drive_lag", "time_delay", "torque_offset", "asymmetric_friction")
 
 
-def turned(seed: int, waves: Mapping[float, float] = {_ORDER: 0.04}, lag: float = _LAG) -> ExperimentLog:
+def turned(seed: int, waves: Mapping[float, float] = {_ORDER: 0.04}, lag: float = _LAG, mean: float = 0.65,
+           sharpness: float = 30.0) -> ExperimentLog:
     """A rotor that turns once in ten seconds, unevenly: its torque, and what a low-pass leaves of it in the log.
 
     Args:
         waves: amplitude [N m] of each order.
+        mean: speed [rad/s].
+        sharpness: [s/rad] of its Coulomb friction.
     """
     rng = np.random.default_rng(seed)
     t = np.arange(int(_FINE * _SECONDS)) / _FINE
     rates, phases = 2.0 * np.pi * np.array([0.7, 1.6, 3.1, 5.3]), rng.uniform(0.0, 2.0 * np.pi, 4)
     size = np.array([0.4, 0.4, 0.5, 0.5]) * 0.4  # [rad/s]
-    q = 0.65 * t + sum(a / w * np.sin(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
-    dq = 0.65 + sum(a * np.cos(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
+    q = mean * t + sum(a / w * np.sin(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
+    dq = mean + sum(a * np.cos(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
     ddq = sum(-a * w * np.sin(w * t + p) for a, w, p in zip(size, rates, phases, strict=True))
-    tau = _INERTIA * ddq + 0.01 * np.tanh(30.0 * dq) + 0.004 * dq
+    tau = _INERTIA * ddq + 0.01 * np.tanh(sharpness * dq) + 0.004 * dq
     tau += sum(amplitude * np.sin(order * q + 0.4) for order, amplitude in waves.items())
     late = lsim(([1.0], [lag, 1.0]), tau, t, X0=[tau[0] * lag])[1] if lag else tau
     every = _FINE // _RATE
@@ -95,6 +100,23 @@ def test_slopes_of_a_model_behind_a_lag_are_those_of_its_torque(found: Found) ->
         shift[k] = step = 1e-3 * (abs(model.beta[k]) or 1.0)
         moved = (model.moved(shift, list(done.names)).torque(data) - model.torque(data)) / step
         assert np.linalg.norm(moved - done.slopes[k]) < 1e-6 * np.linalg.norm(moved)
+
+
+def test_sharpness_of_each_joint_is_found_behind_a_lag() -> None:
+    """Of two rotors at right angles, whose friction changes sign over 1/30 and over 1/90 rad/s, the second one's torque is logged
+    late."""
+    first, second = turned(1, {}, lag=0.0, mean=0.1), turned(2, {}, mean=0.1, sharpness=90.0)
+    both = {"q": np.column_stack([first.q, second.q]), "tau": np.column_stack([first.tau, second.tau])}
+    signals = {name: replace(signal, values=both.get(name, signal.values)) for name, signal in first.signals.items()}
+    joint = _ROBOT[_ROBOT.index("[[joint]]"):]
+    robot = _ROBOT.replace("alpha = 0.0", "alpha = 1.5707963267948966") + joint.replace("rotor", "other")
+    log = replace(first, signals=signals, robot_text=robot)
+    prepared = prepare(Logs((log,)), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    done = refine(Exact.start(columns, fit).with_effect(TorqueLag(joint=2), np.array([_LAG])), prepared.data, fit.weight, steps=30)
+    assert done.model.effects[0].values["time_constant"] == pytest.approx(_LAG, rel=0.005)
+    found = [law.sharpness for law in done.model.columns.laws if isinstance(law, Coulomb)]
+    assert found == pytest.approx([30.0, 90.0], rel=0.02)
 
 
 def test_slopes_of_a_ripple_behind_a_lag_are_taken_where_the_joint_truly_is() -> None:
