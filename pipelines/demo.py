@@ -4,7 +4,7 @@ Reads    nothing
 Writes   logs/, result.json with what was hidden in them, report.html
 Source   Kostić et al. 2004, eq. (22) for the motion, Section III for the arm; causes.md for what can be hidden
 
-`rrrid demo` runs the whole workflow on these logs and says then what was hidden.
+`rrrid demo` runs the whole workflow on these logs, and ends in what was hidden beside what was found.
 """
 
 from __future__ import annotations
@@ -16,13 +16,17 @@ from pipelines.errors import UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.results import NOT_STORED
+from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
+from pipelines.report.diagnosis_words import in_order, named, spoken, told_values
 from pipelines.report.report import Report, Section, Table
-from pipelines.report.style import format_number, format_unit
+from pipelines.report.style import format_number, unit_in_words
 from pipelines.stage import Inputs, Request, Stage
 
-__all__ = ["STAGE", "Recorded", "Result", "Settings", "compute", "hidden", "report"]
+__all__ = ["STAGE", "Recorded", "Result", "Settings", "compute", "ending", "hidden", "report"]
+
+_NUMBERS = 3  # of a finding whose numbers nobody has chosen
 
 
 @dataclass(frozen=True)
@@ -85,19 +89,41 @@ def hidden(result: Result) -> str:
 
 
 def _in_words(fault: str) -> str:
-    name, *rest = fault.split(":")
-    kind = find_effect(name)
-    units = {q.name: _unit(q.unit) for q in kind.parameters}
-    place = "".join(f" at joint {part}" for part in rest if "=" not in part)
-    given = dict(pair.split("=") for part in rest if "=" in part for pair in part.split(",") if pair.strip())
-    numbers = ", ".join(f"{key.strip().replace('_', ' ')} {format_number(float(value))}{units[key.strip()]}"
-                        for key, value in given.items())
-    return f"{kind.title[:1].lower()}{kind.title[1:]}{place} ({numbers})"
+    cause, joint = _place(fault)
+    units = {q.name: unit_in_words(q.unit) for q in find_effect(cause).parameters}
+    numbers = ", ".join(f"{spoken(key)} {format_number(float(value))} {units[key]}".strip() for key, value in _given(fault).items())
+    return f"{named(cause, joint)} ({numbers})"
 
 
-def _unit(unit: str) -> str:
-    """Behind a number in a sentence: " N m", " per rev", nothing for a ratio."""
-    return "" if unit == "1" else f" per {unit[2:]}" if unit.startswith("1/") else f" {format_unit(unit)}"
+def _place(fault: str) -> tuple[str, int | None]:
+    """The cause and its joint."""
+    cause, *rest = fault.split(":")
+    return cause, next((int(part) for part in rest if part and "=" not in part), None)
+
+
+def _given(fault: str) -> dict[str, str]:
+    """The numbers of a fault, as they were given."""
+    pairs = (pair.split("=") for part in fault.split(":") if "=" in part for pair in part.split(",") if pair.strip())
+    return {key.strip(): value for key, value in pairs}
+
+
+def ending(result: Result, found: Diagnosis | None) -> tuple[str, str]:
+    """What was hidden beside what was found, a line each; `found`: the diagnosis of the logs, None where none was made."""
+    return f"Was hidden: {hidden(result)}.", f"Was found:  {_found(result, found)}."
+
+
+def _found(result: Result, found: Diagnosis | None) -> str:
+    if found is None:
+        return "nobody has looked, for diagnose was left out"
+    if found.verdict == "nothing-wrong":
+        return "nothing"
+    asked = {_place(fault): _given(fault) for fault in result.fault}
+    told = []
+    for one in found.findings:
+        names = asked.get((one.cause, one.joint), {})
+        shown = [(name, value) for name, value in in_order(one.cause, one.parameters) if name in names or not names][:_NUMBERS]
+        told.append(f"{named(one.cause, one.joint)} ({told_values(shown)})")
+    return "; ".join(told) or "something that has no name here"
 
 
 def report(result: Result) -> Report:

@@ -12,7 +12,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Diagnosis, ResidualRms, Value
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.report import Table
-from pipelines.report.style import format_number, format_unit, to_one_place, with_std
+from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
 __all__ = ["cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "meaning_of", "named",
            "per_joint", "spoken", "title_of", "told_value", "told_values", "torque_errors", "unit_or_dash", "without_keys"]
@@ -91,8 +91,8 @@ def told_value(value: Value) -> str:
 
 
 def told_values(named: Iterable[tuple[str, Value]]) -> str:
-    """"order 18 1/rev, exponent 2": names, values and units in one line; a pure number has no unit to show."""
-    return ", ".join(f"{spoken(name)} {told_value(value)} {'' if value.unit == '1' else format_unit(value.unit)}".strip()
+    """"order 18 per rev, exponent 2": names, values and units in one line; a pure number has no unit to show."""
+    return ", ".join(f"{spoken(name)} {told_value(value)} {unit_in_words(value.unit)}".strip()
                      for name, value in named)
 
 
@@ -165,5 +165,7 @@ def _judged(errors: Sequence[float], floor: float) -> str:
     """Whether an error is in order, and how many times what an arm in order leaves it is: now, then extended."""
     if not floor > 0.0:
         return "–"
-    told = [f"{'in order' if error <= _ORDER * floor else 'above it'}, {format_number(error / floor, 2)} ×" for error in errors]
-    return " → ".join(dict.fromkeys(told))
+    told = [("in order" if error <= _ORDER * floor else "above it", f"{format_number(error / floor, 2)}×") for error in errors]
+    if told[0][0] == told[-1][0] == "in order":
+        return f"in order, {told[-1][1]}"
+    return " → ".join(f"{words}, {times}" for words, times in dict.fromkeys(told))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BLACK", "BLUE", "COLOURS", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILLION", "figure_style",
            "format_decimals", "format_number", "format_unit", "log_ticks", "prepare_matplotlib", "printable", "to_one_place",
-           "with_std"]
+           "unit_in_words", "with_std"]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BLACK: Final = "#1a1f24"
@@ -71,6 +71,11 @@ def printable(text: object, limit: int = 400) -> str:
 def format_unit(unit: str) -> str:
     """A unit as people read it: "rad/s^4" becomes "rad/s⁴"."""
     return re.sub(r"\^(-?[0-9]+)", lambda power: power[1].translate(_RAISED), printable(unit, 40))
+
+
+def unit_in_words(unit: str) -> str:
+    """A unit behind a number in a sentence: "per rev" for "1/rev", nothing for a pure number."""
+    return "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else format_unit(unit)
 
 
 def format_number(value: float | None, digits: int = 4) -> str:

@@ -13,9 +13,9 @@ from rrrid_cli.console import Teller, say_outcome
 from rrrid_cli.options import Common, Roles, StageGroup
 
 if TYPE_CHECKING:
-    from pipelines.stage import Request
+    from pipelines.stage import Outcome, Request
 
-__all__ = ["STAGES", "app", "asked", "go"]
+__all__ = ["STAGES", "app", "asked", "done", "go"]
 
 STAGES = ("run", "inspect", "import", "convert", "fit-friction", "reconstruct", "estimate-bps", "simulate", "design-excitation",
           "validate-writing", "frf", "diagnose", "extend", "compare", "demo")
@@ -42,7 +42,13 @@ def about(
 
 def go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],
        fallback: dict[str, Any] | None = None, roles: Roles | None = None) -> None:
-    """Run one stage as the options say, print its outcome, and end with its exit code.
+    """Run one stage as the options say, print its outcome, and end with its exit code."""
+    raise typer.Exit(done(stage, paths, common, given, fallback, roles).exit_code)
+
+
+def done(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],
+         fallback: dict[str, Any] | None = None, roles: Roles | None = None) -> Outcome[Any]:
+    """Run one stage as the options say, and print its outcome.
 
     Args:
         given: the command's own options; None means: not given.
@@ -57,7 +63,7 @@ def go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any
     finally:
         teller.done()
     say_outcome(outcome, as_json=common.json, quiet=common.quiet, verbose=common.verbose)
-    raise typer.Exit(outcome.exit_code)
+    return outcome
 
 
 def asked(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],

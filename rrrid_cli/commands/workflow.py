@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from rrrid_cli.batch import BatchCommand, batch
-from rrrid_cli.commands.application import app, asked, go
+from rrrid_cli.commands.application import app, asked, done, go
 from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, with_common, with_common_but
 
 __all__ = ["batch", "demo", "run"]
@@ -71,9 +71,17 @@ def demo(
     if not common.quiet:
         print(f"Simulated {len(recorded.result.logs)} logs into {out / 'recording/logs'}; now: rrrid run {out / 'recording'}",
               file=sys.stderr)
+    hidden, stream = recording.hidden(recorded.result), sys.stderr if common.json else sys.stdout
     try:
-        go(workflow.STAGE, (out / "recording",), replace(common, out=out / "run"), {})
-    finally:
+        outcome = done(workflow.STAGE, (out / "recording",), replace(common, out=out / "run"), {})
+    except BaseException:
         if not common.quiet:
-            hidden = recording.hidden(recorded.result)
-            print(f"What had been hidden: {hidden}. With logs of your own: rrrid run FOLDER", file=sys.stderr)
+            print(f"Hidden was: {hidden}.", file=sys.stderr)
+        raise
+    if not common.quiet:
+        print(*recording.ending(recorded.result, outcome.result.diagnosis), sep="\n", file=stream)
+        report = outcome.folder / "report.html"
+        print(f"Report:     {report if report.exists() else 'none was asked for'}", file=stream)
+        print("Next:       rrrid run FOLDER, on logs of your own; rrrid import --guess FILE drafts what makes logs of recordings",
+              file=stream)
+    raise typer.Exit(outcome.exit_code)

@@ -6,11 +6,15 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from pipelines import demo
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Value
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.simulation.example import FAULT, example_arm, example_session
 from tests.cli.commands import REPO, rrrid
@@ -29,11 +33,14 @@ def test_the_hidden_fault_is_in_the_logs() -> None:
 
 
 def test_logs_and_what_was_hidden(tmp_path: Path) -> None:
-    """Logs that rrrid run takes, the run beside them, and the answer in the last line."""
+    """Logs that rrrid run takes, the run beside them; the end says what was hidden, what was found, and what to do next."""
     done = rrrid("demo", *QUICK, "--fault", "quadratic_drag:3:coefficient=0.1", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stderr.splitlines()[-1].startswith(
-        "What had been hidden: quadratic drag at joint 3 (coefficient 0.1 N m s²/rad²).")
+    told, found, report, next_ = done.stdout.splitlines()[-4:]
+    assert told == "Was hidden: quadratic drag at joint 3 (coefficient 0.1 N m s²/rad²)."
+    assert found.startswith("Was found: ")
+    assert report.split(maxsplit=1) == ["Report:", "none was asked for"]
+    assert "rrrid run FOLDER" in next_
     assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == ["recording", "run"]
     assert len(list((tmp_path / "demo/recording/logs").iterdir())) == 3
     assert json.loads((tmp_path / "demo/run/result.json").read_text())["stages"][0]["name"] == "inspect"
@@ -49,6 +56,23 @@ def test_without_mujoco_and_network(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(REPO)}, text=True,
                           capture_output=True, check=False, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_the_end_lays_what_was_found_beside_what_was_hidden() -> None:
+    """The same numbers of both, with their deviations; nothing, what has no name, and no diagnosis are told apart."""
+    recorded = demo.Result("arm", ("cogging:2:order=18,amplitude=0.4",), ())
+    numbers = {name: Value(value, 0.002, unit) for name, value, unit in
+               (("amplitude", 0.399, "N m"), ("order", 18.001, "1/rev"), ("phase", 1.0, "rad"), ("amplitude_2", 0.1, "N m"))}
+    bare: Any = {field.name: None for field in fields(Finding)}
+    one = Finding(**(bare | {"cause": "cogging", "joint": 2, "parameters": numbers}))
+
+    def end(verdict: str, *findings: Finding) -> str:
+        nothing: Any = {field.name: None for field in fields(Diagnosis)}
+        return demo.ending(recorded, Diagnosis(**(nothing | {"verdict": verdict, "findings": findings})))[1]
+
+    assert demo.ending(recorded, None)[0] == "Was hidden: cogging at joint 2 (order 18 per rev, amplitude 0.4 N m)."
+    assert end("cause", one) == "Was found:  cogging at joint 2 (order 18.0010 ± 0.0020 per rev, amplitude 0.3990 ± 0.0020 N m)."
+    assert len({end("nothing-wrong"), end("unknown"), demo.ending(recorded, None)[1]}) == 3
 
 
 @pytest.mark.slow
