@@ -61,12 +61,15 @@ class Ledger:
         return self.folder / f"{slug}.json"
 
     def put(self, record: Record) -> None:
-        """Write it in one step. Not flushed to the disk: what a power cut loses is done again."""
+        """Write it in one step. Not flushed to the disk: what a power cut loses is done again.
+
+        Figures keep their order, which is that of a run's stages: of one that several stages fit, the last counts.
+        """
         path = self.path(record.slug)
         draft = path.with_name(f".rrrid-tmp-{path.name}"[:250])
         with environment_faults(path):
             self.folder.mkdir(parents=True, exist_ok=True)
-            draft.write_text(json.dumps(dataclasses.asdict(record), sort_keys=True, indent=1) + "\n", encoding="ascii")
+            draft.write_text(json.dumps(dataclasses.asdict(record), indent=1) + "\n", encoding="ascii")
             os.replace(draft, path)
 
     def get(self, item: Item) -> Record | None:

@@ -11,7 +11,10 @@ import pytest
 
 from pipelines import inspect
 from pipelines.batch.batch import Wanted, run_batch
+from pipelines.batch.drift import drift_of
+from pipelines.batch.items import Item
 from pipelines.batch.plan import Options, Plan, plan_key, plan_text, read_plan
+from pipelines.batch.record import Ledger, Record
 from pipelines.log.files import write_log
 from pipelines.stage import Request, run_stage
 from tests.batch.conftest import Lay, contents, obey
@@ -80,6 +83,21 @@ def test_a_torn_ledger_is_no_ledger(lay: Lay) -> None:
     record.write_text(record.read_text()[:100])
     obey(root, resume=True)
     assert (contents(out), _kept(out)) == (whole, 1)
+
+
+def test_a_record_that_was_kept_says_what_it_said_at_once(tmp_path: Path) -> None:
+    """P07: the same figures in the same order, and so the same drift, and the same stage to hold against a baseline."""
+    said = ("reconstruct noise", "estimate-bps p10", "estimate-bps p2", "estimate-bps p1", "diagnose cogging joint 2 amplitude")
+    first, second = (Record(name, name, "ok", 0, figures=dict.fromkeys(said, (value, 0.1, "N m")), recorded=name,
+                            residuals={f"{one} rms": (value, "N m") for one in said}) for name, value in (("a", 1.0), ("b", 2.0)))
+    ledger = Ledger(tmp_path)
+    for record in (first, second):
+        ledger.put(record)
+    kept = [ledger.get(Item(name, (), ())) for name in "ab"]
+    assert kept == [first, second]
+    at_once, resumed = (drift_of(records)[0] for records in ([first, second], [one for one in kept if one is not None]))
+    assert [course.name for course in at_once.figures] == [course.name for course in resumed.figures] == list(said)
+    assert [course.name for course in at_once.residuals] == [course.name for course in resumed.residuals]
 
 
 def test_items_that_are_gone_leave_nothing_behind(lay: Lay) -> None:
