@@ -6,7 +6,6 @@ Run by name: pytest -m slow tests/batch/test_whole_run.py
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from contextlib import ExitStack
 from pathlib import Path
@@ -34,7 +33,7 @@ def root(tmp_path: Path) -> Path:
     for name, (folder, logs) in FOLDERS.items():
         (tmp_path / "root" / name).mkdir(parents=True)
         for log in logs:
-            os.link(SAMPLES / folder / f"{log}.h5", tmp_path / "root" / name / f"{log}.h5")
+            shutil.copy(SAMPLES / folder / f"{log}.h5", tmp_path / "root" / name)
     return tmp_path / "root"
 
 
