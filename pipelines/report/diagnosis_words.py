@@ -165,7 +165,7 @@ def _judged(errors: Sequence[float], floor: float) -> str:
     """Whether an error is in order, and how many times what an arm in order leaves it is: now, then extended."""
     if not floor > 0.0:
         return "–"
-    told = [("in order" if error <= _ORDER * floor else "above it", f"{format_number(error / floor, 2)}×") for error in errors]
-    if told[0][0] == told[-1][0] == "in order":
-        return f"in order, {told[-1][1]}"
-    return " → ".join(f"{words}, {times}" for words, times in dict.fromkeys(told))
+    fine = [error <= _ORDER * floor for error in errors]
+    times = [f"{format_number(error / floor, 2)}×" for error in errors]
+    shown = " → ".join(dict.fromkeys(times[-1:] if fine[0] and fine[-1] else times))
+    return f"{shown}, {'in order' if fine[-1] else 'above it'}"

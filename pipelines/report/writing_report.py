@@ -9,6 +9,7 @@ import numpy as np
 
 from pipelines.model.writing.cases import Case
 from pipelines.model.writing.design import Designed
+from pipelines.model.writing.first_validation import FirstValidation, Largest
 from pipelines.model.writing.result import Result
 from pipelines.report.bps import torque_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
@@ -124,9 +125,7 @@ def _where_section(result: Result) -> Section:
     log = result.logs[0]
     kinds = {"letters": f"letters, read back from the reference: '{log.text}'", "strokes": "stretches between standstills",
              "time": "stretches of time"}
-    worst = [f"{result.joints[one.joint - 1]}: most in {one.label} ({format_number(one.rms, 2)} {log.torque_units[one.joint - 1]} "
-             f"rms), up to {format_number(one.error, 2)} {log.torque_units[one.joint - 1]} at {format_number(one.t, 4)} s, tip at "
-             f"({', '.join(f'{x:.3f}' for x in one.tip)}) m." for one in log.largest]
+    worst = [_worst(log, one, result.joints[one.joint - 1]) for one in log.largest]
     text = (f"By {kinds[log.marks]}. Log {log.name}, after the low-pass.", *worst)
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (one.label, one.start, one.end, *(_short(100 * x) for x in one.relative_error)) for one in log.letters[:_MOST_LETTERS])
@@ -134,6 +133,25 @@ def _where_section(result: Result) -> Section:
                   "What the model leaves in each, rms, over the torque of the whole log.")
     figure = error_map_figure(log, result.joints)
     return Section("Where the torque is missed", text, (table,), () if figure is None else (figure,))
+
+
+def _worst(log: FirstValidation, one: Largest, joint: str) -> str:
+    """Where the model of one joint misses most: the stretch, and its largest sample, where that is one that says anything."""
+    unit = log.torque_units[one.joint - 1]
+    said = f"{joint}: most in {one.label} ({format_number(one.rms, 2)} {unit} rms)"
+    size, at = f"{format_number(abs(one.error), 2)} {unit}", f"{format_number(one.t, 4)} s"
+    if end := _at_the_edge(log, one.t):
+        return (f"{said}. Its largest sample, {size} at {at}, stands within one period of the low-pass of the {end} of the log: "
+                "there filter and smoother see one side only, and it says nothing of the model.")
+    return f"{said}, up to {size} at {at}, tip at ({', '.join(f'{x:.3f}' for x in one.tip)}) m."
+
+
+def _at_the_edge(log: FirstValidation, t: float) -> str:
+    """Which end of the log `t` [s] is nearer to than one period of the low-pass: "beginning", "end" or "" for none."""
+    if log.low_pass_hz is None or not log.letters:
+        return ""
+    near = 1.0 / log.low_pass_hz
+    return "beginning" if t - log.letters[0].start < near else "end" if log.letters[-1].end - t < near else ""
 
 
 def _online_section(result: Result) -> Section:

@@ -66,7 +66,7 @@ def test_whether_an_error_is_in_order_is_said() -> None:
     before, after = ResidualRms(now, now, floor), ResidualRms(then, then, floor)
     table = torque_errors(before, after, (50.0,) * 3, *known)
     beside = [row[table.columns.index("beside it")] for row in table.rows]
-    assert beside == ["in order, 1.2×", "above it, 9× → in order, 1×", "above it, 9× → above it, 8×"]
+    assert beside == ["1.2×, in order", "9× → 1×, in order", "9× → 8×, above it"]
     assert "1.3 times" in table.caption
     noise = held_out_floor(Diagnosis(**(nothing | {"residual_rms": before})))  # noise alone: any arm leaves more at its reversals
     assert "beside it" not in torque_errors(before, after, (50.0,) * 3, *noise).columns

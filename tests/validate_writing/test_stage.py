@@ -49,6 +49,18 @@ def plain(writing: ExperimentLog, tmp_path_factory: pytest.TempPathFactory) -> O
     return validated(tmp_path_factory.mktemp("plain"), {"w": writing}, Settings("rrr", torque_gate=0.5, draws=1))
 
 
+def test_the_ends_of_a_log_are_no_place_where_a_model_is_worst(plain: Outcome[Result]) -> None:
+    """Within one period of the low-pass a filter sees one side: the largest sample there is told as one that says nothing."""
+    first = replace(plain.result.logs[0], low_pass_hz=20.0)
+    end = first.letters[-1].end
+    for t, says in ((end, False), (end - 0.04, False), (end - 0.06, True), (0.5 * end, True), (0.01, False)):
+        logs = (replace(first, largest=tuple(replace(one, t=t) for one in first.largest)), *plain.result.logs[1:])
+        sections = validate_writing.report(replace(plain.result, logs=logs)).sections
+        said = next(section.text for section in sections if section.title == "Where the torque is missed")[1:]
+        assert len(said) == 3
+        assert all(("tip at" in line) is says and ("says nothing of the model" in line) is not says for line in said)
+
+
 def test_what_the_contract_promises(plain: Outcome[Result]) -> None:
     """torque, cases and simulation with their keys, and derived logs with the model's torque."""
     told = json.loads((plain.folder / "result.json").read_text())
