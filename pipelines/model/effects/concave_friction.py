@@ -2,29 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ConcaveFriction"]
 
+_ROUND = 2.0  # Carreau's knee, from which a refit starts
+_NONE = 1e-6  # of a knee
+_BLUNTEST = 0.3  # below it levels off over many decades: no recorded speeds tell that from a line and a step
+
 
 @dataclass(frozen=True)
 class ConcaveFriction(Effect):
-    """τ = A tanh(v/v_0), beside Coulomb and viscous friction: v_0 lies well above the speeds at which Coulomb friction turns."""
+    """τ = A tanh(v/v_0), or A x (1 + |x|^a)^(-1/a), x = v/v_0, beside Coulomb and viscous friction.
+
+    The second is the shear of a lubricant whose viscosity falls as 1/|v| far above v_0: Yasuda, Armstrong & Cohen 1981, with the
+    knee a; a = 2 is Carreau 1972, and the smaller a, the more gradually it levels off. v_0 lies well above the speeds at which
+    Coulomb friction turns.
+    """
 
     speed: float = 1.0  # v_0 [rad/s]
+    knee: float = 0.0  # a, held where it is 0: tanh
 
     name = "concave_friction"
     title = "Concave friction"
     parameters = (
         Quantity("amplitude", "N m", 0.0, 20.0, "torque at which it levels off"),
         Quantity("speed", "rad/s", 0.01, 20.0, "speed at which it levels off", shape=True),
+        Quantity("knee", "1", 0.0, 6.0, "how abruptly it levels off; 0: as tanh does", shape=True, unsaid=0.0),
     )
     signature = "Friction that rises with speed and then levels off, the same in both directions."
     explanation = "Lubricant that thins as it is sheared, and churning in gears: common in geared and lubricated joints."
@@ -35,7 +47,8 @@ class ConcaveFriction(Effect):
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, np.tanh(self.own(motion.dq) / self.speed))
+        x = self.own(motion.dq) / self.speed
+        return self.on_own_row(arm, np.tanh(x) if self.knee < _NONE else x * (1.0 + np.abs(x) ** self.knee) ** (-1.0 / self.knee))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """v_0 over a decade and a half below the fastest speed: beyond it is viscous friction."""
@@ -43,5 +56,24 @@ class ConcaveFriction(Effect):
         for speed in np.geomspace(fast / 30.0, fast, 8).tolist():
             yield replace(self, speed=float(np.clip(speed, 0.01, 20.0)))
 
-    def speed_curve(self, values: Values) -> SpeedCurve:
+    @property
+    def free(self) -> tuple[str, ...]:
+        return tuple(name for name in super().free if name != "knee" or self.knee >= _NONE)
+
+    def possible(self, values: Values) -> bool:
+        return super().possible(values) and not _NONE <= values["knee"] < _BLUNTEST
+
+    def forms(self) -> tuple[Self, ...]:
+        return (replace(self, knee=_ROUND),)
+
+    def own_load(self, values: Values) -> OwnLoad | None:
+        amplitude, slow, knee = self.amplitudes(values).item(), 1.0 / values["speed"], values["knee"]
+        if knee < _NONE:
+            return None
+        power = -1.0 / knee
+        return lambda angle, speed: amplitude * slow * speed * math.pow(1.0 + abs(slow * speed) ** knee, power)
+
+    def speed_curve(self, values: Values) -> SpeedCurve | None:
+        if values["knee"] >= _NONE:
+            return None
         return SpeedCurve(heights=(self.amplitudes(values).item(),), sharpnesses=(1.0 / values["speed"],))
