@@ -45,7 +45,7 @@ def fitted(law: Callable[[Array], Array]) -> tuple[ConcaveFriction, float]:
     (lambda v: AMPLITUDE * np.tanh(v / SPEED), 1e-6),
     (lambda v: AMPLITUDE * v / (v + SPEED), 1e-6),
     (lambda v: AMPLITUDE * v / np.sqrt(np.square(v) + SPEED**2), 1e-6),
-    (lambda v: AMPLITUDE * -np.expm1(-v / SPEED), 0.02),
+    (lambda v: AMPLITUDE * np.arctan(v / SPEED) / (0.5 * np.pi), 0.03),
 ], ids=["tanh", "Cross 1965", "Carreau 1972", "none of these"])
 def test_a_law_fitted_to_some_speeds_holds_at_others(law: Callable[[Array], Array], left: float) -> None:
     """Torque within `left` of the amplitude, at speeds up to nearly three times the fastest of the fit."""
