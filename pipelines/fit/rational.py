@@ -91,10 +91,10 @@ class Rational:
         """[s], beside that of the hold."""
         return Known(float(self.parameters[1] / self.unit), float(np.sqrt(self.covariance[1, 1]) / self.unit))
 
-    def modes(self) -> tuple[Mode, ...]:
-        """Complex pairs whose frequency lies in the band of the fit."""
+    def modes(self, beyond: float = 1.0) -> tuple[Mode, ...]:
+        """Complex pairs whose frequency lies in the band of the fit, or up to `beyond` times its upper end."""
         found = [self._mode(k) for k in range(self.zeros + self.poles)]
-        inside = [m for m in found if m is not None and self.band[0] <= m.frequency.value <= self.band[1]]
+        inside = [m for m in found if m is not None and self.band[0] <= m.frequency.value <= beyond * self.band[1]]
         marked = [Mode(m.kind, m.frequency, m.damping, not any(_same(m, o) for o in inside if o.kind != m.kind)) for m in inside]
         return tuple(sorted(marked, key=lambda m: m.frequency.value))
 

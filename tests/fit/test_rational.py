@@ -55,6 +55,17 @@ def test_four_modes_a_delay_and_two_plateaus_are_found() -> None:
     assert np.mean(np.square(deviations)) == pytest.approx(1.0, abs=0.5)
 
 
+def test_the_flank_of_a_resonance_above_the_band_tells_where_it_is() -> None:
+    """An antiresonance at 75 Hz, a resonance at 210 Hz, seen up to 180 Hz with 2 % noise."""
+    w = 2.0 * np.pi * np.array([75.0, 210.0])
+    _, truth = signal.freqs([1.0 / w[0]**2, 0.06 / w[0], 1.0], [1.0 / w[1]**2, 0.2 / w[1], 1.0], 2.0 * np.pi * FREQUENCY)
+    found = fit_rational(FREQUENCY, *_noisy(np.asarray(truth), 0.02, np.random.default_rng(3)))
+    assert [m.kind for m in found.modes()] == ["antiresonance"]
+    _, above = found.modes(1.25)
+    assert above.kind == "resonance"
+    assert abs(above.frequency.value - 210.0) < 4.0 * above.frequency.std < 12.0
+
+
 @pytest.mark.parametrize("delay", [0.0, -5e-4, 4e-3])
 def test_a_rigid_plant_has_no_modes(delay: float) -> None:
     """A held and sampled double integrator, late or not, as scipy samples it: gain, delay and nothing else, at any noise."""
