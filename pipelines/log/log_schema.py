@@ -24,6 +24,22 @@ _ATTRIBUTES: Final[dict[str, Any]] = {
     "torque": {"enum": list(schema.TORQUE_KINDS)}, "recorded": {"type": "string", "description": "ISO 8601, UTC"},
     "joint": {"type": "integer", "minimum": 1}, "posture": _REALS, "period": {"type": "number", "exclusiveMinimum": 0}}
 _REQUIRED: Final = ("name", "experiment", "role", "origin", "robot_name", "sample_time")
+_ABOUT: Final = {
+    "format": "what kind of file this is", "format_version": "version of the format",
+    "digest": "SHA-256 over all samples and attributes: a flipped byte is noticed",
+    "controller": "the controller that was in charge", "derived": "of a log that a command has made of another",
+    "name": "name, as results and reports have it",
+    "experiment": "what was done", "role": "what it serves for", "origin": "measured, simulated or planned",
+    "robot_name": "name of the robot", "sample_time": "[s] between samples",
+    "torque": "held-command, what was commanded and held; or measured",
+    "joint": "number of the one joint that moves, from 1", "posture": "[rad, m] where the joints stand",
+    "period": "[s] of the motion",
+    "law": "control law", "kp": "[N m/rad] or [1/s^2] gain of position, joint by joint", "kd": "[N m s/rad] or [1/s] gain of speed",
+    "ki": "[N m/(rad s)] or [1/s^3] gain of the integral", "feedforward": "what is fed forward",
+    "velocity": "where its speed comes from",
+    "observer_gain": "gains of the observer, one row a joint", "output_limit": "[N m] largest torque commanded, joint by joint",
+    "torque_resolution": "[N m] step of the commanded torque", "delay": "samples from measurement to command",
+    "command": "the command that has made it", "source_sha256": "SHA-256 of the file it was made of", "created": "ISO 8601, UTC"}
 _MATRIX: Final = {"type": "array", "items": {"anyOf": [_REAL, _REALS]}}
 
 
@@ -38,7 +54,8 @@ def log_schema() -> dict[str, Any]:
     derived = _object({"command": _WORDS, "settings": {"type": "string", "description": "JSON"}, "source_sha256": _WORDS,
                        "created": _WORDS}, ("command", "settings", "source_sha256", "created"))
     signals = {"type": "object", "additionalProperties": False, "properties": {
-        name: _object({"units": {"type": "string"}, "long_name": {"type": "string"}}, ("units", "long_name"),
+        name: _object({"units": {"type": "string", "description": "unit of the samples"},
+                       "long_name": {"type": "string", "description": "what it is, in words"}}, ("units", "long_name"),
                       f"{words}; SI: {_unit(name)}") for name, (_, words) in (schema.SIGNALS | schema.DERIVED).items()}}
     whole = _object({
         "format": {"const": schema.FORMAT}, "format_version": {"const": schema.FORMAT_VERSION},
@@ -56,4 +73,5 @@ def _unit(name: str) -> str:
 
 def _object(properties: dict[str, Any], required: Iterable[str], about: str = "") -> dict[str, Any]:
     told = {"description": about} if about else {}
+    properties = {name: {"description": _ABOUT[name]} | own if name in _ABOUT else own for name, own in properties.items()}
     return {"type": "object", **told, "properties": properties, "required": list(required), "additionalProperties": False}

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NoReturn
 
 from pipelines.errors import InputRejected, did_you_mean
 from pipelines.log.atomic import write_file
+from pipelines.log.field_words import words_of
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -129,6 +130,10 @@ def model_schema() -> dict[str, Any]:
     schema = _adapter().json_schema(mode="validation")
     # A default serves those who build a model; in the file these must stand.
     schema["required"] = ["format", "format_version", *schema["required"]]
+    kinds = {kind.__name__: kind for kind in (StoredParameter, StoredValue, StoredEffect, Source, Validity)}
+    for kind, told in ((ModelFile, schema), *((kinds[name], told) for name, told in schema["$defs"].items())):
+        for name, words in words_of(kind).items():
+            told["properties"][name].setdefault("description", words)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

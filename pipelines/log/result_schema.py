@@ -14,14 +14,16 @@ from typing import Any, Final
 
 import numpy as np
 
+from pipelines.log.field_words import words_of
+
 __all__ = ["DRAFT", "object_schema", "result_schema"]
 
 DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
 _PLAIN: Final[dict[Any, dict[str, Any]]] = {
     bool: {"type": "boolean"}, int: {"type": "integer"}, str: {"type": "string"}, Path: {"type": "string"},
     float: {"type": ["number", "null"], "description": "null: infinite or undefined"}, type(None): {"type": "null"}}
-_SERIES = {"type": "object", "properties": {"$series": {"type": "string"}}, "required": ["$series"], "additionalProperties": False,
-           "description": "the place of a long series in result.h5"}
+_SERIES = {"type": "object", "properties": {"$series": {"type": "string", "description": "its place"}}, "required": ["$series"],
+           "additionalProperties": False, "description": "the place of a long series in result.h5"}
 _ARRAY = {"anyOf": [{"type": ["number", "null"]}, {"type": "array", "items": {"$ref": "#/$defs/numbers"}}]}
 
 _Defs = dict[str, Any]
@@ -31,7 +33,7 @@ def result_schema(kind: type[Any], command: str) -> dict[str, Any]:
     """The schema of the result.json of `command`, whose result is a `kind`."""
     defs: _Defs = {"numbers": _ARRAY, "series": _SERIES}
     whole = _object(kind, defs)
-    whole["properties"] = {"command": {"const": command}} | whole["properties"]
+    whole["properties"] = {"command": {"const": command, "description": "the command that has left this"}} | whole["properties"]
     whole["required"] = ["command", *whole["required"]]
     title = f"result.json of rrrid {command}"
     return {"$schema": DRAFT, "title": title, **whole, "$defs": {name: defs[name] for name in sorted(defs)}}
@@ -66,6 +68,11 @@ def _of(kind: Any, defs: _Defs) -> dict[str, Any]:
     return {}  # Any: of a run, each stage's own schema
 
 
+def _told(schema: dict[str, Any], words: str) -> dict[str, Any]:
+    """A field's schema with its words before what its type says by itself."""
+    return schema | {"description": "; ".join(filter(None, (words, schema.get("description", ""))))} if words else schema
+
+
 def _named(kind: type[Any], defs: _Defs) -> str:
     """The name of a dataclass among the definitions; two of one name in different modules are told apart."""
     name, place = kind.__name__, f"{kind.__module__}.{kind.__qualname__}"
@@ -79,7 +86,7 @@ def _named(kind: type[Any], defs: _Defs) -> str:
 
 def _object(kind: type[Any], defs: _Defs) -> dict[str, Any]:
     """A dataclass: every stored field is there; the fields of a flat one stand beside the others, where it is there at all."""
-    hints = typing.get_type_hints(kind)
+    hints, words = typing.get_type_hints(kind), words_of(kind)
     properties: dict[str, Any] = {}
     required = []
     for field in dataclasses.fields(kind):
@@ -89,7 +96,7 @@ def _object(kind: type[Any], defs: _Defs) -> dict[str, Any]:
             inner = next(one for one in typing.get_args(hints[field.name]) or (hints[field.name],) if dataclasses.is_dataclass(one))
             properties = _object(inner, defs)["properties"] | properties  # type: ignore[arg-type]  # a class, by the line above
         else:
-            properties[field.name] = _of(hints[field.name], defs)
+            properties[field.name] = _told(_of(hints[field.name], defs), words.get(field.name, ""))
             required.append(field.name)
     about = (kind.__doc__ or "").strip().split("\n\n")[0]
     told = {} if about.startswith(f"{kind.__name__}(") else {"description": " ".join(about.split())}
