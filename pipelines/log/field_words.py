@@ -1,6 +1,6 @@
 """What each field of a dataclass holds, in words: the comment that stands beside it, or above it, in its source.
 
-    words_of(LogResult)["predicted"]        "samples in which the position of some joint was not measured, and is predicted"
+    words_of(LogResult)["predicted"]        "predicted: samples in which the position of some joint was not measured, …"
 """
 
 from __future__ import annotations
@@ -20,14 +20,23 @@ __all__ = ["words_of"]
 
 
 def words_of(kind: type[Any]) -> dict[str, str]:
-    """Field -> words: of its own comment, else of its name (`result_words`); "" where nobody has said anything."""
+    """Field -> words: of its own comment, else of its name (`result_words`); "" where nobody has said anything.
+
+    A comment goes on where the name ends, "sample_time  # [s]", so the name stands before it.
+    """
     known, found = {field.name for field in dataclasses.fields(kind)}, dict[str, str]()
     for base in reversed(kind.__mro__):
         if dataclasses.is_dataclass(base):
             own = _comments(base)
-            found |= {name: own.get(name, "") or WORDS.get(f"{base.__name__}.{name}", "") or WORDS.get(name, "")
-                      for name in inspect.get_annotations(base) if name in known}
+            found |= {name: _words(base, name, own.get(name, "")) for name in inspect.get_annotations(base) if name in known}
     return found
+
+
+def _words(kind: type[Any], name: str, comment: str) -> str:
+    told = WORDS.get(f"{kind.__name__}.{name}", "")
+    if not comment:
+        return told or WORDS.get(name, "")
+    return f"{told or name.replace('_', ' ')}: {comment}"
 
 
 @lru_cache(maxsize=256)

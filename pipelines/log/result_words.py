@@ -1,7 +1,8 @@
 """Words for the fields of results whose names mean the same wherever they stand, for the schemas.
 
 What a single field holds stands beside it in its dataclass (`field_words`); a name that many results share is told once, here.
-A name with a class before it, "Range.low", holds for that class alone, and before the bare name.
+A name with a class before it, "Range.low", holds for that class alone, and before the bare name; beside a comment it stands in
+front of that.
 """
 
 from __future__ import annotations
@@ -48,6 +49,10 @@ WORDS: Final[dict[str, str]] = {
     "Validation.held_out": "whether the logs were held out of the fit", "ledger": "every hypothesis that was tried, step by step",
     "thresholds": "what each cause has to exceed", "evidence": "the picture of what is wrong, log by log, before any name",
     "Classified.evidence": "what it is seen by, in words", "Undecided.evidence": "what is seen, in words",
+    "Diagnosis.findings": "accepted causes", "Extension.findings": "the causes that were named", "Diagnosis.floor_origin":
+    "where the floor comes from", "Diagnosis.after_rms": "[N m] torque error of the extended model",
+    "Diagnosis.replicas": "simulated runs", "Extension.residual_rms": "[N m] torque error of the nominal model",
+    "Extension.gain": "what it gains on held-out logs", "Finding.of_rated": "size of its torque", "Result.joints": "the joints",
     "rivals": "other causes that explain nearly as much of the same",
     "proof": "the figure that proves it; null where none is drawn", "validate_torque_rms": "torque error over what was held out",
     "simulation": "how the simulated figures were obtained",

@@ -50,7 +50,7 @@ def kinds(one: Any, seen: set[type[Any]]) -> None:
 
 
 def test_no_words_are_left_over() -> None:
-    """A field that was taken away, or has a comment of its own by now, leaves no words behind."""
+    """A field that was taken away, or has a comment that says all by now, leaves no words behind."""
     from pipelines.batch.result import Result as Batch
     from pipelines.log.model_file import ModelFile
 
@@ -58,7 +58,7 @@ def test_no_words_are_left_over() -> None:
     modules = ("import_log" if name == "import" else name.replace("-", "_") for name in STAGES)
     for one in (*(result_type(import_module(f"pipelines.{name}").STAGE) for name in modules), Batch, ModelFile, Calibration):
         kinds(one, seen)
-    told = {words for kind in seen for words in words_of(kind).values()}
+    told = "\n".join(words for kind in seen for words in words_of(kind).values())
     assert [name for name, words in WORDS.items() if words not in told] == []
 
 
@@ -67,7 +67,7 @@ def test_words_stand_beside_their_field() -> None:
     from pipelines.model.diagnosis.outcome import Result
     from pipelines.model.motion_result import LogResult
 
-    assert words_of(LogResult)["predicted"].startswith("samples in which the position of some joint was not measured")
-    assert words_of(Result)["rated"].startswith("[N m]")
-    assert words_of(Result)["held_out_floor"].startswith("[N m]")
+    assert words_of(LogResult)["predicted"].startswith("predicted: samples in which the position of some joint was not measured")
+    assert words_of(Result)["rated"].startswith("rated: [N m]")
+    assert words_of(Result)["after_rms"].startswith("[N m] torque error of the extended model: ")
     assert words_of(LogResult)["peak_speed"].startswith("[rad/s]")
