@@ -36,6 +36,7 @@ class Named:
     amplitudes: tuple[float, ...]
     log: int | None = None  # number of the log it belongs to, where it happened once; None: it acts in all
     tied: tuple[str, ...] = ()  # shapes that are those of the friction at its joint
+    held: tuple[str, ...] = ()  # shapes that are not fitted
 
     @property
     def values(self) -> dict[str, float]:
@@ -43,7 +44,7 @@ class Named:
 
     @property
     def free_shapes(self) -> list[Quantity]:
-        return [q for q in self.effect.parameters if q.name in self.effect.free and q.name not in self.tied]
+        return [q for q in self.effect.parameters if q.name in self.effect.free and q.name not in (*self.tied, *self.held)]
 
     @property
     def free_amplitudes(self) -> bool:
@@ -73,10 +74,10 @@ class Exact:
         count = len(columns.kept) + sum(not q.shape for law in columns.laws for q in law.parameters)
         return cls(columns, fit.beta[:count].copy(), ())
 
-    def with_effect(self, effect: Effect, amplitudes: Array, log: int | None = None) -> Exact:
+    def with_effect(self, effect: Effect, amplitudes: Array, log: int | None = None, held: tuple[str, ...] = ()) -> Exact:
         given = amplitudes if effect.fixed_amplitudes is None else effect.fixed_amplitudes
         tied = tuple(name for name in effect.shared if law_of(self.columns.laws, effect, name) is not None)
-        return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log, tied)))
+        return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log, tied, held)))
 
     def without(self, place: int) -> Exact:
         return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))

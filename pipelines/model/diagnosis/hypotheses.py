@@ -13,7 +13,7 @@ from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.screen import INVISIBLE, Screened
+from pipelines.model.diagnosis.screen import INVISIBLE, Screened, gains_of
 from pipelines.model.diagnosis.through import beyond_first_order
 from pipelines.model.effects.base import Effect
 
@@ -21,6 +21,7 @@ __all__ = ["best_form", "fitted", "laid_whole"]
 
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
 _DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
+_NEARLY = 0.95  # of what the best shape explains
 
 
 def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
@@ -30,12 +31,37 @@ def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     effect = one.shape[0].full()
     if effect.fixed_amplitudes is not None:
         effect = _given(case, now, one, np.array(effect.fixed_amplitudes)).full()
-    return _refitted(case, now, one, effect, error)
+    tried = _refitted(case, now, one, effect, error)
+    if tried.possible or effect.fixed_amplitudes is not None or one.amplitude is not None or not effect.free:
+        return tried
+    return _in_range(case, now, one, error) or tried
 
 
-def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: float) -> Tried:
+def _in_range(case: Case, now: Refined, one: Screened, error: float) -> Tried | None:
+    """In that of the screened shapes which asks for least, of those that explain nearly the most with numbers that can be; None
+    where there is none.
+
+    Of a drift that is seen only at its beginning, size and time constant grow together beyond anything; what the logs tell is how
+    fast it begins. Of all ends that it may come to, the nearest one goes least beyond what was seen.
+    """
+    best, least = None, np.inf
+    for laid in lay_family(case.data, one.family, now.model.arm):
+        gains, _, _ = gains_of(laid, now.fit, now.residual[None])
+        for k in np.flatnonzero(gains[:, 0] >= _NEARLY * one.gain[0]).tolist():
+            shape = one.family.shapes[laid.first + k].full()
+            amplitudes = _amplitudes(now.fit, laid_whole(case.data, shape, now.model.arm))
+            size = float(np.linalg.norm(amplitudes))
+            if size < least and shape.possible(shape.values(amplitudes)):
+                best, least = shape, size
+    if best is None:
+        return None
+    tried = _refitted(case, now, one, best, error, best.free)
+    return tried if tried.possible else None
+
+
+def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: float, held: tuple[str, ...] = ()) -> Tried:
     table = laid_whole(case.data, effect, now.model.arm)
-    start = (now.model.with_effect(effect, _amplitudes(now.fit, table)) if one.amplitude is None else
+    start = (now.model.with_effect(effect, _amplitudes(now.fit, table), held=held) if one.amplitude is None else
              beyond_first_order(now, effect, one.amplitude))
     done = refine(start, case.data, now.weight)
     left = held_out(done, case) / error

@@ -100,6 +100,28 @@ def test_the_gain_of_a_screening_is_that_of_least_squares(waving: Case) -> None:
     assert found.gain[0] == pytest.approx(float(before[0] - rss[0]), rel=0.02)
 
 
+def test_a_drift_that_is_seen_only_at_its_beginning_has_numbers_that_can_be() -> None:
+    """12 mN m s/rad less every second, straight: no end of it is in the logs, and the fit alone would go to more than there is."""
+    def less(motion: Motion) -> np.ndarray:  # type: ignore[type-arg]
+        out = np.zeros_like(motion.q)
+        out[:, 1] = -0.012 * (motion.t - motion.t[0]) * motion.dq[:, 1]
+        return out
+
+    prepared = prepare(Logs((hidden(1, less), hidden(2, less)), (hidden(3, less, "validate"),)), DiagnosisSettings())
+    case = case_of(prepared)
+    others = tuple(kind.name for kind in all_effects() if kind.name != "viscous_drift")
+    drifts = families(case.model.columns.laws, whole_motion(case.data), case.model.arm, others)
+    found = search(replace(case, families=(*case.families, *drifts)), 1)
+    best = found.steps[0].best
+    assert best is not None
+    assert (best.effect.name, best.effect.joint) == ("viscous_drift", 2)
+    assert best.possible
+    values, end = best.done.model.effects[0].values, float(np.ptp(case.data.logs[0].motion.t))
+    friction = find_effect("viscous_drift")(joint=2)._viscous(best.done.model.nominal)
+    gone = -values["relative_change"] * -np.expm1(-end / values["time_constant"]) * friction
+    assert gone == pytest.approx(0.012 * end, rel=0.15)
+
+
 def test_an_event_belongs_to_its_log() -> None:
     """A push at the tip for 0.3 s in the second of two logs is found there, at its time."""
     def push(motion: Motion) -> np.ndarray:  # type: ignore[type-arg]
