@@ -13,7 +13,7 @@ from pipelines.model.diagnosis.beside import Part
 from pipelines.model.diagnosis.chain import gains
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
-from pipelines.model.diagnosis.gains import Simulation, torque_gain, worse_log
+from pipelines.model.diagnosis.gains import Simulation, asked_for, torque_gain, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.joined import once_each
@@ -107,8 +107,11 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
 
 
 def by_chance(before: Refined, after: Refined, judge: Data | None, blocks: int) -> bool:
-    """Whether no joint's held-out error falls by more than chance does."""
+    """Whether no joint's held-out error falls by more than chance does, nor held-out time asks for just what was found."""
     gain = torque_gain(before, after, judge, blocks)
+    asked = asked_for(before, after, judge, blocks)
+    if ((asked[:, 0] > _AGREE[0]) & (asked[:, 1] < _AGREE[1])).any():
+        return False
     # An event, torque that is clipped once say, is in one block of time only, and drawn blocks do not repeat it; but what was
     # fitted to other time does not take half of the power off by chance.
     return not (gain.ci95[:, 1] < 0.0).any() and not (gain.after**2 < _HALF * gain.before**2).any()
