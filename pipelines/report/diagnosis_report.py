@@ -33,7 +33,7 @@ from pipelines.report.diagnosis_words import (
 from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number, to_one_place
+from pipelines.report.style import format_decimals, format_number, to_one_place
 
 __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
@@ -165,14 +165,14 @@ def gain_table(gain: Gain, caption: str) -> Table:
     torque, position = gain.validate_torque_rms, gain.simulated_position_rms
     joints = len(torque.before)
     errors = to_one_place([*map(float, torque.before), *map(float, torque.after)])
+    decimals = 1 + max((len(f"{x:.9g}".partition(".")[2]) for x in errors if x is not None), default=0)  # a change is smaller
     rows = []
     for j in range(joints):
-        low, high = torque.ci95[j]
-        rows.append((j + 1, *errors[j::joints], f"{format_number(float(low), 2)} to {format_number(float(high), 2)}",
-                     None if position is None else _rounded(position.before[j]),
-                     None if position is None else _rounded(position.after[j])))
+        low, high = (format_decimals(float(end), decimals) if math.isfinite(end) else "–" for end in torque.ci95[j])
+        rows.append((j + 1, *errors[j::joints], f"{low} to {high}",
+                     *((None, None) if position is None else (_rounded(1e3 * x[j]) for x in (position.before, position.after)))))
     return Table(("joint", "torque error without [N m]", "with [N m]", "change, 95 % [N m]",
-                  "simulated position error without [rad]", "with [rad]"), tuple(rows), caption)
+                  "simulated position error without [mrad]", "with [mrad]"), tuple(rows), caption)
 
 
 def _unknown(result: Result) -> list[Section]:

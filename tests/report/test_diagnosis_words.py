@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, Rival, TorqueGain, Value
+from pipelines.model.diagnosis.result import BeforeAfter, Diagnosis, Finding, Gain, ResidualRms, Rival, TorqueGain, Value
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.report.diagnosis_report import finding_section, numbers_section
+from pipelines.report.diagnosis_report import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_words import held_out_floor, named, spoken, told_values, torque_errors, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
@@ -70,3 +70,12 @@ def test_whether_an_error_is_in_order_is_said() -> None:
     assert "1.3 times" in table.caption
     noise = held_out_floor(Diagnosis(**(nothing | {"residual_rms": before})))  # noise alone: any arm leaves more at its reversals
     assert "beside it" not in torque_errors(before, after, (50.0,) * 3, *noise).columns
+
+
+def test_a_change_is_told_in_figures_that_show_its_sign() -> None:
+    """The interval of a gain beside the errors it is of: no powers of ten, a decimal more; positions in mrad."""
+    torque = TorqueGain(np.array([0.0878, 0.2373]), np.array([0.0876, 0.0221]), np.array([[-4.4e-4, 8.4e-5], [-0.23, -0.2]]))
+    gain = Gain(torque, BeforeAfter(np.array([4.87e-5, 2.13e-4]), np.array([4.74e-5, 1.56e-5])), "closed-loop", None)
+    rows = gain_table(gain, "").rows
+    assert [row[3] for row in rows] == ["−0.0004 to 0.0001", "−0.2300 to −0.2000"]
+    assert [row[4:] for row in rows] == [(0.0487, 0.0474), (0.213, 0.0156)]
