@@ -35,6 +35,9 @@ def slopes_of(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[Which
     names = [(0, place, name) for place, name in which]
     more, core = list(bent), model.core
     here = model.core_torque(data, core) if core else np.zeros(0)
+    whole = any(one.effect.misread or one.effect.in_drive for one in model.effects)
+    if whole:  # friction is felt where the joint truly is, and comes late
+        more = [_of_law(model, data, here, one) for one in names]
     for place, one in enumerate(model.effects):
         own = model.columns_of(data, one) if place >= core else None
         alone = here if own is None else one.effect.amplitudes(one.values) @ own
@@ -50,7 +53,7 @@ def slopes_of(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[Which
                 effects = (*model.effects[:place], moved, *model.effects[place + 1:core])
                 there = replace(model, effects=effects).core_torque(data, core)
             more.append((there - alone)[None] / step)
-        for name in one.tied:  # it moves with the friction at its joint
+        for name in () if whole else one.tied:  # it moves with the friction at its joint
             law = (0, law_of(model.columns.laws, one.effect, name), name)
             moved = number_moved(one, name, _DIFFERENCE)
             if law in names:
@@ -73,12 +76,10 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
             arm, one.effect.at(one.values).columns(motion, model.nominal) @ np.array(one.amplitudes), motion)
             if one.log in (None, log) else np.zeros_like(motion.q))
 
-    here, more = model.torque(data), []
+    here = model.torque(data)
     as_read = not any(one.effect.misread or one.effect.in_drive for one in model.effects)
     names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
-    for _, place, name in names:
-        step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])
-        more.append((model.moved(step, [(0, place, name)]).torque(data) - here)[None] / _DIFFERENCE)
+    more = [_of_law(model, data, here, one) for one in names]
     for place, one in enumerate(model.effects):
         for name, size in _steps(one):
             names.append((1, place, name))
@@ -89,6 +90,12 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
                 effects = (*model.effects[:place], there, *model.effects[place + 1:])
                 more.append((replace(model, effects=effects).torque(data) - here)[None] / size)
     return np.concatenate([data.lay(linear), *more]), names
+
+
+def _of_law(model: Exact, data: Data, here: Array, law: Which) -> Array:
+    """(1, rows) slope of the whole torque, which is `here`, by a shape of a friction law."""
+    step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])
+    return (model.moved(step, [law]).torque(data) - here)[None] / _DIFFERENCE
 
 
 def _steps(one: Named) -> list[tuple[str, float]]:

@@ -20,9 +20,12 @@ from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.slopes import slopes_of
+from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
+from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
 from pipelines.signal.first_order import lagging
@@ -117,6 +120,21 @@ def test_sharpness_of_each_joint_is_found_behind_a_lag() -> None:
     assert done.model.effects[0].values["time_constant"] == pytest.approx(_LAG, rel=0.005)
     found = [law.sharpness for law in done.model.columns.laws if isinstance(law, Coulomb)]
     assert found == pytest.approx([30.0, 90.0], rel=0.02)
+
+
+@pytest.mark.parametrize(("effect", "amplitudes"), [(EncoderEccentricity(joint=1), [0.02, 0.0]), (TimeDelay(joint=1), [0.004]),
+                                                    (DriveLag(joint=1), [0.004])], ids=["misread", "late", "slow drive"])
+def test_how_sharply_friction_turns_over_is_sloped_as_the_whole_torque_is(effect: Effect, amplitudes: list[float]) -> None:
+    """Friction is felt where the joint truly is, and comes late: a slope at the measured speed is off by a third and more."""
+    prepared = prepare(Logs((turned(1, {}, lag=0.0, mean=0.1),)), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    done = refine(Exact.start(columns, fit).with_effect(effect, np.array(amplitudes)), prepared.data, fit.weight, steps=0)
+    k = len(done.model.beta) + done.names.index((0, 0, "sharpness"))
+    shift = np.zeros(len(done.slopes))
+    shift[k] = 1e-4
+    ahead, behind = (done.model.moved(by, done.names).torque(prepared.data) for by in (shift, -shift))
+    slope = (ahead - behind) / 2e-4
+    assert np.linalg.norm(slope - done.slopes[k]) < 0.01 * np.linalg.norm(slope)
 
 
 def test_slopes_of_a_ripple_behind_a_lag_are_taken_where_the_joint_truly_is() -> None:
