@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from pipelines.report.diagnosis_words import without_keys
 from pipelines.report.report import Figure as Picture
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.style import BLUE, VERMILLION, format_number, format_unit, with_std
@@ -81,7 +82,7 @@ def comparison_report(result: Comparison) -> Report:
 def _verdict(result: Comparison) -> str:
     a, b = result.names
     beyond = [one for one in result.figures if one.beyond]
-    told = [f"{one.what} ({one.a} in {a}, {one.b} in {b})" for one in result.answers if one.differs]
+    told = [f"{one.what} ({without_keys(one.a)} in {a}, {without_keys(one.b)} in {b})" for one in result.answers if one.differs]
     if not beyond and not told:
         return f"{a} and {b} agree: none of {len(result.figures)} figures differs beyond its uncertainty."
     words = []
@@ -97,7 +98,7 @@ def _verdict(result: Comparison) -> str:
 def _answers(result: Comparison) -> Section | None:
     if not result.answers:
         return None
-    rows = tuple((one.what, one.a, one.b) for one in result.answers)
+    rows = tuple((one.what, without_keys(one.a), without_keys(one.b)) for one in result.answers)
     tones: tuple[Tone, ...] = tuple("attention" if one.differs else "neutral" for one in result.answers)
     return Section("What they say", (), (Table(("what", *_heads(result)), rows, tones=tones),))
 

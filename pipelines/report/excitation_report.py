@@ -8,6 +8,7 @@ import numpy as np
 
 from pipelines.model.excitation.rehearse import Rehearsal
 from pipelines.model.excitation.result import DrawnPlan, Result
+from pipelines.report.diagnosis_words import without_keys
 from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import joint_signal_figure
@@ -41,7 +42,7 @@ def _apart(result: Result) -> Section | None:
         return None
     rows = tuple((name, one.similarity, *one.visibility, one.condition_number)
                  for name, one in (("design for the parameters alone", found.before), ("this design", found.after)))
-    a, b = found.causes
+    a, b = map(without_keys, found.causes)
     words = ("Similarity: how much of one cause the other can imitate, when base parameters and friction are fitted beside both; "
              "from 0.8 on diagnose calls them rivals. Visible: what base parameters and friction cannot take up.")
     return Section(f"Telling {a} from {b}", (words,), (Table(
@@ -71,8 +72,8 @@ def _verdict(result: Result) -> str:
     text = " ".join(said)
     if result.apart is not None:
         before, after = (format_number(one.similarity, 2) for one in (result.apart.before, result.apart.after))
-        text += (f"; {' and '.join(result.apart.causes)} look alike by {after} (1: the same), in a design for the parameters "
-                 f"alone by {before}; from 0.8 on diagnose calls them rivals")
+        text += (f"; {' and '.join(map(without_keys, result.apart.causes))} look alike by {after} (1: the same), in a design for "
+                 f"the parameters alone by {before}; from 0.8 on diagnose calls them rivals")
     if not result.reached and result.ceiling is not None:
         dear = result.dearest
         text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"

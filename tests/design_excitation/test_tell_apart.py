@@ -58,7 +58,7 @@ def test_the_two_look_less_alike(both: dict[str, Outcome[Result]]) -> None:
     assert found.causes == ("spring:2", "torque_offset:2")
     assert found.after.similarity < 0.95 * found.before.similarity
     assert both["plain"].result.apart is None
-    assert "look alike by" in both["apart"].report.verdict
+    assert "spring at joint 2 and torque offset at joint 2 look alike by" in both["apart"].report.verdict
 
 
 def test_what_one_leaves_of_the_other_stands_above_the_noise(both: dict[str, Outcome[Result]]) -> None:

@@ -41,7 +41,7 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
     assert [(one.cause, one.joint) for one in result.rejected] == [("stribeck", 2)]
     assert result.rejected[0].reason
     assert (result.accepted, outcome.exit_code) == (False, 1)
-    assert "stribeck:2" in outcome.report.verdict
+    assert "Stribeck friction at joint 2" in outcome.report.verdict
 
 
 def test_the_gain_is_that_of_diagnose(rippled: tuple[Path, Outcome[extend.Extension]]) -> None:
