@@ -6,12 +6,14 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipelines.report.render import write_report
+from pipelines.report.report import Table
 from tests.report.demo import FOOTER, demo_report
 
 pytestmark = pytest.mark.slow
@@ -74,6 +76,23 @@ def test_no_width_makes_the_page_scroll_sideways(page: Path, tmp_path: Path) -> 
         assert frame["text"] >= 13.0
     assert max(found[-1]["tables"]) <= 0, "on a desk every table is seen whole"
     assert max(found[0]["tables"]) > 0, "on a phone a wide one scrolls inside its box"
+
+
+def test_key_figures_are_whole_on_paper(tmp_path: Path) -> None:
+    """Seven columns, one of them words, as a diagnosis has them: within the 182 mm of an A4 sheet, where nothing scrolls."""
+    heads = ("joint", "torque error now [N m]", "extended [N m]", "an arm in order leaves [N m]", "beside it", "now [% of rated]",
+             "extended [% of rated]")
+    rows = tuple((j, 10.0878, 0.0876, 0.0746, "8.4× → 0.79×, in order", 10.146, 0.146) for j in range(1, 7))
+    page = write_report(replace(demo_report(), key_figures=Table(heads, rows, "Of what was held out.")), tmp_path, FOOTER)[0]
+    text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page.read_text("utf-8"))
+    probe, harness = tmp_path / "probe.html", tmp_path / "harness.html"
+    probe.write_text(text.replace("@media print{", "@media all{").replace("</body>", PROBE + "</body>"), "utf-8")
+    harness.write_text(HARNESS % f'<iframe src="{probe.as_uri()}" style="width:688px;height:800px;border:0"></iframe>', "utf-8")
+    match = re.search(r'<pre id="found">(.*?)</pre>', chromium(tmp_path, harness, "--virtual-time-budget=10000", "--dump-dom"))
+    assert match
+    (sheet,) = json.loads(match[1])
+    assert sheet["page"] <= sheet["width"] == 688
+    assert sheet["tables"][0] <= 0
 
 
 @pytest.mark.parametrize("width", [1200, 390])
