@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.beside import Held, acted, judged
+from pipelines.model.diagnosis.beside import Held, Judged, acted, judged
 from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origin_of, refuse_unfit, thresholds_of
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.candidates import families, whole_motion
@@ -35,7 +35,7 @@ from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import Settled, settled, unnamed
+from pipelines.model.diagnosis.pruned import Settled, settled, unlike_held_out, unnamed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, Rejected, ResidualRms, Threshold
@@ -201,10 +201,10 @@ def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings,
           probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None = None) -> Diagnosis:
+    done, responded, own = _held_against(first, case, done, floored, chosen)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
     plain = first.held.plain or nominal  # nothing taken out for what responses name
-    responded = judged(replace(first.held, case=case), found.final)
     parts = responded.parts
     held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
     named = _strongest((*held, *findings(found, ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks,
@@ -220,9 +220,6 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
     judge = first.held.judge if parts else prepared.judge
     rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
            for one, rows in ((plain, judge), (responded.final, responded.judge))]
-    own = None if judge is None or floored.noise is None else motion_floor(
-        responded.final.model, acted(responded.final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
-        floored.rms, chosen.seed)
     made = floored.calibration
     pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()
     arm = extended_arm(replace(found, final=responded.final), ruling)
@@ -234,6 +231,24 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
         0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise, own,
         acted(plain.model.arm, standing), acted(arm, responded.acting), made)
+
+
+def _held_against(first: Responding, case: Case, done: Settled, floored: _Floored,
+                  chosen: DiagnosisSettings) -> tuple[Settled, Judged, Array | None]:
+    """What is believed beside the floor of the held-out logs, what responses have named beside that, and this floor (joints,)
+    [N m]; None where there is none."""
+    held, prepared = replace(first.held, case=case), first.held.prepared
+    responded = judged(held, done.found.final)
+    judge = first.held.judge if responded.parts else prepared.judge
+    if judge is None or responded.judge is None or floored.noise is None:
+        return done, responded, None
+    final = responded.final
+    own = motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
+                       floored.rms, chosen.seed)
+    if own is None:
+        return done, responded, None
+    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own)
+    return believed, responded if believed is done else judged(held, believed.found.final), own
 
 
 def _limits(last: Step, case: Case, prepared: Prepared, probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None,

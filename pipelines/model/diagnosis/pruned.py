@@ -25,12 +25,13 @@ from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Settled", "at_odds", "settled", "unnamed", "vague"]
+__all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unnamed", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
 _ALIKE = 0.25  # of what a cause took away, that one for which it could be mistaken takes as well: weaker ones are no rivals
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
+_WRONG = 5.0  # times the floor of the held-out logs: whatever was found is something else; the right cause has been seen at 3.4
 _SHAPE = "it only mends the shape of what was found before it at the joint"
 
 
@@ -83,6 +84,17 @@ def unnamed(done: Settled, floor: Array) -> Settled:
     return replace(done, ruling=Ruling("nothing-wrong", (), "", done.ruling.doubts), simulated=())
 
 
+def unlike_held_out(done: Settled, rms: Array, floor: Array) -> Settled:
+    """Without names where the model with all of them leaves, (joints,) [N m], many times the `floor` of the very logs held out."""
+    high = held_out_high(rms, floor, _WRONG)
+    if done.ruling.verdict != "cause" or not high:
+        return done
+    times = float((rms / floor).max())
+    why = f"what explains the fitted logs leaves, of {high} in those held out, {times:.0f} times what an arm in order leaves there"
+    doubts = dict(done.ruling.doubts) | dict.fromkeys(done.ruling.named, "it does not explain the held-out logs")
+    return Settled(replace(done.found, final=done.found.nominal), Ruling("unknown", (), why, doubts), ())
+
+
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:
     """Nothing wrong in the fitted logs is not enough where the held-out ones show something.
 
@@ -108,7 +120,9 @@ def _harm(found: Found, final: Refined, case: Case) -> str:
 
 def _by_chance(step: Step, prepared: Prepared, blocks: int) -> bool:
     best = step.best
-    return best is not None and best.log is None and by_chance(step.before, best.done, prepared.judge, blocks)
+    if best is None or best.log is not None:
+        return False
+    return by_chance(step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, blocks)
 
 
 def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
@@ -116,7 +130,7 @@ def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
     if not _by_chance(found.steps[k], prepared, case.blocks):
         return False
     others = [j for j, step in enumerate(found.steps) if step.best is not None and j != k]
-    return not others or by_chance(_without(found, others, case), found.final, case.judge, case.blocks)
+    return not others or by_chance(_without(found, others, case), found.final, k, case.judge, case.blocks)
 
 
 def at_odds(found: Found, k: int, prepared: Prepared, case: Case) -> str:
@@ -142,7 +156,7 @@ def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) 
         for k in left:
             more = sorted((*kept, k))
             there = _without(found, more, case, final) if _apart(found, more, case) == more else None
-            if there is None or by_chance(final, there, case.judge, case.blocks):
+            if there is None or by_chance(final, there, more.index(k), case.judge, case.blocks):
                 others.append(k)
             else:
                 kept, final = more, there

@@ -103,9 +103,9 @@ def at_floor(rms: Array, floor: Array) -> bool:
     return bool((rms <= _CLEAR * floor).all())
 
 
-def held_out_high(rms: Array, floor: Array) -> str:
+def held_out_high(rms: Array, floor: Array, times: float = _FAR) -> str:
     """Which joints stand far above the floor on held-out logs; empty where none does."""
-    return _named(np.flatnonzero(rms > _FAR * floor).tolist())
+    return _named(np.flatnonzero(rms > times * floor).tolist())
 
 
 def _named(joints: Iterable[int]) -> str:

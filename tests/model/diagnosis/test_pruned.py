@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import pruned
+from pipelines.model.diagnosis import findings, pruned
+from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects import find_effect
@@ -138,7 +139,7 @@ def test_what_gained_no_more_than_chance_is_asked_again_beside_what_was_found_af
     found = searched(left(0.5, 0.5, 0.5), (effect("cogging", 1), left(0.4, 0.5, 0.5)), (effect("cogging", 2), left(0.4, 0.4, 0.5)),
                      (effect("cogging", 3), left(0.4, 0.4, 0.1)))
     monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last=None: tuple(kept))
-    monkeypatch.setattr(pruned, "by_chance", lambda before, after, judge, blocks: (before, after) != ((2,), (0, 2)))
+    monkeypatch.setattr(pruned, "by_chance", lambda before, after, place, *_: (before, after, place) != ((2,), (0, 2), 0))
     assert pruned._asked_again(found, [2], [0, 1], among()) == ([0, 2], (0, 2))
     assert pruned._asked_again(found, [], [0, 1], among()) == ([], ())
 
@@ -163,6 +164,32 @@ def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkey
     case = among(effect(one, 1), effect(other, 1))
     kept, final = pruned._asked_again(found, [1], [0], case)
     assert (kept, final) == ([1], (1,))
+
+
+@pytest.mark.parametrize(("joint", "chance"), [(1, False), (3, True)])
+def test_what_falls_at_a_joint_that_a_cause_does_not_act_on_is_no_argument_for_it(
+        joint: int, chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held-out time shows less at joint 1 alone: a gain of joint 3 has no part in that, whatever the fit made of other numbers."""
+    acts = np.arange(1, 4) == joint
+    model = SimpleNamespace(torque=lambda data: acts.astype(float),
+                            without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(3)))
+    before, after = SimpleNamespace(), SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs))
+    less = TorqueGain(np.array([0.5, 0.1, 0.1]), np.array([0.2, 0.1, 0.1]), np.array([[-0.4, -0.2], [-0.1, 0.1], [-0.1, 0.1]]))
+    monkeypatch.setattr(findings, "torque_gain", lambda *_: less)
+    monkeypatch.setattr(findings, "asked_for", lambda *_: np.array([[0.9, 1.1], [-9.0, 9.0], [-9.0, 9.0]]))
+    assert findings.by_chance(before, after, 0, None, 10) is chance  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])
+def test_what_leaves_many_floors_of_the_held_out_logs_is_something_else(held_out: float, verdict: str) -> None:
+    """A slow wave over half a turn passes for a spring there, and not beyond."""
+    nominal, final = left(2.0, 0.01, 0.01), left(0.01, 0.01, 0.01)
+    found = searched(nominal, (effect("cogging", 1), final))
+    done = pruned.Settled(Found(nominal, tuple(found.steps), final), Ruling("cause", (0,), ""), ())
+    believed = pruned.unlike_held_out(done, np.array([held_out, 0.01, 0.01]), FLOOR)
+    assert believed.ruling.verdict == verdict
+    assert believed.found.final is (final if verdict == "cause" else nominal)
+    assert ("joint 1" in believed.ruling.reason and "16 times" in believed.ruling.reason) is (verdict == "unknown")
 
 
 @pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])
