@@ -192,6 +192,16 @@ def test_what_leaves_many_floors_of_the_held_out_logs_is_something_else(held_out
     assert ("joint 1" in believed.ruling.reason and "16 times" in believed.ruling.reason) is (verdict == "unknown")
 
 
+@pytest.mark.parametrize(("held_out", "verdict"), [(0.019, "nothing-wrong"), (0.028, "unknown")])
+def test_what_shows_in_held_out_logs_alone_is_not_in_order(held_out: float, verdict: str) -> None:
+    """Within one excitation gravity takes in an offset; elsewhere it does not."""
+    nominal = left(0.01, 0.01, 0.01)
+    done = pruned.Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
+    believed = pruned.unlike_held_out(done, np.array([0.01, held_out, 0.01]), FLOOR)
+    assert believed.ruling.verdict == verdict
+    assert ("joint 2" in believed.ruling.reason) is (verdict == "unknown")
+
+
 @pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])
 def test_what_did_harm_in_a_log_when_it_was_found_is_asked_again_beside_what_was_found_after_it(
         beside: str, odd: bool, monkeypatch: pytest.MonkeyPatch) -> None:
