@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.fit.equations import Array
 
-__all__ = ["apart", "apart_in", "drawn", "ratio"]
+__all__ = ["apart", "apart_in", "drawn"]
 
 _DRAWS = 4000
 _NORMAL = 1.96  # standard deviations of 95 %
@@ -32,16 +32,6 @@ def apart(ours: Array, theirs: Array, power: Array, rng: np.random.Generator) ->
     return apart_in(drawn(len(power), rng), ours, theirs, power)
 
 
-def ratio(above: Array, below: Array, rng: np.random.Generator) -> tuple[float, float]:
-    """Where Σ above / Σ below lies with 95 %, of sums (blocks,), below ≥ 0; everywhere where a draw may have nothing below."""
-    draws, blocks = drawn(len(below), rng), len(below)
-    whole = draws @ below
-    if blocks < 2 or not whole.min() > 0.0:
-        return -np.inf, np.inf
-    middle = float(above.sum() / below.sum())
-    return _widened(middle, draws @ above / whole, blocks)
-
-
 def drawn(blocks: int, rng: np.random.Generator) -> Array:
     """(draws, blocks) how often each block is drawn, for several questions of the same blocks."""
     return rng.multinomial(blocks, np.full(blocks, 1.0 / blocks), size=_DRAWS).astype(np.float64)
@@ -56,13 +46,8 @@ def apart_in(drawn: Array, ours: Array, theirs: Array, power: Array) -> tuple[fl
         return -np.inf, np.inf
     differences = (np.sqrt(drawn @ theirs) - np.sqrt(drawn @ ours))[known] / np.sqrt(whole[known])
     middle = float((np.sqrt(theirs.sum()) - np.sqrt(ours.sum())) / np.sqrt(power.sum()))
-    return _widened(middle, differences, blocks)
-
-
-def _widened(middle: float, draws: Array, blocks: int) -> tuple[float, float]:
-    """Percentiles of the draws, widened as `apart` says."""
     wider = _student(blocks - 1) * np.sqrt(blocks / (blocks - 1)) / _NORMAL
-    low, high = np.quantile(draws, (0.025, 0.975)) - middle
+    low, high = np.quantile(differences, (0.025, 0.975)) - middle
     return middle + wider * float(low), middle + wider * float(high)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.fit.bootstrap import apart, ratio
+from pipelines.fit.bootstrap import apart
 from pipelines.fit.equations import Array
 
 
@@ -39,25 +39,3 @@ def test_a_difference_is_seen_that_scatter_of_each_would_hide() -> None:
 
 def test_one_block_says_nothing() -> None:
     assert apart(np.ones(1), np.ones(1), np.ones(1), np.random.default_rng(0)) == (-np.inf, np.inf)
-
-
-@pytest.mark.parametrize("there", [0.0, 1.0])
-def test_the_share_of_what_was_added_that_is_there_lies_in_its_interval(there: float) -> None:
-    """A wave that grows from block to block, all of it there or nothing, in noise three times as large; 300 draws."""
-    rng = np.random.default_rng(4)
-    wave = np.linspace(0.2, 1.0, 20)[:, None] * np.sin(np.linspace(0.0, 20.0, 80))
-    inside = sure = 0
-    for _ in range(300):
-        left = there * wave + 2.0 * rng.standard_normal(wave.shape)
-        low, high = ratio((wave * left).sum(axis=1), (wave**2).sum(axis=1), rng)
-        inside += low < there < high
-        sure += low > 0.0
-    assert 0.90 <= inside / 300 <= 0.98
-    assert sure / 300 > 0.9 if there else sure / 300 < 0.05
-
-
-def test_what_was_added_in_one_block_of_time_alone_is_not_asked_for_by_others() -> None:
-    moment = np.zeros(20)
-    moment[7] = 1.0
-    low, high = ratio(moment, moment, np.random.default_rng(0))
-    assert not np.isfinite(high - low)

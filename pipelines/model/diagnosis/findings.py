@@ -13,7 +13,7 @@ from pipelines.model.diagnosis.beside import Part
 from pipelines.model.diagnosis.chain import gains
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
-from pipelines.model.diagnosis.gains import Simulation, asked_for, torque_gain, worse_log
+from pipelines.model.diagnosis.gains import Simulation, torque_gain, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.joined import once_each
@@ -108,15 +108,12 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
 
 def by_chance(before: Refined, after: Refined, place: int, judge: Data | None, blocks: int) -> bool:
     """Whether, of all joints that effect number `place` of `after`, which `before` lacks, acts on, no held-out error falls by more
-    than chance does, nor held-out time asks for just what was found.
+    than chance does.
 
     What falls elsewhere is due to other numbers, moved by the fit.
     """
     gain = torque_gain(before, after, judge, blocks)
     own = after.data.rms(after.model.torque(after.data) - _without(after, place)) > 0.0
-    asked = asked_for(before, after, judge, blocks)[own]
-    if ((asked[:, 0] > _AGREE[0]) & (asked[:, 1] < _AGREE[1])).any():
-        return False
     # An event, torque that is clipped once say, is in one block of time only, and drawn blocks do not repeat it; but what was
     # fitted to other time does not take half of the power off by chance.
     return not (gain.ci95[own, 1] < 0.0).any() and not (gain.after**2 < _HALF * gain.before**2)[own].any()

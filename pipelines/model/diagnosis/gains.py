@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.fit.bootstrap import apart, ratio
+from pipelines.fit.bootstrap import apart
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
@@ -29,7 +29,7 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Plant, choose_step, simulate_together, simulate_windows
 
-__all__ = ["Simulation", "asked_for", "farther", "gain_of", "simulation_errors", "torque_gain", "torque_gain_of", "worse_log"]
+__all__ = ["Simulation", "farther", "gain_of", "simulation_errors", "torque_gain", "torque_gain_of", "worse_log"]
 
 _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
@@ -82,25 +82,6 @@ def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
                 for values in (before[own] ** 2, after[own] ** 2, np.ones(int(own.sum())))]
         ci.append(apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED)))
     return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
-
-
-def asked_for(before: Refined, after: Refined, judge: Data | None, blocks: int) -> Array:
-    """(joints, 2) how much of what the second model adds held-out time asks for, 1 being all of it, with 95 %.
-
-    The error of the model with more numbers holds their noise too, and falls by less than what they stand for is worth: with
-    b what the first leaves and d what the second adds, Σ d b / Σ d² says how much of d is there (Clark & West 2007, J. Econometrics
-    138, p. 291; Davidson & MacKinnon 1981, Econometrica 49, the J test).
-    """
-    data = after.data if judge is None else judge
-    left = held_out_left(before, judge, blocks)
-    added = left - held_out_left(after, judge, blocks)
-    place, found = data.blocks(_BLOCKS), []
-    for joint in range(data.n_joints):
-        own = (data.joint == joint) & data.counts
-        moment, power = (np.asarray(np.bincount(place[own], x[own], minlength=int(place.max()) + 1), dtype=np.float64)
-                         for x in (added * left, added**2))
-        found.append(ratio(moment, power, np.random.default_rng(_SEED)))
-    return np.array(found)
 
 
 def worse_log(data: Data, before: Array, after: Array) -> str:

@@ -176,7 +176,6 @@ def test_what_falls_at_a_joint_that_a_cause_does_not_act_on_is_no_argument_for_i
     before, after = SimpleNamespace(), SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs))
     less = TorqueGain(np.array([0.5, 0.1, 0.1]), np.array([0.2, 0.1, 0.1]), np.array([[-0.4, -0.2], [-0.1, 0.1], [-0.1, 0.1]]))
     monkeypatch.setattr(findings, "torque_gain", lambda *_: less)
-    monkeypatch.setattr(findings, "asked_for", lambda *_: np.array([[0.9, 1.1], [-9.0, 9.0], [-9.0, 9.0]]))
     assert findings.by_chance(before, after, 0, None, 10) is chance  # type: ignore[arg-type]
 
 
