@@ -29,6 +29,7 @@ __all__ = ["BY_CHANCE", "agreement", "by_chance", "extended_arm", "findings", "h
 BY_CHANCE = "its gain on held-out torque is within what chance does"
 
 _HALF = 0.5
+_NOTHING = 1e-9  # of the torque at the joint that an effect acts on most: what is smaller is rounding
 _ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
 _TELLS = 9.0  # times its variance, that the power of the predicted part must have in a log to be asked
@@ -113,7 +114,8 @@ def by_chance(before: Refined, after: Refined, place: int, judge: Data | None, b
     What falls elsewhere is due to other numbers, moved by the fit.
     """
     gain = torque_gain(before, after, judge, blocks)
-    own = after.data.rms(after.model.torque(after.data) - _without(after, place)) > 0.0
+    acts = after.data.rms(after.model.torque(after.data) - _without(after, place))
+    own = acts > _NOTHING * acts.max()  # without it the whole torque may be worked out in another order
     # An event, torque that is clipped once say, is in one block of time only, and drawn blocks do not repeat it; but what was
     # fitted to other time does not take half of the power off by chance.
     return not (gain.ci95[own, 1] < 0.0).any() and not (gain.after**2 < _HALF * gain.before**2)[own].any()

@@ -94,7 +94,7 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array) -> Settled:
     if verdict == "unknown" or not high:
         return done
     model = "what explains the fitted logs" if verdict == "cause" else "the nominal model, which the fitted logs bear out,"
-    times = f"{float((rms / floor).max()):.2g} times what an arm in order leaves there"
+    times = f"{float((rms / np.maximum(floor, 1e-12)).max()):.2g} times what an arm in order leaves there"
     doubts = dict(done.ruling.doubts) | dict.fromkeys(done.ruling.named, "it does not explain the held-out logs")
     ruling = Ruling("unknown", (), f"{model} leaves, of {high} in those held out, {times}", doubts)
     return Settled(replace(done.found, final=done.found.nominal), ruling, ())

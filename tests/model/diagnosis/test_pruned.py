@@ -170,8 +170,8 @@ def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkey
 def test_what_falls_at_a_joint_that_a_cause_does_not_act_on_is_no_argument_for_it(
         joint: int, chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Held-out time shows less at joint 1 alone: a gain of joint 3 has no part in that, whatever the fit made of other numbers."""
-    acts = np.arange(1, 4) == joint
-    model = SimpleNamespace(torque=lambda data: acts.astype(float),
+    acts = np.where(np.arange(1, 4) == joint, 1.0, 1e-15)  # rounding elsewhere: without it the torque is worked out otherwise
+    model = SimpleNamespace(torque=lambda data: acts,
                             without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(3)))
     before, after = SimpleNamespace(), SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs))
     less = TorqueGain(np.array([0.5, 0.1, 0.1]), np.array([0.2, 0.1, 0.1]), np.array([[-0.4, -0.2], [-0.1, 0.1], [-0.1, 0.1]]))
@@ -199,6 +199,14 @@ def test_what_shows_in_held_out_logs_alone_is_not_in_order(held_out: float, verd
     believed = pruned.unlike_held_out(done, np.array([0.01, held_out, 0.01]), FLOOR)
     assert believed.ruling.verdict == verdict
     assert ("joint 2" in believed.ruling.reason) is (verdict == "unknown")
+
+
+def test_a_joint_without_rows_is_no_number_in_the_sentence() -> None:
+    """Neither residual nor floor: joint 3 did not move fast enough to count."""
+    nominal = left(0.01, 0.01, 0.0)
+    done = pruned.Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
+    believed = pruned.unlike_held_out(done, np.array([0.01, 0.05, 0.0]), np.array([0.01, 0.01, 0.0]))
+    assert "joint 2 in those held out, 5 times" in believed.ruling.reason
 
 
 @pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])

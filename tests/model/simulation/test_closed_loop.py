@@ -11,7 +11,7 @@ import pytest
 from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Noise, Plant, run
+from pipelines.model.simulation import Noise, Plant, one_loop, run
 from pipelines.model.simulation.replicas import run_together
 from tests.model.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop, TransferObserver
@@ -187,3 +187,16 @@ def test_experiments_side_by_side_do_what_they_do_alone() -> None:
                           strict=True):
         np.testing.assert_array_equal(one.q, alone.q)
         np.testing.assert_array_equal(one.tau, alone.tau)
+
+
+def test_how_many_samples_are_taken_at_once_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One arm without arrays, its reference and excitation in pieces of 100 samples, its motion in pieces of 7: bit for bit."""
+    asked = replace(experiment(plain(), 250), v=0.1 * np.random.default_rng(1).standard_normal((250, 3)))
+    plant = Plant.of(rrr().arm)
+    whole = run(plant, asked, 2, NOISE)
+    monkeypatch.setattr(one_loop, "_AT_ONCE", 100)
+    monkeypatch.setattr(one_loop, "_PART", 7)
+    pieces = run(plant, asked, 2, NOISE)
+    assert one_loop.OneLoop.fits(plant, asked)
+    np.testing.assert_array_equal(pieces.true_q, whole.true_q)
+    np.testing.assert_array_equal(pieces.tau, whole.tau)
