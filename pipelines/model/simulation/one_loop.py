@@ -74,19 +74,18 @@ class OneLoop:
                 are no numbers, for there the arithmetic has given up.
         """
         experiment = self._experiment
-        table, count = np.empty((experiment.n_samples, 12)), 0
+        table = np.empty((experiment.n_samples, 12))
         now, memory = tuple(start.tolist()), self._memory()
         drawn = repeat((0.0,) * 6) if noise is None else chain.from_iterable(map(np.ndarray.tolist, noise))
         rows = zip(_listed(experiment.q_ref), _fed(experiment), drawn, strict=False)
-        while count < len(table):
+        for first in range(0, len(table), _PART):
             part: list[_Now] = []
             try:
                 now, memory = self._loop(now, memory, islice(rows, _PART), part.append, self._step)
             except (ValueError, OverflowError):  # of an infinite number there is neither a sine nor a count
                 now = (nan,) * 6
-            watch(np.array(now), count + len(part))
-            table[count:count + len(part)] = part
-            count += len(part)
+            watch(np.array(now), first + len(part))
+            table[first:first + _PART] = part
         return table[:, :6], table[:, 6:9], table[:, 9:]
 
     def _memory(self) -> tuple[Any, ...]:

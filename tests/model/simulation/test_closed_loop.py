@@ -200,3 +200,10 @@ def test_how_many_samples_are_taken_at_once_changes_nothing(monkeypatch: pytest.
     assert one_loop.OneLoop.fits(plant, asked)
     np.testing.assert_array_equal(pieces.true_q, whole.true_q)
     np.testing.assert_array_equal(pieces.tau, whole.tau)
+
+
+def test_an_excitation_that_ends_before_the_experiment_is_an_error() -> None:
+    """And no loop without an end."""
+    asked = experiment(plain(), 300, v=np.zeros((100, 3)))
+    with pytest.raises(ValueError, match="shape"):
+        run(Plant.of(rrr().arm), asked, 2)
