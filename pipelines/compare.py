@@ -17,7 +17,7 @@ from typing import Any
 
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
-from pipelines.log.result_figures import fitted, residuals
+from pipelines.log.result_figures import fitted, residuals, robot_of
 from pipelines.log.stored_result import StoredResult, read_result
 from pipelines.report.comparison_report import Answer, Comparison, Figure, Residual, comparison_report
 from pipelines.report.report import Report
@@ -48,18 +48,9 @@ def read(request: Request, settings: Settings) -> Inputs:
         raise UsageError("C02", f"results of different commands: {found[0].command} and {found[1].command}", where="compare",
                          remedy="compare two of one command")
     named = replace(request, paths=tuple(one.path.parent for one in found))
-    robots = [robot for one in found if (robot := _robot(one.object))]
+    robots = [robot for one in found if (robot := robot_of(one.object))]
     return Inputs(sources=tuple(one.path for one in found), material=found, label=named.paths[1].name,
                   robot_name=robots[0] if len(set(robots)) == 1 else "several" if robots else "unknown")
-
-
-def _robot(result: Any) -> str:
-    """The first robot that a result names."""
-    if isinstance(result, Mapping):
-        if isinstance(result.get("robot"), str):
-            return str(result["robot"])
-        return next(filter(None, map(_robot, result.values())), "")
-    return next(filter(None, map(_robot, result)), "") if isinstance(result, list) else ""
 
 
 def compute(inputs: Inputs, settings: Settings) -> Comparison:

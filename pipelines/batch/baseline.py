@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from pipelines.batch.drift import LIMIT
+from pipelines.batch.parts import Part, place_of
 from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.log.model_file import ModelFile, StoredEffect
@@ -24,36 +25,52 @@ __all__ = ["against", "known_figures", "unheld"]
 def against(record: Record, baseline: ModelFile) -> Record:
     """`record` as it stands with the baseline in mind: "ok" where it holds nothing new, "found" with the changes where it does.
 
-    An item of another robot than the baseline's is not judged by it.
+    What is of another robot than the baseline's is not judged by it.
     """
-    if record.status not in ("ok", "found") or _robot(baseline) not in ("", record.robot):
+    own = [part for part in record.parts if _robot(baseline) in ("", part.robot)]
+    if record.status not in ("ok", "found") or not own:
         return record
-    changes = [*_moved(record, baseline), *_new_causes(record, baseline)]
-    accepted = record.status == "ok" or record.accepts
+    changes, remarks = list[str](), list[str]()
+    for part in own:
+        moved = [*_moved(part, baseline), *_new_causes(part, baseline)]
+        gone, unsure = _gone(part, baseline)
+        of = f"{part.name}: " if part.name else ""
+        changes += [f"{of}{words}" for words in (*moved, *gone)]
+        remarks += [f"{of}{words}" for words in unsure]
     if changes:
-        return dataclasses.replace(record, status="found", verdict=clean("Beyond the baseline: " + "; ".join(changes) + ".", 1000))
-    if accepted and record.status == "found":
-        return dataclasses.replace(record, status="ok", verdict=f"Nothing beyond the baseline. {record.verdict}")
+        return dataclasses.replace(record, status="found", verdict=_limited("Beyond the baseline", [*changes, *remarks]))
+    elsewhere = any(part.findings for part in record.parts if part not in own)
+    if record.status == "ok" or (record.accepts and not elsewhere):
+        more = f" {_limited('Of the baseline', remarks)}" if remarks else ""
+        said = record.verdict if record.status == "ok" else f"Nothing beyond the baseline. {record.verdict}"
+        return dataclasses.replace(record, status="ok", verdict=f"{said}{more}")
     return record
 
 
-def unheld(stage: str, records: Iterable[Record], baseline: ModelFile) -> tuple[Check, ...]:
+def _limited(about: str, words: Sequence[str]) -> str:
+    return clean(f"{about}: {'; '.join(words)}.", 1000)
+
+
+def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: bool = False) -> tuple[Check, ...]:
     """What of the baseline no item of `stage` can be held against: that nothing is said of it does not mean that it is the same.
 
-    Where that is all of it, the check is a gate: what was asked for has not been done.
+    Where that is all of it, the check is a gate: what was asked for has not been done. Of a batch in shards another one may
+    have the items of the baseline's robot: laid together, they are asked again.
     """
-    done = [record for record in records if record.status in ("ok", "found")]
-    others = [record.name for record in done if _robot(baseline) not in ("", record.robot)]
-    judged = [record for record in done if record.name not in set(others)]
+    done = [(record.called(part), part) for record in records if record.status in ("ok", "found") for part in record.parts]
+    others = [name for name, part in done if _robot(baseline) not in ("", part.robot)]
+    judged = [part for _, part in done if _robot(baseline) in ("", part.robot)]
     if not judged:
-        return (_warned(f"the baseline is of {_robot(baseline)}, and no item is: nothing is held against it",
-                        "give a model of this robot", gate=True),) if done else ()
+        what, remedy = ("item of this shard", "lay the shards together, and judge them with --resume") if sharded else (
+            "item", "give a model of this robot")
+        return (_warned(f"the baseline is of {_robot(baseline)}, and no {what} is: nothing is held against it", remedy,
+                        gate=not sharded),) if done else ()
     said = []
     if others:
         said.append(_warned(f"{len(others)} of {len(done)} items are of another robot than the baseline, and not held against it: "
                             f"{', '.join(others[:3])}", "give the folders of each robot a batch of their own"))
-    missing = [name for name, part in _parts(baseline).items() if not _met(part, judged)]
-    nothing = not any(record.diagnosed or known_figures(baseline, record.figures) for record in judged)
+    missing = [name for name, part in _kinds(baseline).items() if not _met(part, judged)]
+    nothing = not any(part.diagnosed or known_figures(baseline, part.figures) for part in judged)
     if missing:
         said.append(_warned(f"of the baseline, {_listed(missing)} met nothing to be held against: {stage} names none of them",
                             "run 'rrrid batch' with --stage run, and with the friction laws of the baseline", gate=nothing))
@@ -63,16 +80,16 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile) -> tuple[
     return tuple(said)
 
 
-def _parts(baseline: ModelFile) -> dict[str, ModelFile]:
+def _kinds(baseline: ModelFile) -> dict[str, ModelFile]:
     return {"base parameters": dataclasses.replace(baseline, friction=(), effects=()),
             "friction": dataclasses.replace(baseline, base_parameters=(), effects=()),
             "effects": dataclasses.replace(baseline, base_parameters=(), friction=())}
 
 
-def _met(part: ModelFile, judged: Iterable[Record]) -> bool:
-    """Whether there was something to hold what there is of `part` against: an effect is met by what names causes as well."""
-    asked = part.effects or _spelled(part)
-    return not asked or any(known_figures(part, record.figures) or (part.effects and record.diagnosed) for record in judged)
+def _met(kind: ModelFile, judged: Iterable[Part]) -> bool:
+    """Whether there was something to hold what there is of `kind` against: an effect is met by what names causes as well."""
+    asked = kind.effects or _spelled(kind)
+    return not asked or any(known_figures(kind, part.figures) or (kind.effects and part.diagnosed) for part in judged)
 
 
 def _listed(words: Sequence[str]) -> str:
@@ -119,15 +136,15 @@ def _spelled(baseline: ModelFile) -> dict[str, tuple[int, tuple[float, float]]]:
     return known
 
 
-def _moved(record: Record, baseline: ModelFile) -> Iterator[str]:
+def _moved(part: Part, baseline: ModelFile) -> Iterator[str]:
     """The figures beyond the baseline's, in words."""
     # The causes that were found are held against the baseline one by one, below.
-    found = [f"{finding['cause']} joint {finding['joint']} " for finding in record.findings]
-    known = {name: figure for name, figure in known_figures(baseline, record.figures).items()
+    found = [f"{finding['cause']} joint {finding['joint']} " for finding in part.findings]
+    known = {name: figure for name, figure in known_figures(baseline, part.figures).items()
              if not any(cause in name for cause in found)}
     limit = _limit(len(known))
     for name, (value, std) in known.items():
-        new, own, unit = record.figures[name]
+        new, own, unit = part.figures[name]
         away = _change(name, unit, new, value) / math.hypot(own, std)
         if abs(away) > limit:
             yield f"{name} {new:.4g} {unit}, {value:.4g} before ({away:+.1f} std)"
@@ -148,16 +165,38 @@ def _limit(numbers: int) -> float:
     return -NormalDist().inv_cdf(-math.expm1(math.log1p(-single) / numbers) / 2.0)
 
 
-def _new_causes(record: Record, baseline: ModelFile) -> Iterator[str]:
+def _new_causes(part: Part, baseline: ModelFile) -> Iterator[str]:
     """The causes that a diagnosis names and the baseline does not have, or has otherwise."""
-    for finding in record.findings:
+    for finding in part.findings:
         cause, joint = str(finding["cause"]), finding["joint"]
-        place = cause if joint is None else f"{cause}:{joint}"
+        place = place_of(finding)
         known = next((one for one in (*baseline.effects, *baseline.friction) if (one.effect, one.joint) == (cause, joint)), None)
         if known is None:
             yield f"{place}, which it does not have"
         else:
             yield from _otherwise(place, finding["parameters"] or {}, known)
+
+
+def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
+    """The effects of the baseline that a diagnosis does not name any more: those it would have found, and those it might not have.
+
+    What the reference logs show as well is no finding, and there all the same. An effect is gone where it is larger than the
+    least that these logs would show by more than its own uncertainty explains.
+    """
+    gone, unsure = list[str](), list[str]()
+    there = {*map(place_of, part.findings), *part.standing}
+    for one in baseline.effects if part.diagnosed else ():
+        place = place_of({"cause": one.effect, "joint": one.joint})
+        if place in there:
+            continue
+        parameter, least = part.detectable.get(place, ("", math.inf))
+        stored = one.parameters.get(parameter)
+        if stored is not None and abs(stored.value) - LIMIT * (stored.std or 0.0) > least:
+            gone.append(f"{place} is not found any more: {parameter} {stored.value:.4g} {stored.unit} before, and from {least:.2g} "
+                        f"{stored.unit} on it would have been")
+        else:
+            unsure.append(f"{place} is not found, and might be there: these logs would not show it for sure")
+    return gone, unsure
 
 
 def _otherwise(place: str, parameters: Mapping[str, Any], known: StoredEffect) -> Iterator[str]:

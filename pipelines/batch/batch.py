@@ -81,7 +81,8 @@ def run_batch(plan: Plan, wanted: Wanted) -> Outcome[Summary]:
         done = _Done(plan, plan_key(plan), folder, wanted, listener)
         done.go(items)
         records = _judged([done.records.get(item.slug) or done.missing(item) for item in items], baseline)
-        remarks = (*(_short(check, root) for check in checks), *(() if baseline is None else unheld(plan.stage, records, baseline)))
+        unmet = () if baseline is None else unheld(plan.stage, records, baseline, wanted.shard[1] > 1)
+        remarks = (*(_short(check, root) for check in checks), *unmet)
         summary = Summary(plan.stage, records, drift_of(records), remarks, baseline, bool(listener.number))
         outcome = _written(folder, summary, done, started)
     if done.fault is not None:

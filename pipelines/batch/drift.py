@@ -18,6 +18,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.batch.parts import Part
 from pipelines.batch.record import Record
 from pipelines.log.experiment import Array
 
@@ -64,39 +65,50 @@ class Drift:
 
 
 def drift_of(records: Iterable[Record]) -> tuple[Drift, ...]:
-    """The courses of every robot's figures, in the order of the names; empty for robots with a single item."""
-    robots: dict[str, list[Record]] = {}
-    for record in sorted(records, key=lambda one: (one.recorded, one.name)):
-        if record.figures or record.residuals:
-            robots.setdefault(record.robot, []).append(record)
+    """The courses of every robot's figures, in the order of the names; empty for robots with a single item.
+
+    Of an item with several robots, or days of one, each is followed by itself.
+    """
+    robots: dict[str, list[_Seen]] = {}
+    seen = [_Seen(record.called(part), part) for record in records for part in record.parts if part.figures or part.residuals]
+    for one in sorted(seen, key=lambda one: (one.part.recorded, one.name)):
+        robots.setdefault(one.part.robot, []).append(one)
     return tuple(Drift(robot, _figures(done), _residuals(done)) for robot, done in sorted(robots.items()) if len(done) > 1)
 
 
-def _figures(done: Sequence[Record]) -> tuple[Course, ...]:
+@dataclass(frozen=True)
+class _Seen:
+    """A part by the name it has among those of all items."""
+
+    name: str
+    part: Part
+
+
+def _figures(done: Sequence[_Seen]) -> tuple[Course, ...]:
     courses = []
-    for name in dict.fromkeys(name for record in done for name in record.figures):
-        having = [record for record in done if name in record.figures]
-        if len(having) > 1 and len({record.figures[name][2] for record in having}) == 1:
-            value = np.array([record.figures[name][0] for record in having])
-            std = np.array([record.figures[name][1] for record in having])
+    for name in dict.fromkeys(name for one in done for name in one.part.figures):
+        having = [one for one in done if name in one.part.figures]
+        figures = [one.part.figures[name] for one in having]
+        if len(having) > 1 and len({unit for _, _, unit in figures}) == 1:
+            value, std = np.array([x for x, _, _ in figures]), np.array([s for _, s, _ in figures])
             chi_square, freedom = _chi_square(value, std), len(having) - 1
             trend = float((value[-1] - value[0]) / np.hypot(std[-1], std[0]))
-            courses.append(Course(name, having[0].figures[name][2], tuple(r.name for r in having), value, std,
-                                  from_others(value, std), chi_square, freedom, _probability(chi_square, freedom), trend))
+            courses.append(Course(name, figures[0][2], tuple(one.name for one in having), value, std, from_others(value, std),
+                                  chi_square, freedom, _probability(chi_square, freedom), trend))
     return tuple(courses)
 
 
-def _residuals(done: Sequence[Record]) -> tuple[Course, ...]:
+def _residuals(done: Sequence[_Seen]) -> tuple[Course, ...]:
     courses = []
-    for name in dict.fromkeys(name for record in done for name in record.residuals):
-        having = [record for record in done if name in record.residuals]
+    for name in dict.fromkeys(name for one in done for name in one.part.residuals):
+        having = [one for one in done if name in one.part.residuals]
         if len(having) > 1:
-            value = np.array([record.residuals[name][0] for record in having])
+            value = np.array([one.part.residuals[name][0] for one in having])
             scatter = _scatter(value)
             away = (value - np.median(value)) / scatter if scatter > 0.0 else np.zeros(len(value))
             trend = float(value[-1] - value[0]) / (np.sqrt(2.0) * scatter) if scatter > 0.0 else 0.0
-            courses.append(Course(name, having[0].residuals[name][1], tuple(r.name for r in having), value, None, away, None, None,
-                                  None, trend))
+            courses.append(Course(name, having[0].part.residuals[name][1], tuple(one.name for one in having), value, None, away,
+                                  None, None, None, trend))
     return tuple(courses)
 
 

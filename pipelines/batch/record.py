@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipelines.batch.items import Item
+from pipelines.batch.parts import Part, read_part
 from pipelines.errors import RrridError
 from pipelines.log.atomic import environment_faults
 from pipelines.log.files import PROVENANCE, hash_file
@@ -35,13 +36,10 @@ class Record:
     exit: int  # what the stage's own command would have ended in, with --check
     error: dict[str, str] | None = None  # code, where, message, remedy
     verdict: str = ""
-    robot: str = ""
+    robot: str = ""  # "several" where it holds several
     recorded: str = ""  # the earliest of its logs
-    figures: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)  # name -> value, std, unit
-    residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)
-    findings: tuple[Mapping[str, Any], ...] = ()  # of a diagnosis: cause, joint, parameters
-    diagnosed: bool = False  # its result names causes, be it none
-    accepts: bool = False  # the diagnosis's causes are all that kept it from "ok"
+    parts: tuple[Part, ...] = ()  # more than one where it holds several robots or days; none without a result
+    accepts: bool = False  # the diagnoses' causes are all that kept it from "ok"
     inputs: Mapping[str, str] = field(default_factory=dict)  # file, relative to the root where it lies below -> SHA-256
     logs: tuple[str, ...] = ()
     provenance: str = ""  # SHA-256 of the item's provenance.json
@@ -49,6 +47,10 @@ class Record:
     seconds: float = 0.0
     trace: str = ""  # of an internal error
     stops: bool = False  # the output itself cannot be written: the next item would fare no better
+
+    def called(self, part: Part) -> str:
+        """What one of its parts is called among those of all items."""
+        return f"{self.name}: {part.name}" if part.name else self.name
 
 
 class Ledger:
@@ -85,12 +87,8 @@ class Ledger:
 
 def read_record(about: dict[str, Any]) -> Record:
     """The record that was written as JSON."""
-    about = dict(about)
-    about["figures"] = {name: (float(v), float(s), str(u)) for name, (v, s, u) in about["figures"].items()}
-    about["residuals"] = {name: (float(v), str(u)) for name, (v, u) in about["residuals"].items()}
-    for name in ("findings", "logs"):
-        about[name] = tuple(about[name])
-    return Record(**about)
+    parts = tuple(map(read_part, about["parts"]))
+    return Record(**(about | {"parts": parts, "logs": tuple(about["logs"])}))
 
 
 def relative(path: Path, root: Path) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from pipelines.batch.baseline import known_figures
 from pipelines.batch.drift import LIMIT, Course, Drift
+from pipelines.batch.parts import Part
 from pipelines.batch.record import Record, Status
 from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
@@ -53,11 +54,18 @@ def rows_of(summary: Summary) -> list[Mapping[str, str | float | int | None]]:
         about: dict[str, str | float | int | None] = {
             "item": r.name, "status": r.status, "exit": r.exit, "code": (r.error or {}).get("code"),
             "message": (r.error or {}).get("message"), "verdict": r.verdict, "robot": r.robot, "recorded": r.recorded}
-        numbers: list[tuple[str, float, float | None, str]] = [(name, *figure) for name, figure in r.figures.items()]
-        numbers += [(name, value, None, unit) for name, (value, unit) in r.residuals.items()]
-        rows += [{**about, "quantity": name, "value": value, "std": std, "unit": unit, "away": away.get((name, r.name))}
-                 for name, value, std, unit in numbers] or [about]
+        numbers = [number for part in r.parts for number in _numbers(r, part, away)]
+        rows += [{**about, **number} for number in numbers] or [about]
     return rows
+
+
+def _numbers(record: Record, part: Part, away: Mapping[tuple[str, str], float]) -> Iterator[Mapping[str, str | float | None]]:
+    """One row for each figure and residual of a part; of one of several its quantities say whose they are."""
+    numbers: list[tuple[str, float, float | None, str]] = [(name, *figure) for name, figure in part.figures.items()]
+    numbers += [(name, value, None, unit) for name, (value, unit) in part.residuals.items()]
+    for name, value, std, unit in numbers:
+        yield {"robot": part.robot, "quantity": f"{part.name} {name}".strip(), "value": value, "std": std, "unit": unit,
+               "away": away.get((name, record.called(part)))}
 
 
 def summary_report(summary: Summary, figures: bool = True) -> Report:

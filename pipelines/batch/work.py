@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.batch.items import Item
+from pipelines.batch.parts import parts_of
 from pipelines.batch.plan import Plan, load_stage, read_plan
 from pipelines.batch.process import economise
 from pipelines.batch.record import Record, Status, relative
@@ -25,7 +26,6 @@ from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, Rr
 from pipelines.log.files import PROVENANCE, hash_file
 from pipelines.log.guard import die_with_parent
 from pipelines.log.places import renamed, tilde
-from pipelines.log.result_figures import fitted, residuals
 from pipelines.stage import Inputs, Outcome, Request, Stage, run_stage
 
 __all__ = ["attempt", "begin", "undone"]
@@ -112,24 +112,21 @@ def _record(item: Item, warm: _Warm, outcome: Outcome[Any], inputs: Inputs, root
     wrong = next((check for check in outcome.checks if check.level == "reject"), None) if status in ("rejected", "failed") else None
     error = None if wrong is None else {"code": wrong.code, "where": wrong.where, "message": wrong.message, "remedy": wrong.remedy}
     hashes = {relative(path, root): inputs.hashes.get(path) or hash_file(path) for path in inputs.sources if path.is_file()}
+    recorded = min((opened.log.recorded for opened in inputs.logs if opened.log.recorded), default="")
     return Record(
         clean(item.name), item.slug, status, outcome.exit_code, error, clean(outcome.report.verdict, 1000),
-        inputs.robot_name, min((opened.log.recorded for opened in inputs.logs if opened.log.recorded), default=""),
-        fitted(outcome.json), residuals(outcome.json), _findings(outcome.json),
-        outcome.json.get("findings") is not None, _only_causes(outcome.json), hashes,
+        inputs.robot_name, recorded,
+        parts_of(outcome.json, inputs.robot_name, recorded), _only_causes(outcome.json), hashes,
         tuple(relative(log, root) for log in item.logs), hash_file(outcome.folder / PROVENANCE), warm.key, seconds)
-
-
-def _findings(result: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
-    """The causes that a diagnosis names, without their figures."""
-    return tuple({name: one.get(name) for name in ("cause", "joint", "parameters")} for one in result.get("findings") or ())
 
 
 def _only_causes(result: Mapping[str, Any]) -> bool:
     """Whether nothing but named causes is wrong: of a run, every stage but the diagnosis, and what extends by it, is in order."""
-    stages = [stage for run in result.get("runs") or (result,) for stage in run.get("stages", ())]
-    others = any(stage["exit"] not in (0, 5) for stage in stages if stage["name"] not in ("diagnose", "extend"))
-    return result.get("verdict") == "cause" and not others
+    runs = result.get("runs") or (result,)
+    others = any(stage["exit"] not in (0, 5) for run in runs for stage in run.get("stages", ())
+                 if stage["name"] not in ("diagnose", "extend"))
+    said = {run.get("verdict", "nothing-wrong") for run in runs}
+    return "cause" in said and said <= {"cause", "nothing-wrong"} and not others
 
 
 def undone(item: Item, problem: BaseException, plan: Plan, key: str) -> Record:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-__all__ = ["fitted", "residuals"]
+__all__ = ["fitted", "residuals", "robot_of"]
 
 # What a result calls the error that is left, and its unit; arrays are per joint.
 _RESIDUALS: Final = {"torque_rms": "N m", "residual_rms": "N m", "relative_error": "1", "reconstruction_error_max": "rad"}
@@ -42,6 +42,15 @@ def residuals(result: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
                     if len(found) < _MOST:
                         found[_free(" ".join(filter(None, (name, key.replace("_", " "), words))), found)] = (value, unit)
     return found
+
+
+def robot_of(result: Any) -> str:
+    """The first robot that a result names, however deep; "" where it names none."""
+    if isinstance(result, Mapping):
+        if isinstance(result.get("robot"), str):
+            return str(result["robot"])
+        return next(filter(None, map(robot_of, result.values())), "")
+    return next(filter(None, map(robot_of, result)), "") if isinstance(result, list) else ""
 
 
 def _single(result: Mapping[str, Any]) -> Mapping[str, Any]:

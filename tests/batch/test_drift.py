@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import jsonschema
@@ -13,7 +14,8 @@ import pytest
 
 from pipelines.batch.baseline import against, unheld
 from pipelines.batch.drift import drift_of, from_others
-from pipelines.batch.record import Record
+from pipelines.batch.parts import Part, parts_of
+from pipelines.batch.record import Record, Status
 from pipelines.batch.result import Result
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
 from pipelines.log.result_figures import fitted, residuals
@@ -23,11 +25,16 @@ from tests.batch.conftest import Lay, obey
 STD = 0.02
 
 
-def _records(values: np.ndarray, **more: object) -> list[Record]:
+def _record(name: str, status: Status = "ok", accepts: bool = False, **known: Any) -> Record:
+    """An item of one robot, of which `known` is known."""
+    return Record(name, name, status, int(status == "found"), parts=(Part(**known),), accepts=accepts)
+
+
+def _records(values: np.ndarray) -> list[Record]:
     """Items recorded one a day, in an order that is not that of their names."""
     order = np.random.default_rng(0).permutation(len(values))
-    return [Record(f"item {order[i]:03d}", str(i), "ok", 0, figures={"p1": (float(value), STD, "kg m^2")}, robot="arm",
-                   recorded=f"2026-01-{i + 1:02d}T00:00:00Z", **more) for i, value in enumerate(values)]  # type: ignore[arg-type]
+    return [_record(f"item {order[i]:03d}", figures={"p1": (float(value), STD, "kg m^2")}, robot="arm",
+                    recorded=f"2026-01-{i + 1:02d}T00:00:00Z") for i, value in enumerate(values)]
 
 
 def test_normal_scatter_is_no_drift() -> None:
@@ -67,7 +74,7 @@ def test_the_others_weigh_by_their_uncertainty() -> None:
 def test_a_residual_is_judged_by_the_scatter_of_most() -> None:
     """One item with ten times the residual stands out of six; of four nobody can tell."""
     def course(values: list[float]) -> tuple[str, ...]:
-        records = [Record(str(i), str(i), "ok", 0, residuals={"torque rms": (value, "N m")}, robot="arm")
+        records = [_record(str(i), residuals={"torque rms": (value, "N m")}, robot="arm")
                    for i, value in enumerate(values)]
         return drift_of(records)[0].residuals[0].moved
 
@@ -77,7 +84,7 @@ def test_a_residual_is_judged_by_the_scatter_of_most() -> None:
 
 def test_robots_are_not_mixed() -> None:
     """Two arms differ by nature."""
-    records = [Record(f"{robot}{i}", f"{robot}{i}", "ok", 0, figures={"p1": (value, STD, "kg m^2")}, robot=robot)
+    records = [_record(f"{robot}{i}", figures={"p1": (value, STD, "kg m^2")}, robot=robot)
                for robot, value in (("a", 1.0), ("b", 2.0)) for i in range(3)]
     assert [(drift.robot, drift.figures[0].moved) for drift in drift_of(records)] == [("a", ()), ("b", ())]
 
@@ -102,7 +109,7 @@ def _baseline() -> ModelFile:
 
 def _found(amplitude: float, joint: int = 2, p1: float = 1.0, accepts: bool = True) -> Record:
     finding = {"cause": "cogging", "joint": joint, "parameters": {"amplitude": {"value": amplitude, "std": 0.01, "unit": "N m"}}}
-    return Record("a", "a", "found", 1, figures={"p1": (p1, STD, "kg m^2")}, findings=(finding,), accepts=accepts)
+    return _record("a", "found", accepts, figures={"p1": (p1, STD, "kg m^2")}, findings=(finding,), diagnosed=True)
 
 
 def test_a_baseline_accepts_what_is_known() -> None:
@@ -120,19 +127,24 @@ def test_a_baseline_accepts_what_is_known() -> None:
     assert against(_found(0.5, joint=3), other) == _found(0.5, joint=3)
 
 
+def _known(record: Record, **more: Any) -> Record:
+    """The same item, of which more is known."""
+    return dataclasses.replace(record, parts=tuple(dataclasses.replace(part, **more) for part in record.parts))
+
+
 def test_friction_is_held_against_the_baseline_by_any_name() -> None:
     """A run says "extend model viscous joint 1 …", estimate-bps "viscous:1:…": moved, it is found, and told once."""
     viscous = StoredEffect("viscous", 1, {"coefficient_2": StoredValue(0.6, 0.01, "N m s/rad", "fitted")})
     baseline = dataclasses.replace(_baseline(), friction=(viscous,))
     for name in ("viscous:1:coefficient_2", "extend model viscous joint 1 coefficient 2"):
         for value, status in ((0.61, "ok"), (0.9, "found")):
-            record = Record("a", "a", "ok", 0, figures={"estimate-bps p1": (9.0, STD, ""), "extend p1": (1.0, STD, "kg m^2"),
-                                                        name: (value, 0.01, "N m s/rad")})
+            record = _record("a", figures={"estimate-bps p1": (9.0, STD, ""), "extend p1": (1.0, STD, "kg m^2"),
+                                           name: (value, 0.01, "N m s/rad")})
             judged = against(record, baseline)
             assert judged.status == status
             assert judged.verdict.count("coefficient") == (status == "found")
-    stronger = _found(0.6)
-    told = dataclasses.replace(stronger, figures={**stronger.figures, "extend model cogging joint 2 amplitude": (0.6, 0.01, "N m")})
+    (stronger,) = _found(0.6).parts
+    told = _known(_found(0.6), figures={**stronger.figures, "extend model cogging joint 2 amplitude": (0.6, 0.01, "N m")})
     assert against(told, baseline).verdict.count("amplitude") == 1
 
 
@@ -140,17 +152,18 @@ def test_what_no_item_can_be_held_against_is_said() -> None:
     """A diagnosis names causes, and gives no base parameters and no friction; estimate-bps no effects: silence is no agreement."""
     viscous = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.6, 0.01, "N m s/rad", "fitted")})
     baseline = dataclasses.replace(_baseline(), friction=(viscous,))
-    diagnosed = Record("a", "a", "ok", 0, robot="arm", diagnosed=True)
+    diagnosed = _record("a", robot="arm", diagnosed=True)
     (said,) = unheld("diagnose", [diagnosed], baseline)
     assert (said.level, said.where, said.gate) == ("warn", "--baseline", False)
     assert "of the baseline, base parameters and friction met nothing to be held against: diagnose names none" in said.message
-    estimated = Record("b", "b", "ok", 0, figures={"p1": (1.0, STD, "kg m^2")}, robot="arm")
+    figures = {"p1": (1.0, STD, "kg m^2")}
+    estimated = _record("b", figures=figures, robot="arm")
     (said,) = unheld("estimate-bps", [estimated], baseline)
     assert ("baseline, friction and effects met" in said.message, said.gate) == (True, False)
     assert ["baseline, friction met" in one.message for one in unheld("run", [diagnosed, estimated], baseline)] == [True]
-    whole = dataclasses.replace(estimated, figures={**estimated.figures, "viscous:1:coefficient": (0.6, 0.01, "N m s/rad")})
+    whole = _known(estimated, figures=figures | {"viscous:1:coefficient": (0.6, 0.01, "N m s/rad")})
     assert unheld("run", [whole, diagnosed], baseline) == ()
-    extended = dataclasses.replace(whole, figures={**whole.figures, "cogging joint 2 amplitude": (0.5, 0.01, "N m")})
+    extended = _known(whole, figures={**whole.parts[0].figures, "cogging joint 2 amplitude": (0.5, 0.01, "N m")})
     assert unheld("simulate", [extended], baseline) == ()
     assert unheld("run", [Record("a", "a", "rejected", 3)], baseline) == ()
 
@@ -158,33 +171,97 @@ def test_what_no_item_can_be_held_against_is_said() -> None:
 def test_a_baseline_that_meets_nothing_is_a_gate() -> None:
     """Another robot's, a stage without figures, a model without uncertainties: what was asked for cannot be done at all."""
     baseline = dataclasses.replace(_baseline(), robot='name = "arm"')
-    mine, other = (Record(name, name, "ok", 0, figures={"p1": (1.0, STD, "kg m^2")}, robot=name, diagnosed=True)
+    mine, other = (_record(name, figures={"p1": (1.0, STD, "kg m^2")}, robot=name, diagnosed=True)
                    for name in ("arm", "another"))
-    silent = Record("silent", "silent", "ok", 0, robot="arm")
+    silent = _record("silent", robot="arm")
     given = dataclasses.replace(baseline, effects=(), base_parameters=(
         StoredParameter("p1", 1.0, None, "kg m^2", True, "given", "J"),))
     for stage, records, model, words in (
             ("run", [other], baseline, "the baseline is of arm, and no item is"),
             ("inspect", [silent], baseline, "base parameters and effects met nothing"),
-            ("estimate-bps", [dataclasses.replace(mine, diagnosed=False)], given, "no number with an uncertainty")):
+            ("estimate-bps", [_known(mine, diagnosed=False)], given, "no number with an uncertainty")):
         (said,) = unheld(stage, records, model)
         assert words in said.message
         assert said.gate
     (said,) = unheld("run", [mine, other], baseline)
     assert said.message == "1 of 2 items are of another robot than the baseline, and not held against it: another"
     assert not said.gate
-    assert unheld("diagnose", [dataclasses.replace(mine, figures={})], given) == ()
+    assert unheld("diagnose", [_known(mine, figures={})], given) == ()
+
+
+def test_a_shard_may_hold_another_robots_items_alone() -> None:
+    """What the other shards hold nobody knows here: said, and no gate. Where all are looked at, it is one."""
+    baseline = dataclasses.replace(_baseline(), robot='name = "arm"')
+    other = _record("another", figures={"p1": (1.0, STD, "kg m^2")}, robot="another", diagnosed=True)
+    (said,) = unheld("run", [other], baseline, sharded=True)
+    assert (said.gate, "no item of this shard is" in said.message, "--resume" in said.remedy) == (False, True, True)
+    (said,) = unheld("inspect", [_record("silent", robot="arm")], baseline, sharded=True)
+    assert said.gate  # no shard's items would be held against it: the stage names nothing of it
+
+
+def test_a_known_cause_that_is_gone_is_told() -> None:
+    """Where so strong a one would have been found, it is a change; where these logs would not show it, it is said. One that the
+    reference logs show as well is there."""
+    baseline = _baseline()  # cogging at joint 2 with 0.5 N m, known to 0.01
+    quiet = _record("a", figures={"p1": (1.0, STD, "kg m^2")}, diagnosed=True, detectable={"cogging:2": ("amplitude", 0.04)})
+    judged = against(quiet, baseline)
+    assert judged.status == "found"
+    assert "cogging:2 is not found any more: amplitude 0.5 N m before, and from 0.04 N m on" in judged.verdict
+    for least in (0.48, 0.6):  # 0.5 less 3 std is 0.47
+        deaf = against(_known(quiet, detectable={"cogging:2": ("amplitude", least)}), baseline)
+        assert deaf.status == "ok"
+        assert "cogging:2 is not found, and might be there" in deaf.verdict
+    assert against(_known(quiet, standing=("cogging:2",)), baseline) == _known(quiet, standing=("cogging:2",))
+    assert against(_known(quiet, diagnosed=False), baseline).verdict == ""
+
+
+def _run(name: str, robot: str, amplitude: float | None, p1: float = 1.0) -> dict[str, Any]:
+    """What result.json has of one of several robots: a cause or none, and a fitted figure."""
+    finding = {"cause": "cogging", "joint": 2, "parameters": {"amplitude": {"value": amplitude, "std": 0.01, "unit": "N m"}}}
+    findings = [] if amplitude is None else [finding]
+    least = [{"cause": "cogging", "joint": 2, "parameter": "amplitude", "smallest": {"value": 0.04, "std": None, "unit": "N m"}}]
+    figure = {"name": "p1", "value": p1, "std": STD, "unit": "kg m^2"}
+    estimated = {"name": "estimate-bps", "exit": 0, "result": {"robot": robot, "parameters": [figure]}}
+    return {"name": name, "stages": [estimated], "verdict": "cause" if findings else "nothing-wrong", "findings": findings,
+            "standing": [], "detectable": least}
+
+
+def test_several_robots_in_one_folder_are_held_against_the_baseline() -> None:
+    """What `runs` say of the baseline's robot is judged, each day by itself; another robot's is not."""
+    baseline = dataclasses.replace(_baseline(), robot='name = "arm"')
+
+    def item(*runs: dict[str, Any], accepts: bool = True) -> Record:
+        status: Status = "found" if any(run["findings"] for run in runs) else "ok"
+        return Record("a", "a", status, 1, parts=parts_of({"stages": [], "runs": runs}, "several", "2026-01-01"), accepts=accepts)
+
+    known = item(_run("arm 2026-01-05", "arm", 0.5), _run("other", "other", None))
+    assert [(part.robot, part.recorded, list(part.figures)) for part in known.parts] == [
+        ("arm", "2026-01-05", ["estimate-bps p1"]), ("other", "2026-01-01", ["estimate-bps p1"])]
+    assert against(known, baseline).status == "ok"
+    (said,) = unheld("run", [known], baseline)
+    assert said.message == "1 of 2 items are of another robot than the baseline, and not held against it: a: other"
+    for record, says in ((item(_run("arm", "arm", 0.6), _run("other", "other", None)), "arm: cogging:2 amplitude 0.6 N m"),
+                         (item(_run("arm", "arm", 0.5, 1.2)), "arm: estimate-bps p1 1.2"),
+                         (item(_run("day 1", "arm", 0.5), _run("day 2", "arm", None)), "day 2: cogging:2 is not found any more")):
+        judged = against(record, baseline)
+        assert judged.status == "found"
+        assert judged.verdict.startswith(f"Beyond the baseline: {says}")
+    strange = item(_run("arm", "arm", 0.5), _run("other", "other", 0.5))
+    assert against(strange, baseline) == strange  # nobody knows that cause of the other one
+    days = drift_of([known, item(_run("arm 2026-01-04", "arm", None, 1.5)), item(_run("arm 2026-01-03", "arm", None))])
+    assert [(one.robot, one.figures[0].items) for one in days] == [("arm", ("a: arm 2026-01-03", "a: arm 2026-01-04",
+                                                                            "a: arm 2026-01-05"))]
 
 
 def test_a_phase_is_the_same_after_a_whole_turn() -> None:
     """3.1 rad and -3.1 rad are 0.08 rad apart."""
     effect = StoredEffect("cogging", 2, {"phase": StoredValue(3.1, 0.05, "rad", "fitted")})
     finding = {"cause": "cogging", "joint": 2, "parameters": {"phase": {"value": -3.1, "std": 0.05, "unit": "rad"}}}
-    record = Record("a", "a", "found", 1, findings=(finding,), accepts=True)
+    record = _record("a", "found", True, findings=(finding,), diagnosed=True)
     baseline = dataclasses.replace(_baseline(), effects=(effect,))
     assert against(record, baseline).status == "ok"
     other = {"cause": "cogging", "joint": 2, "parameters": {"phase": {"value": -2.0, "std": 0.05, "unit": "rad"}}}
-    assert against(dataclasses.replace(record, findings=(other,)), baseline).status == "found"
+    assert against(_known(record, findings=(other,)), baseline).status == "found"
 
 
 def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Path) -> None:

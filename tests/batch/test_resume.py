@@ -13,6 +13,7 @@ from pipelines import inspect
 from pipelines.batch.batch import Wanted, run_batch
 from pipelines.batch.drift import drift_of
 from pipelines.batch.items import Item
+from pipelines.batch.parts import Part
 from pipelines.batch.plan import Options, Plan, plan_key, plan_text, read_plan
 from pipelines.batch.record import Ledger, Record
 from pipelines.log.files import write_log
@@ -88,8 +89,10 @@ def test_a_torn_ledger_is_no_ledger(lay: Lay) -> None:
 def test_a_record_that_was_kept_says_what_it_said_at_once(tmp_path: Path) -> None:
     """P07: the same figures in the same order, and so the same drift, and the same stage to hold against a baseline."""
     said = ("reconstruct noise", "estimate-bps p10", "estimate-bps p2", "estimate-bps p1", "diagnose cogging joint 2 amplitude")
-    first, second = (Record(name, name, "ok", 0, figures=dict.fromkeys(said, (value, 0.1, "N m")), recorded=name,
-                            residuals={f"{one} rms": (value, "N m") for one in said}) for name, value in (("a", 1.0), ("b", 2.0)))
+    first, second = (Record(name, name, "ok", 0, parts=(Part(
+        recorded=name, figures=dict.fromkeys(said, (value, 0.1, "N m")), standing=("stribeck:2",),
+        residuals={f"{one} rms": (value, "N m") for one in said}, detectable={"cogging:2": ("amplitude", 0.04)}),))
+        for name, value in (("a", 1.0), ("b", 2.0)))
     ledger = Ledger(tmp_path)
     for record in (first, second):
         ledger.put(record)

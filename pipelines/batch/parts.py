@@ -1,0 +1,69 @@
+"""What is known of one robot's logs of one day: followed from item to item, and held against a baseline.
+
+    parts = parts_of(result, robot, recorded)       of an item's result.json; several where `rrrid run` took its logs apart
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pipelines.log.result_figures import fitted, residuals, robot_of
+
+__all__ = ["Part", "parts_of", "place_of", "read_part"]
+
+_DAY = re.compile(r"\b\d{4}-\d\d-\d\d\b")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One robot's logs of one day."""
+
+    name: str = ""  # within its item; "" where that is all one
+    robot: str = ""
+    recorded: str = ""  # the day of its logs, else the earliest of the item's
+    figures: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)  # name -> value, std, unit
+    residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    findings: tuple[Mapping[str, Any], ...] = ()  # of a diagnosis: cause, joint, parameters
+    diagnosed: bool = False  # its result names causes, be it none
+    standing: tuple[str, ...] = ()  # what the reference logs show as well: "stribeck:2"
+    detectable: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, the least that is found
+
+
+def parts_of(result: Mapping[str, Any], robot: str, recorded: str) -> tuple[Part, ...]:
+    """The parts of an item by its result.json, of which `robot` and `recorded` are known."""
+    runs = result.get("runs") or ()
+    if not runs:
+        return (_part(result, "", robot, recorded),)
+    return tuple(_part(run, run["name"], robot_of(run) or robot, _day(run["name"]) or recorded) for run in runs)
+
+
+def _day(name: str) -> str:
+    """The day that a run's name holds, where its logs say one."""
+    found = _DAY.search(name)
+    return "" if found is None else found[0]
+
+
+def _part(result: Mapping[str, Any], name: str, robot: str, recorded: str) -> Part:
+    findings = tuple({key: one.get(key) for key in ("cause", "joint", "parameters")} for one in result.get("findings") or ())
+    least = {place_of(one): (str(one["parameter"]), float(one["smallest"]["value"])) for one in result.get("detectable") or ()
+             if (one.get("smallest") or {}).get("value") is not None}
+    return Part(name, robot, recorded, fitted(result), residuals(result), findings, result.get("findings") is not None,
+                tuple(map(place_of, result.get("standing") or ())), least)
+
+
+def place_of(one: Mapping[str, Any]) -> str:
+    """A cause where it is, as commands take it: "cogging:2"."""
+    return str(one["cause"]) if one["joint"] is None else f"{one['cause']}:{one['joint']}"
+
+
+def read_part(about: Mapping[str, Any]) -> Part:
+    """The part that was written as JSON."""
+    told: dict[str, Any] = {
+        "figures": {name: (float(v), float(s), str(u)) for name, (v, s, u) in about["figures"].items()},
+        "residuals": {name: (float(v), str(u)) for name, (v, u) in about["residuals"].items()},
+        "detectable": {name: (str(parameter), float(least)) for name, (parameter, least) in about["detectable"].items()},
+        "findings": tuple(about["findings"]), "standing": tuple(about["standing"])}
+    return Part(**{**about, **told})
