@@ -18,6 +18,7 @@ from pipelines.batch.parts import Part, place_of
 from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.log.model_file import ModelFile, StoredEffect
+from pipelines.report.figure_words import figure_in_words
 
 __all__ = ["against", "known_figures", "unheld"]
 
@@ -147,7 +148,7 @@ def _moved(part: Part, baseline: ModelFile) -> Iterator[str]:
         new, own, unit = part.figures[name]
         away = _change(name, unit, new, value) / math.hypot(own, std)
         if abs(away) > limit:
-            yield f"{name} {new:.4g} {unit}, {value:.4g} before ({away:+.1f} std)"
+            yield f"{figure_in_words(name)} {new:.4g} {unit}, {value:.4g} before ({away:+.1f} std)"
 
 
 def _change(name: str, unit: str, new: float, old: float) -> float:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,11 +32,11 @@ class Part:
     detectable: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, the least that is found
 
 
-def parts_of(result: Mapping[str, Any], robot: str, recorded: str) -> tuple[Part, ...]:
-    """The parts of an item by its result.json, of which `robot` and `recorded` are known."""
+def parts_of(result: Mapping[str, Any], robot: str, recorded: str, turning: Sequence[bool] = ()) -> tuple[Part, ...]:
+    """The parts of an item by its result.json, of which `robot`, the joints of one that turn, and `recorded` are known."""
     runs = result.get("runs") or ()
     if not runs:
-        return (_part(result, "", robot, recorded),)
+        return (_part(result, "", robot, recorded, turning),)
     return tuple(_part(run, run["name"], robot_of(run) or robot, _day(run["name"]) or recorded) for run in runs)
 
 
@@ -46,11 +46,11 @@ def _day(name: str) -> str:
     return "" if found is None else found[0]
 
 
-def _part(result: Mapping[str, Any], name: str, robot: str, recorded: str) -> Part:
+def _part(result: Mapping[str, Any], name: str, robot: str, recorded: str, turning: Sequence[bool] = ()) -> Part:
     findings = tuple({key: one.get(key) for key in ("cause", "joint", "parameters")} for one in result.get("findings") or ())
     least = {place_of(one): (str(one["parameter"]), float(one["smallest"]["value"])) for one in result.get("detectable") or ()
              if (one.get("smallest") or {}).get("value") is not None}
-    return Part(name, robot, recorded, fitted(result), residuals(result), findings, result.get("findings") is not None,
+    return Part(name, robot, recorded, fitted(result), residuals(result, turning), findings, result.get("findings") is not None,
                 tuple(map(place_of, result.get("standing") or ())), least)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -14,7 +15,9 @@ from pipelines.batch.parts import Part
 from pipelines.batch.record import Record, Status
 from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
+from pipelines.report.diagnosis_words import without_keys
 from pipelines.report.drift_figures import Panel, drift_figure
+from pipelines.report.figure_words import figure_in_words
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
@@ -23,6 +26,7 @@ __all__ = ["KINDS", "Summary", "rows_of", "summary_report"]
 
 _TONES: Final[dict[Status, Tone]] = {"ok": "good", "found": "attention", "rejected": "bad", "failed": "bad"}
 _ROWS = 2000  # items in one table of the page
+_CHANCE = 0.01  # of calling something moved where nothing did, once in so many batches
 _DRAWN = 6  # figures of one robot
 _LISTED, _LEAST = 40, 10  # of them in the table at most; where fewer moved
 KINDS: Final[dict[str, type]] = {"item": str, "status": str, "exit": int, "code": str, "message": str, "verdict": str,
@@ -75,7 +79,7 @@ def summary_report(summary: Summary, figures: bool = True) -> Report:
         figures: draw them; without, the page is there at once.
     """
     tone: Tone = "bad" if summary.count("rejected", "failed") or summary.interrupted or _unmet(summary) else (
-        "attention" if summary.count("found") else "good")
+        "attention" if summary.count("found") or any(map(_beyond_chance, summary.drifts)) else "good")
     words: dict[Status, str] = {"ok": "in order", "found": "something found", "rejected": "rejected", "failed": "failed"}
     counts = Table(("items", "number"), tuple((said, summary.count(status)) for status, said in words.items()))
     sections = [*_wrong(summary), *(s for drift in summary.drifts for s in _drift_section(drift, summary.baseline, figures)),
@@ -90,14 +94,20 @@ def _verdict(summary: Summary) -> str:
     said += f", {wrong} {'was' if wrong == 1 else 'were'} rejected or failed" if wrong else ""
     begun = "Interrupted; what is missing is done with --resume. " if summary.interrupted else ""
     begun += "Nothing was held against the baseline. " if _unmet(summary) else ""
-    moved = [(c, d) for d in summary.drifts for c in d.figures if c.moved]
+    moved = [(c, d) for d in summary.drifts if _beyond_chance(d) for c in d.figures if c.moved]
     if not moved:
         return f"{begun}{said}."
     course, drift = max(moved, key=lambda one: float(np.max(np.abs(one[0].away))))
     far = int(np.argmax(np.abs(course.away)))
     of = f" of {drift.robot}" if len(summary.drifts) > 1 else ""
     by = f"{format_number(abs(float(course.away[far])), 2)} std in {course.items[far]}"
-    return f"{begun}{said}. What moved most{of} is {course.name}: {by}."
+    return f"{begun}{said}. What moved most{of} is {figure_in_words(course.name)}: {by}."
+
+
+def _beyond_chance(drift: Drift) -> bool:
+    """Whether a robot's figures moved farther than chance moves the farthest of so many (Šidák 1967)."""
+    single = -math.expm1(math.log1p(-_CHANCE) / max(1, len(drift.figures)))
+    return any(c.moved and (c.probability or 0.0) < single for c in drift.figures)
 
 
 def _unmet(summary: Summary) -> bool:
@@ -118,7 +128,7 @@ def _wrong(summary: Summary) -> list[Section]:
 
 def _why(record: Record) -> str:
     if record.error is None:
-        return record.verdict
+        return without_keys(record.verdict)
     where = f"{record.error['where']}: " if record.error["where"] not in ("", ".") else ""
     remedy = f" ({record.error['remedy']})" if record.error["remedy"] else ""
     return f"{where}{record.error['message']}{remedy}"
@@ -129,7 +139,7 @@ def _checks(summary: Summary) -> list[Section]:
 
 
 def _all(summary: Summary) -> Section:
-    rows = tuple((r.name, r.status, r.verdict or _why(r)) for r in summary.records[:_ROWS])
+    rows = tuple((r.name, r.status, without_keys(r.verdict) or _why(r)) for r in summary.records[:_ROWS])
     more = len(summary.records) - len(rows)
     text = (f"{more} more stand in summary.parquet and result.json.",) if more else ()
     return Section("All items", text, tables=(Table(("item", "status", "verdict"), rows, tones=tuple(
@@ -156,12 +166,21 @@ def _drift_section(drift: Drift, baseline: ModelFile | None, figures: bool) -> l
 
 def _figure_table(ranked: Sequence[Course]) -> Table:
     listed = min(_LISTED, max(_LEAST, sum(bool(c.moved) for c in ranked)))
-    rows = tuple((c.name, c.chi_square, c.freedom, c.probability, float(np.max(np.abs(c.away))), c.trend,
-                  ", ".join(c.moved[:4]) + (f" and {len(c.moved) - 4} more" if len(c.moved) > 4 else "")) for c in ranked[:listed])
+    rows = tuple((figure_in_words(c.name), _digits(c.chi_square), c.freedom, _digits(c.probability),
+                  _digits(float(np.max(np.abs(c.away)))), _digits(c.trend), _first_four(c.moved)) for c in ranked[:listed])
     tones: tuple[Tone, ...] = tuple("attention" if c.moved else "neutral" for c in ranked[:listed])
     more = "" if len(ranked) <= listed else f" The {len(ranked) - listed} that moved least stand in result.json."
     return Table(("figure", "χ²", "freedom", "probability", "largest [std]", "first to last [std]", "moved"), rows,
                  caption=f"What moved most stands first.{more}", tones=tones)
+
+
+def _first_four(items: Sequence[str]) -> str:
+    return ", ".join(items[:4]) + (f" and {len(items) - 4} more" if len(items) > 4 else "")
+
+
+def _digits(x: float | None) -> float | None:
+    """Three of them are all that a deviation in std can use."""
+    return None if x is None else float(f"{x:.3g}")
 
 
 def _figures(drift: Drift, ranked: Sequence[Course], baseline: ModelFile | None) -> tuple[Figure, ...]:
@@ -172,7 +191,7 @@ def _figures(drift: Drift, ranked: Sequence[Course], baseline: ModelFile | None)
         whole = [c for c in courses if courses and len(c.items) == max(len(one.items) for one in courses)]
         same = [c for c in whole if c.items == whole[0].items][:_DRAWN]
         if same:
-            panels = [Panel(c.name, c.unit, c.value, c.std, c.beyond, before.get(c.name)) for c in same]
+            panels = [Panel(figure_in_words(c.name), c.unit, c.value, c.std, c.beyond, before.get(c.name)) for c in same]
             grey = " The band is the baseline." if any(panel.before for panel in panels) else ""
             drawn.append(drift_figure(f"{name}-{drift.robot}", words + grey, panels, same[0].items))
     return tuple(drawn)

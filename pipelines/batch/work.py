@@ -112,11 +112,12 @@ def _record(item: Item, warm: _Warm, outcome: Outcome[Any], inputs: Inputs, root
     wrong = next((check for check in outcome.checks if check.level == "reject"), None) if status in ("rejected", "failed") else None
     error = None if wrong is None else {"code": wrong.code, "where": wrong.where, "message": wrong.message, "remedy": wrong.remedy}
     hashes = {relative(path, root): inputs.hashes.get(path) or hash_file(path) for path in inputs.sources if path.is_file()}
+    turning = inputs.logs[0].log.robot.revolute if inputs.logs else ()
     recorded = min((opened.log.recorded for opened in inputs.logs if opened.log.recorded), default="")
     return Record(
         clean(item.name), item.slug, status, outcome.exit_code, error, clean(outcome.report.verdict, 1000),
         inputs.robot_name, recorded,
-        parts_of(outcome.json, inputs.robot_name, recorded), _only_causes(outcome.json), hashes,
+        parts_of(outcome.json, inputs.robot_name, recorded, turning), _only_causes(outcome.json), hashes,
         tuple(relative(log, root) for log in item.logs), hash_file(outcome.folder / PROVENANCE), warm.key, seconds)
 
 

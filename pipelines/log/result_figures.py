@@ -7,15 +7,16 @@ gets a name in words from where it stands: "p1", "joint 2 viscous", "cogging joi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 __all__ = ["fitted", "residuals", "robot_of"]
 
 # What a result calls the error that is left, and its unit; arrays are per joint.
 _RESIDUALS: Final = {"torque_rms": "N m", "residual_rms": "N m", "relative_error": "1", "reconstruction_error_max": "rad"}
+_SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
 # Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
-_NAMING: Final = ("name", "effect", "cause", "kind", "law", "joint", "posture", "method")
+_NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
 _SILENT: Final = ("parameters", "result", "torque")
 _PASSED_OVER: Final = ("balance", "comparison", "ladder", "rejected", "detectable", "courses")
 _MOST = 400  # figures of one item
@@ -32,16 +33,30 @@ def fitted(result: Mapping[str, Any]) -> dict[str, tuple[float, float, str]]:
     return found
 
 
-def residuals(result: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
-    """Name -> (value, unit) of every residual of `result`."""
+def residuals(result: Mapping[str, Any], turning: Sequence[bool] = ()) -> dict[str, tuple[float, str]]:
+    """Name -> (value, unit) of every residual of `result`.
+
+    Args:
+        turning: which joints turn, where the caller knows the robot; else what the result says of their units.
+    """
     found: dict[str, tuple[float, str]] = {}
+    slides = {j + 1 for j, turns in enumerate(turning) if not turns} or _sliding(result)
     for name, holder in _walk(_single(result), ()):
         for key, unit in _RESIDUALS.items():
             if isinstance(holder, Mapping) and key in holder:
-                for words, value in _leaves(holder[key]):
+                for words, joint, value in _leaves(holder[key]):
                     if len(found) < _MOST:
-                        found[_free(" ".join(filter(None, (name, key.replace("_", " "), words))), found)] = (value, unit)
+                        full = " ".join(filter(None, (name, key.replace("_", " "), words)))
+                        found[_free(full, found)] = value, _SLIDING.get(unit, unit) if joint in slides else unit
     return found
+
+
+def _sliding(value: Any) -> set[int]:
+    """The joints, from 1, that slide by the units that a result gives of them."""
+    if isinstance(value, Mapping):
+        told = [unit for key in ("units", "torque_units") if isinstance(value.get(key), list) for unit in enumerate(value[key], 1)]
+        return {j for j, unit in told if unit in _SLIDING.values()}.union(*map(_sliding, value.values()))
+    return set[int]().union(*map(_sliding, value)) if isinstance(value, list) else set()
 
 
 def robot_of(result: Any) -> str:
@@ -63,11 +78,14 @@ def _walk(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
     if isinstance(value, Mapping):
         yield " ".join(path), value
         for key, item in value.items():
-            if key not in _PASSED_OVER and key not in _RESIDUALS:
-                yield from _walk(item, path if key in _SILENT or isinstance(item, list) else (*path, key.replace("_", " ")))
-    elif isinstance(value, list):
-        for item in value:
-            yield from _walk(item, (*path, *_words(item)))
+            if key in _PASSED_OVER or key in _RESIDUALS:
+                continue
+            words = key.replace("_", " ")
+            if isinstance(item, list):
+                for number, one in enumerate(item, 1):
+                    yield from _walk(one, (*path, *(_words(one) or (words, str(number)))))
+            else:
+                yield from _walk(item, path if key in _SILENT else (*path, words))
 
 
 def _words(item: Any) -> list[str]:
@@ -84,15 +102,16 @@ def _words(item: Any) -> list[str]:
     return said
 
 
-def _leaves(value: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str, float]]:
+def _leaves(value: Any, words: tuple[str, ...] = (), joint: int = 0) -> Iterator[tuple[str, int, float]]:
+    """Words, the joint they are of or 0, and the number."""
     if _number(value):
-        yield " ".join(words), float(value)
+        yield " ".join(words), joint, float(value)
     elif isinstance(value, Mapping):
         for key, item in value.items():
-            yield from _leaves(item, (*words, key))
+            yield from _leaves(item, (*words, key), joint)
     elif isinstance(value, list):
-        for index, item in enumerate(value):
-            yield from _leaves(item, (*words, f"joint {index + 1}"))
+        for index, item in enumerate(value, 1):
+            yield from _leaves(item, (*words, f"joint {index}"), index)
 
 
 def _number(value: Any) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pipelines.report.diagnosis_words import without_keys
+from pipelines.report.figure_words import figure_in_words
 from pipelines.report.report import Figure as Picture
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.style import BLUE, VERMILLION, format_number, format_unit, with_std
@@ -87,7 +88,7 @@ def _verdict(result: Comparison) -> str:
         return f"{a} and {b} agree: none of {len(result.figures)} figures differs beyond its uncertainty."
     words = []
     if beyond:
-        named = ", ".join(f"{one.name} by {format_number(abs(one.away), 2)} std" for one in beyond[:3])
+        named = ", ".join(f"{figure_in_words(one.name)} by {format_number(abs(one.away), 2)} std" for one in beyond[:3])
         more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
         words.append(f"{len(beyond)} of {len(result.figures)} figures differ beyond their uncertainty: {named}{more}")
     if told:
@@ -113,7 +114,7 @@ def _figures(result: Comparison) -> Section | None:
     if not result.figures:
         return None
     shown = result.figures[:_SHOWN]
-    rows = tuple((one.name, with_std(one.a, one.a_std), with_std(one.b, one.b_std), format_unit(one.unit),
+    rows = tuple((figure_in_words(one.name), with_std(one.a, one.a_std), with_std(one.b, one.b_std), format_unit(one.unit),
                   round(one.away, 1) if math.isfinite(one.away) else None, "differs" if one.beyond else "") for one in shown)
     tones: tuple[Tone, ...] = tuple("attention" if one.beyond else "neutral" for one in shown)
     more = len(result.figures) - len(shown)
@@ -135,7 +136,7 @@ def _picture(result: Comparison) -> Picture:
         axes.axvline(0.0, color="0.6", lw=0.8)
         colours = [VERMILLION if one.beyond else BLUE for one in shown]
         axes.scatter([one.away for one in shown], places, c=colours, s=14, zorder=3)
-        axes.set_yticks(list(places), [one.name for one in shown], fontsize=7)
+        axes.set_yticks(list(places), [figure_in_words(one.name) for one in shown], fontsize=7)
         axes.invert_yaxis()
         axes.margins(y=0.02)
         axes.set_xlabel("moved by [std of the difference]")
@@ -148,7 +149,8 @@ def _residuals(result: Comparison) -> Section | None:
     if not result.residuals:
         return None
     changed = sorted(result.residuals, key=lambda one: -abs(_change(one) or 0.0))[:_SHOWN]
-    rows = tuple((one.name, _rounded(one.a), _rounded(one.b), format_unit(one.unit), _rounded(_change(one))) for one in changed)
+    rows = tuple((figure_in_words(one.name), _rounded(one.a), _rounded(one.b), format_unit(one.unit), _rounded(_change(one)))
+                 for one in changed)
     more = len(result.residuals) - len(changed)
     text = ("No standard deviation is known of these, so that they are not judged.",
             *((f"{more} more stand in result.json.",) if more > 0 else ()))
@@ -167,6 +169,6 @@ def _rounded(x: float | None) -> float | None:
 def _alone(result: Comparison) -> Section | None:
     if not (result.only_a or result.only_b):
         return None
-    rows = tuple((name, ", ".join(names[:_SHOWN]) or "none") for name, names in zip(result.names, (result.only_a, result.only_b),
-                                                                                    strict=True))
+    both = zip(result.names, (result.only_a, result.only_b), strict=True)
+    rows = tuple((name, "; ".join(map(figure_in_words, names[:_SHOWN])) or "none") for name, names in both)
     return Section("Figures that only one has", (), (Table(("result", "figures"), rows),))

@@ -17,6 +17,7 @@ from pipelines.batch.drift import drift_of, from_others
 from pipelines.batch.parts import Part, parts_of
 from pipelines.batch.record import Record, Status
 from pipelines.batch.result import Result
+from pipelines.batch.summary import Summary, summary_report
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
 from pipelines.log.result_figures import fitted, residuals
 from pipelines.log.result_schema import result_schema
@@ -289,6 +290,23 @@ def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Pa
     assert outcome.exit_code == 1
     assert {item["name"]: item["status"] for item in outcome.json["items"]} == {"0": "ok", "1": "found", "2": "ok"}
     assert outcome.json["drift"][0]["figures"][0]["moved"] == ["1"]
+
+
+def test_the_page_says_figures_in_words_and_the_file_has_their_keys() -> None:
+    """coulomb:3:level is "Coulomb friction at joint 3, level" for who reads; what moved beyond chance is worth a look, what
+    scatters is in order."""
+    rng = np.random.default_rng(6)
+    for step, tone in ((0.0, "good"), (8.0, "attention")):
+        values = 1.0 + STD * rng.normal(size=8)
+        values[3] += step * STD
+        records = tuple(_record(f"day {k}", figures={"coulomb:3:level": (float(x), STD, "N m")}, robot="arm")
+                        for k, x in enumerate(values))
+        drifts = drift_of(records)
+        page = summary_report(Summary("estimate-bps", records, drifts))
+        (table,) = next(section.tables for section in page.sections if section.title == "Drift of arm")
+        assert (page.tone, table.rows[0][0]) == (tone, "Coulomb friction at joint 3, level")
+        assert drifts[0].figures[0].name == "coulomb:3:level"
+        assert ("Coulomb friction at joint 3, level: " in page.verdict) is (step > 0.0)
 
 
 def test_the_summary_table_holds_every_figure(lay: Lay) -> None:

@@ -1,0 +1,36 @@
+"""The names of figures as people read them; those who compute with them have the keys.
+
+    figure_in_words("extend model cogging joint 2 amplitude 2")     "extend model: cogging at joint 2, second amplitude"
+    figure_in_words("coulomb:3:level")                              "Coulomb friction at joint 3, level"
+"""
+
+from __future__ import annotations
+
+import re
+
+from pipelines.model.effects import effect_names
+from pipelines.report.diagnosis_words import named, spoken
+
+__all__ = ["figure_in_words"]
+
+_WORD = re.compile(r"\S+")
+_CAUSES = (re.compile(r"([a-z_]+)(?::(\d+))?:([a-z_0-9]+)"),  # "coulomb:3:level", "payload:mass"
+           re.compile(r"([a-z_]+)(?: joint (\d+))?(?: (.+))?"))  # "coulomb joint 3 level", "payload mass"
+_HARMONIC = re.compile(r" ([23])$")
+_METHOD = re.compile(r"\b(?:varpro|output-error|ekf) ")
+
+
+def figure_in_words(name: str) -> str:
+    """`name`, which `log.result_figures` gave, with its cause in words; as it is where it is of none."""
+    for start in (word.start() for word in _WORD.finditer(name)):
+        for pattern in _CAUSES:
+            if (found := pattern.fullmatch(name, start)) is not None and found[1] in effect_names():
+                return _told(name[:start].strip(), found[1], None if found[2] is None else int(found[2]), found[3] or "")
+    return name
+
+
+def _told(before: str, cause: str, joint: int | None, what: str) -> str:
+    said = named(cause, joint)
+    parameter = spoken(_HARMONIC.sub(r"_\1", _METHOD.sub("", what)).replace(".", " "))
+    said = f"{before}: {said}" if before else f"{said[:1].upper()}{said[1:]}"
+    return f"{said}, {parameter}" if parameter else said
