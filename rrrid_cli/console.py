@@ -20,7 +20,8 @@ __all__ = ["Teller", "say_error", "say_outcome", "say_table", "say_verdict"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
 _MOST = 12  # remarks
-_HEAD = 12  # characters: a heading is broken into lines no shorter than that
+_HEADS = (12, 8, 6)  # characters: a heading is broken into lines no shorter than that; shorter ones where the table is too wide
+_WIDE = 80  # characters of the narrowest terminal that tables are made for
 
 
 class Teller:
@@ -87,11 +88,7 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], stream: Any = 
     from pipelines.report.cells import are_numbers
 
     columns = [[clean(cell, 200) for cell in column] for column in zip(*rows, strict=True)]
-    widths = [max(map(len, column)) for column in columns]
-    heads: list[list[str]] = []
-    if head and rows:
-        heads = [_heading(words, max(width, _HEAD)) for words, width in zip(head, widths, strict=True)]
-        widths = [max(width, *map(len, lines)) for width, lines in zip(widths, heads, strict=True)]
+    heads, widths = _laid_out(head if rows else (), [max(map(len, column)) for column in columns])
     right = [bool(head) and are_numbers(column) for column in columns]
     deep = max(map(len, heads), default=0)
     above = [[""] * (deep - len(lines)) + lines for lines in heads]
@@ -100,12 +97,25 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], stream: Any = 
         print("  " + "  ".join(cells).rstrip(), file=stream)
 
 
-def _heading(words: str, width: int) -> list[str]:
-    """A heading in lines, its unit in one of them."""
+def _laid_out(head: Sequence[str], cells: Sequence[int]) -> tuple[list[list[str]], list[int]]:
+    """The headings in lines, and the widths of the columns whose cells need `cells`: no wider together than a terminal, if that
+    can be had by breaking headings."""
+    heads, widths = list[list[str]](), list(cells)
+    for least in _HEADS if head else ():
+        heads = [_heading(words, max(width, least), least < _HEADS[0]) for words, width in zip(head, cells, strict=True)]
+        widths = [max(width, *map(len, lines)) for width, lines in zip(cells, heads, strict=True)]
+        if sum(widths) + 2 * len(widths) <= _WIDE:
+            break
+    return heads, widths
+
+
+def _heading(words: str, width: int, tight: bool) -> list[str]:
+    """A heading in lines, its unit in one of them; where it is `tight`, the unit is broken as well."""
     if len(words) <= width:
         return [words]
     name, bracket, unit = words.partition("[")
-    return [*textwrap.wrap(name, width, break_long_words=False), *((bracket + unit,) if bracket else ())]
+    units = textwrap.wrap(bracket + unit, width, break_long_words=False) if tight else [bracket + unit] * bool(bracket)
+    return [*textwrap.wrap(name, width, break_long_words=False), *units]
 
 
 def _say_checks(checks: Iterable[Check], verbose: bool, stream: Any) -> None:

@@ -31,7 +31,7 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
         stage: the command's name. Its table of the configuration is used; the others are checked all the same, and
             `run` hands them to its stages.
         stages: every known name, for a hint where one is misspelt.
-        given: the command's own options; None means: not given.
+        given: the command's own options; None means: not given. Of `run` also "STAGE.OPTION".
         fallback: what holds where nothing else was said; None means: nothing.
 
     Raises:
@@ -53,7 +53,10 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
             owner = kind if name == stage else _settings_of(name)
             chosen.setdefault(name, {}).update(
                 {key: _value(owner, key, value, f"{where}, {name}.{key}") for key, value in options.items()})
-    own = _said(fallback or {}) | chosen.pop(stage, {}) | _said(given)
+    own = _said(fallback or {}) | chosen.pop(stage, {})
+    for name, value in _said(given).items():
+        of, dot, option = name.rpartition(".")
+        (chosen.setdefault(of, {}) if dot else own)[option] = value
     if stage == "run":
         own["stages"] = {name: _settings_of(name)(**options) for name, options in chosen.items()}
     return kind(**own)

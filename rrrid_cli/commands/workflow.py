@@ -23,11 +23,13 @@ def run(
     skip: Annotated[list[str] | None, typer.Option(help="Stage to leave out, such as diagnose. Repeatable.")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be computed, and why; compute nothing.")] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute everything, also what has not changed.")] = False,
+    calibration: Annotated[str | None, typer.Option(
+        help="Folder of an earlier diagnosis or run, whose thresholds diagnose takes. [none]")] = None,
 ) -> None:
     """Do the whole workflow on a folder of logs; one report. What has not changed is not computed again."""
     from pipelines.run import STAGE, plan
 
-    given = {"skip": tuple(skip or ()) or None, "fresh": fresh or None}
+    given = {"skip": tuple(skip or ()) or None, "fresh": fresh or None, "diagnose.calibration": calibration}
     if not dry_run:
         go(STAGE, tuple(logs or ()), common, given, roles=roles)
     request, settings, teller = asked(STAGE, tuple(logs or ()), common, given, roles=roles)

@@ -71,6 +71,8 @@ def test_json_is_alone_on_standard_output(logs: Path) -> None:
     (("run", "logs", "--set", "estimate-bps.model=m.json"), "RRID-C02", 2),
     (("run", "logs", "--set", "diagnose.model=m.json"), "RRID-C04", 2),
     (("run", "logs", "--set", "diagnose.calibration=there-is-none"), "RRID-C04", 2),
+    (("run", "logs", "--calibration", "there-is-none"), "RRID-C04", 2),
+    (("run", "logs", "--calibration", "there-is-none", "--dry-run"), "RRID-C04", 2),
     (("run", "logs", "--set", "validate-writing.text=RRR"), "RRID-C02", 2),
     (("run", "logs", "--set", "run.stages=3"), "RRID-C01", 2),
     (("convert", "logs/a.h5", "--joints", "1,x"), "RRID-C02", 2),

@@ -47,3 +47,19 @@ def test_what_to_check_follows_the_verdict(capsys: pytest.CaptureFixture[str]) -
 def test_no_rows_no_table(capsys: pytest.CaptureFixture[str]) -> None:
     say_table(("a", "b"), [])
     assert capsys.readouterr().out == ""
+
+
+def test_a_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    """The key figures of a diagnosis, 97 characters with headings of twelve letters: 80 at most, with every word and unit."""
+    head = ("joint", "torque error now [N m]", "extended [N m]", "an arm in order leaves [N m]", "beside it", "now [% of rated]",
+            "extended [% of rated]")
+    rows = [("1", "0.0878", "0.0876", "0.0747", "1.2×, in order", "0.146", "0.146"),
+            ("2", "0.2373", "0.0221", "0.0281", "8.4× → 0.79×, in order", "0.791", "0.074")]
+    say_table(head, rows)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert sorted(" ".join(lines[:-2]).split()) == sorted(" ".join(head).split())
+    assert [line.split() for line in lines[-2:]] == [" ".join(row).split() for row in rows]
+    wide = [("a" * 70, "b" * 70)]
+    say_table(("one", "two"), wide)  # no heading could make it narrower: every letter is there all the same
+    assert capsys.readouterr().out.splitlines()[-1].split() == list(wide[0])
