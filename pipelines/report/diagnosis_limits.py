@@ -6,6 +6,7 @@ from pipelines.model.diagnosis.result import Detectable, Diagnosis
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_words import spoken, title_of, told_value, told_values, unit_or_dash, without_keys
 from pipelines.report.report import Section, Table
+from pipelines.report.style import format_number
 
 __all__ = ["limits_sections"]
 
@@ -35,4 +36,5 @@ def _smallest(one: Detectable) -> tuple[str, ...]:
     expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
     if isinstance(value, float) and expected and value >= min(expected):
         return "cannot be seen", "", "", ""
-    return told_value(one.smallest), unit_or_dash(one.smallest.unit), told_values(one.at.items()), _WAY[one.way]
+    told = format_number(value, 2) if isinstance(value, float) else told_value(one.smallest)
+    return told, unit_or_dash(one.smallest.unit), told_values(one.at.items()), _WAY[one.way]

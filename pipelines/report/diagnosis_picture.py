@@ -12,6 +12,7 @@ from pipelines.model.diagnosis.result import Curve, Diagnosis, Evidence, Spectru
 from pipelines.report import style
 from pipelines.report.diagnosis_words import floor_words
 from pipelines.report.figures import envelope, joint_axes, joint_size
+from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure, Section, Table
 from pipelines.report.sections import joint_signal_figure
 from pipelines.report.style import format_number, format_unit, to_one_place
@@ -26,18 +27,18 @@ _COLUMNS = 3  # small figures side by side
 _SHOWN = 6  # curves of a joint
 
 
-def picture_sections(found: Diagnosis, rated: Sequence[float]) -> list[Section]:
+def picture_sections(found: Diagnosis, rated: Sequence[float], units: Units) -> list[Section]:
     """One section for each log that is shown."""
-    return [_section(found, one, rated, k) for k, one in enumerate(found.evidence)]
+    return [_section(found, one, rated, k, units) for k, one in enumerate(found.evidence)]
 
 
-def _section(found: Diagnosis, one: Evidence, rated: Sequence[float], number: int) -> Section:
+def _section(found: Diagnosis, one: Evidence, rated: Sequence[float], number: int, units: Units) -> Section:
     suffix = f"-{number + 1}" if number else ""
-    return Section(f"What is wrong, before any name: {one.log}", (floor_words(found),), (_above(found, one, rated), _tells(one)),
-                   tuple(_figures(one, suffix)))
+    return Section(f"What is wrong, before any name: {one.log}", (floor_words(found),),
+                   (_above(found, one, rated, units), _tells(one)), tuple(_figures(one, suffix, units)))
 
 
-def _above(found: Diagnosis, one: Evidence, rated: Sequence[float]) -> Table:
+def _above(found: Diagnosis, one: Evidence, rated: Sequence[float], units: Units) -> Table:
     joints, rows = len(one.above_floor), []
     torques = to_one_place([float(x) for one_rms in (found.residual_rms.identify, found.residual_rms.floor) for x in one_rms])
     for j in range(joints):
@@ -47,7 +48,8 @@ def _above(found: Diagnosis, one: Evidence, rated: Sequence[float]) -> Table:
         band = f"{format_number(float(low), 2)} to {format_number(float(high), 2)}" if np.isfinite([low, high]).all() else None
         rows.append((j + 1, torques[j], _digits(share), torques[joints + j],
                      _digits(100.0 * float(one.above_floor[j])), band))
-    columns = ("joint", "residual, rms [N m]", "[% of rated]", "floor [N m]", "power above the floor [%]", "mostly between [Hz]")
+    columns = ("joint", f"residual, rms [{units.torque}]", "residual [% of rated]", f"floor [{units.torque}]",
+               "power above the floor [%]", "mostly between [Hz]")
     return Table(columns, tuple(rows), "Of the nominal model, refitted to these logs.")
 
 
@@ -60,44 +62,46 @@ def _tells(one: Evidence) -> Table:
     joints = sorted({c.joint for c in one.curves})
     share = {(c.against, c.joint): c.explained for c in one.curves}
     names = sorted({c.against for c in one.curves}, key=lambda name: -max(share.get((name, j), 0.0) for j in joints))
-    rows = tuple((name, *(_digits(100.0 * share[name, j]) if (name, j) in share else None for j in joints)) for name in names)
+    rows = tuple((name, *(round(100.0 * share[name, j], 1) if (name, j) in share else None for j in joints)) for name in names)
     return Table(("signal", *(f"joint {j} [%]" for j in joints)), rows,
                  "Of the residual's power, what survives averaging in bins of each signal: that much may depend on it.")
 
 
-def _figures(one: Evidence, suffix: str) -> list[Figure]:
-    joints = one.residual.shape[1]
+def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:
+    torque, joints = units.torque, one.residual.shape[1]
     found = [Figure(f"torque-predicted{suffix}", "Torque, measured and predicted by the nominal model.",
-                    lambda drawing: _compared(joint_axes(drawing, joints), one), joint_size(joints)),
+                    lambda drawing: _compared(joint_axes(drawing, joints), one, torque), joint_size(joints)),
              joint_signal_figure(f"residual{suffix}", "Residual over time: measured minus predicted torque.", one.t, one.residual,
-                                 "N m", quantity="residual")]
+                                 torque, quantity="residual")]
     if one.simulated_t is not None and one.simulated_position_error is not None:
         found.append(Figure(f"position-error{suffix}", "What the simulation gets wrong: simulated minus measured position, in "
                             f"closed loop with controller and references of {one.simulated_log}.",
-                            lambda drawing: _simulated(joint_axes(drawing, joints), one), joint_size(joints)))
+                            lambda drawing: _simulated(joint_axes(drawing, joints), one, units.thousandths), joint_size(joints)))
     for over, words in (("order", "Orders of the joint's angle: a peak at 18 is a torque that repeats 18 times a turn."),
                         ("frequency", "Spectrum of the residual.")):
         spectra = [s for s in one.spectra if s.over == over]
         if spectra:
             floor = " Grey: the floor." if any(s.floor is not None for s in spectra) else ""
-            found.append(Figure(f"residual-{over}{suffix}", words + floor, _spectra(spectra), (6.0, 0.8 + 1.2 * len(spectra))))
+            found.append(Figure(f"residual-{over}{suffix}", words + floor, _spectra(spectra, torque),
+                                (6.0, 0.8 + 1.2 * len(spectra))))
     for joint in range(1, joints + 1):
         curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:_SHOWN]
         if curves:
             rows = -(-len(curves) // _COLUMNS)
             found.append(Figure(f"residual-{joint}-over{suffix}", f"Residual of joint {joint} over the signals it follows most, "
-                                "the strongest first: mean in bins, shaded its spread.", _small(curves), (6.0, 0.6 + 1.7 * rows)))
+                                "the strongest first: mean in bins, shaded its spread.",
+                                _small(curves, units.at(joint).torque), (6.0, 0.6 + 1.7 * rows)))
     return found
 
 
-def _compared(axes: Sequence[Axes], one: Evidence) -> None:
+def _compared(axes: Sequence[Axes], one: Evidence, unit: str) -> None:
     for j, axis in enumerate(axes):
         axis.plot(*envelope(one.t, one.measured[:, j]), color=style.SKY, linewidth=3.0, label="measured")
         axis.plot(*envelope(one.t, one.predicted[:, j]), color=style.VERMILLION, linewidth=0.9, label="predicted")
-    _over_time(axes, "torque [N m]")
+    _over_time(axes, f"torque [{unit}]")
 
 
-def _simulated(axes: Sequence[Axes], one: Evidence) -> None:
+def _simulated(axes: Sequence[Axes], one: Evidence, unit: str) -> None:
     t, nominal, extended = one.simulated_t, one.simulated_position_error, one.extended_position_error
     assert t is not None  # no figure is made without
     assert nominal is not None
@@ -105,7 +109,7 @@ def _simulated(axes: Sequence[Axes], one: Evidence) -> None:
         axis.plot(t, 1e3 * nominal[:, j], color=style.BLUE, linewidth=1.4, label="nominal model")
         if extended is not None:
             axis.plot(t, 1e3 * extended[:, j], color=style.VERMILLION, linewidth=0.9, label="with the findings")
-    _over_time(axes, "simulated − measured [mrad]")
+    _over_time(axes, f"simulated − measured [{unit}]")
 
 
 def _over_time(axes: Sequence[Axes], quantity: str) -> None:
@@ -119,7 +123,7 @@ def _over_time(axes: Sequence[Axes], quantity: str) -> None:
         figure.supylabel(quantity, fontsize="medium")
 
 
-def _spectra(spectra: Sequence[Spectrum]) -> Callable[[Drawing], None]:
+def _spectra(spectra: Sequence[Spectrum], unit: str) -> Callable[[Drawing], None]:
     def draw(drawing: Drawing) -> None:
         for axis, one in zip(joint_axes(drawing, len(spectra)), spectra, strict=True):
             if one.floor is not None:
@@ -132,12 +136,12 @@ def _spectra(spectra: Sequence[Spectrum]) -> Callable[[Drawing], None]:
         first = drawing.axes[0]
         first.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
         drawing.axes[-1].set_xlabel(f"{'order' if spectra[0].over == 'order' else 'frequency'} [{format_unit(spectra[0].unit)}]")
-        drawing.supylabel("amplitude [N m]", fontsize="medium")
+        drawing.supylabel(f"amplitude [{unit}]", fontsize="medium")
 
     return draw
 
 
-def _small(curves: Sequence[Curve]) -> Callable[[Drawing], None]:
+def _small(curves: Sequence[Curve], unit: str) -> Callable[[Drawing], None]:
     def draw(drawing: Drawing) -> None:
         rows = -(-len(curves) // _COLUMNS)
         axes = drawing.subplots(rows, _COLUMNS, sharey=True, squeeze=False).ravel()
@@ -148,6 +152,6 @@ def _small(curves: Sequence[Curve]) -> Callable[[Drawing], None]:
             axis.locator_params(nbins=4)
         for axis in axes[len(curves):]:
             axis.set_visible(False)
-        drawing.supylabel("residual [N m]", fontsize="medium")
+        drawing.supylabel(f"residual [{unit}]", fontsize="medium")
 
     return draw

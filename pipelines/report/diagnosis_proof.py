@@ -9,6 +9,7 @@ import numpy as np
 
 from pipelines.model.diagnosis.result import Finding, Proof
 from pipelines.report import style
+from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure
 from pipelines.report.style import format_unit
 
@@ -17,20 +18,23 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_proof", "draw_proof_in_time", "proof_figures"]
 
+_TURNING = Units()
 
-def proof_figures(number: int, one: Finding) -> Iterator[Figure]:
+
+def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterator[Figure]:
     """Over the signal that tells it, and over a stretch of time."""
     proof = one.proof
     if proof is None:
         return
+    torque = units.at(proof.joint).torque
     yield Figure(f"proof-{number}", f"Residual of joint {proof.joint} over {proof.against}: where the finding holds, what is left "
                  "without it follows what it predicts, and little is left with it.",
-                 lambda drawing: draw_proof(drawing.subplots(), proof), (6.0, 3.2))
+                 lambda drawing: draw_proof(drawing.subplots(), proof, torque), (6.0, 3.2))
     yield Figure(f"proof-{number}-in-time", f"The same residual of joint {proof.joint} where the finding shows most, over time.",
-                 lambda drawing: draw_proof_in_time(drawing.subplots(), proof), (6.0, 2.6))
+                 lambda drawing: draw_proof_in_time(drawing.subplots(), proof, torque), (6.0, 2.6))
 
 
-def draw_proof(axes: Axes, proof: Proof) -> None:
+def draw_proof(axes: Axes, proof: Proof, torque: str = "N m") -> None:
     """Means in bins with their standard errors."""
     axes.fill_between(proof.x, proof.before - 2.0 * proof.spread, proof.before + 2.0 * proof.spread, color=style.SKY, alpha=0.35,
                       linewidth=0.0)
@@ -38,21 +42,21 @@ def draw_proof(axes: Axes, proof: Proof) -> None:
     axes.plot(proof.x, proof.predicted, color=style.ORANGE, linestyle=(0, (5, 1.5)), linewidth=1.4,
               label="what the finding predicts")
     axes.plot(proof.x, proof.after, color=style.VERMILLION, linewidth=1.0, label="left with it")
-    _finish(axes, f"{proof.against} [{format_unit(proof.unit)}]")
+    _finish(axes, f"{proof.against} [{format_unit(proof.unit)}]", torque)
 
 
-def draw_proof_in_time(axes: Axes, proof: Proof) -> None:
+def draw_proof_in_time(axes: Axes, proof: Proof, torque: str = "N m") -> None:
     """A stretch of time."""
     t = np.asarray(proof.t)
     axes.plot(t, proof.before_in_time, color=style.SKY, linewidth=2.4, label="without the finding")
     axes.plot(t, proof.predicted_in_time, color=style.ORANGE, linestyle=(0, (5, 1.5)), linewidth=1.2,
               label="what the finding predicts")
     axes.plot(t, proof.after_in_time, color=style.VERMILLION, linewidth=0.9, label="left with it")
-    _finish(axes, "time [s]")
+    _finish(axes, "time [s]", torque)
 
 
-def _finish(axes: Axes, x: str) -> None:
+def _finish(axes: Axes, x: str, torque: str) -> None:
     axes.set_xlabel(x)
-    axes.set_ylabel("residual torque [N m]")
+    axes.set_ylabel(f"residual torque [{torque}]")
     axes.margins(x=0.01, y=0.1)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=3)

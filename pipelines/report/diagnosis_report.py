@@ -31,6 +31,7 @@ from pipelines.report.diagnosis_words import (
     without_keys,
 )
 from pipelines.report.diagnosis_words import torque_errors as errors_table
+from pipelines.report.joint_units import Units, units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_decimals, format_number, to_one_place
@@ -38,17 +39,19 @@ from pipelines.report.style import format_decimals, format_number, to_one_place
 __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
 _LEDGER = 40  # lines
+_TURNING = Units()
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
 
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
+    units = units_in(result)
     found = [section for number, one in enumerate(result.findings, 1)
-             for section in (finding_section(number, one), numbers_section(number, one))]
-    sections = [*found, *_unknown(result), *picture_sections(result, result.rated), *_standing(result), *_others(result),
+             for section in (finding_section(number, one, units=units), numbers_section(number, one, units))]
+    sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
-                  errors_table(result.residual_rms, result.after_rms, result.rated, *held_out_floor(result)),
+                  errors_table(result.residual_rms, result.after_rms, result.rated, *held_out_floor(result), units),
                   tuple(sections), _advice(result))
 
 
@@ -63,7 +66,7 @@ def _verdict(result: Result) -> str:
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(named(one.cause, one.joint) for one in more)}" if more else ""
-    size = f", {_size(first)}" if math.isfinite(first.torque_rms) else ""
+    size = f", {_size(first, units_in(result))}" if math.isfinite(first.torque_rms) else ""
     tip = first.gain.tip_error_rms
     moved = f"; for it the simulated tip is {format_number(1e3 * tip.before, 2)} mm off" if tip is not None else ""
     rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
@@ -81,16 +84,25 @@ def _at(joint: int | None) -> str:
     return "" if joint is None else f" at joint {joint}"
 
 
-def _size(one: Finding) -> str:
+def _size(one: Finding, units: Units) -> str:
     rated = f" ({format_number(100.0 * one.of_rated, 2)} % of the rated torque)" if math.isfinite(one.of_rated) else ""
-    return f"{format_number(one.torque_rms, 2)} N m rms of torque that the model does not have{rated}"
+    return f"{_torque(one, units)} rms of torque that the model does not have{rated}"
+
+
+def _torque(one: Finding, units: Units) -> str:
+    """Of its own joint, or of the largest."""
+    return f"{format_number(one.torque_rms, 2)} {units.at(one.joint).torque}"
 
 
 def _rounded(x: float) -> float | None:
     return float(f"{x:.3g}") if math.isfinite(x) else None
 
 
-def finding_section(number: int, one: Finding, offer: bool = True, floor: str = "the floor") -> Section:
+def _hundredths(x: float) -> float | None:
+    return round(x, 2) if math.isfinite(x) else None
+
+
+def finding_section(number: int, one: Finding, offer: bool = True, floor: str = "the floor", units: Units = _TURNING) -> Section:
     """What it is, what to check, what it is worth, and the figure that proves it.
 
     Args:
@@ -100,8 +112,8 @@ def finding_section(number: int, one: Finding, offer: bool = True, floor: str = 
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one, floor)]
     if math.isfinite(one.torque_rms):
-        text.append(f"Its torque is {format_number(one.torque_rms, 2)} N m rms over the logs that were fitted; over other motion, "
-                    "that of held-out logs say, it is another")
+        text.append(f"Over the logs that were fitted its torque is {_torque(one, units)} rms; over other motion it may be more or "
+                    "less")
     if one.origin == "frequency responses":
         text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
                     f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
@@ -114,14 +126,14 @@ def finding_section(number: int, one: Finding, offer: bool = True, floor: str = 
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
     return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text),
-                   figures=tuple(proof_figures(number, one)))
+                   figures=tuple(proof_figures(number, one, units)))
 
 
-def numbers_section(number: int, one: Finding) -> Section:
+def numbers_section(number: int, one: Finding, units: Units = _TURNING) -> Section:
     """What was identified and what it gains, joint by joint: behind the figure that proves it."""
     beside = "the findings before it" if one.origin in ("residual", "reversals") else "all other findings"
     return Section(f"{number}. In numbers", (), (_numbers(one), gain_table(
-        one.gain, f"Gain on held-out time, root mean square, beside {beside}.")))
+        one.gain, f"Gain on held-out time, root mean square, beside {beside}.", units)))
 
 
 def _frequency(one: Finding) -> float:
@@ -160,7 +172,7 @@ def _numbers(one: Finding) -> Table:
     return Table(("parameter", "value ± std", "unit", "what it is"), rows, "What was identified.")
 
 
-def gain_table(gain: Gain, caption: str) -> Table:
+def gain_table(gain: Gain, caption: str, units: Units = _TURNING) -> Table:
     """Joint by joint: torque and simulated position, without and with."""
     torque, position = gain.validate_torque_rms, gain.simulated_position_rms
     joints = len(torque.before)
@@ -171,8 +183,9 @@ def gain_table(gain: Gain, caption: str) -> Table:
         low, high = (format_decimals(float(end), decimals) if math.isfinite(end) else "–" for end in torque.ci95[j])
         rows.append((j + 1, *errors[j::joints], f"{low} to {high}",
                      *((None, None) if position is None else (_rounded(1e3 * x[j]) for x in (position.before, position.after)))))
-    return Table(("joint", "torque error without [N m]", "with [N m]", "change, 95 % [N m]",
-                  "simulated position error without [mrad]", "with [mrad]"), tuple(rows), caption)
+    unit, small = units.torque, units.thousandths
+    return Table(("joint", f"torque error without [{unit}]", f"with [{unit}]", f"change, 95 % [{unit}]",
+                  f"simulated position error without [{small}]", f"with [{small}]"), tuple(rows), caption)
 
 
 def _unknown(result: Result) -> list[Section]:
@@ -224,8 +237,8 @@ def _others(result: Result) -> list[Section]:
     shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
-        rows = tuple((t.step, title_of(t.cause), t.joint, _rounded(100.0 * t.gain), _rounded(100.0 * t.threshold),
-                      _rounded(100.0 * t.exact_gain), _rounded(t.visibility), "accepted" if t.accepted else without_keys(t.reason))
+        rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _hundredths(100.0 * t.threshold),
+                      _hundredths(100.0 * t.exact_gain), _hundredths(t.visibility), "accepted" if t.accepted else without_keys(t.reason))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
         more = len(result.ledger) - len(rows)

@@ -11,6 +11,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Diagnosis, ResidualRms, Value
 from pipelines.model.effects import effect_names, find_effect
+from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
@@ -32,6 +33,7 @@ _FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference
                 "blocks": "noise of the residual"}
 
 
+_TURNING = Units()
 _ORDER = 1.3  # times what an arm in order leaves: no further than that may an extended model be from it (issue 9)
 _HELD_OUT_FLOOR = ("An arm in order is the fitted rigid body and friction, simulated in the held-out experiments with the noise of "
                    "these drives")
@@ -138,7 +140,8 @@ def held_out_words(held_out: str) -> str:
     return "No log has the role validate: contiguous blocks of time were held out, one after the other."
 
 
-def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: Array, name: str, words: str) -> Table:
+def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float], floor: Array, name: str, words: str,
+                  units: Units = _TURNING) -> Table:
     """Joint by joint: the held-out torque error before and after, in N m and in percent of the rated torque, and the floor.
 
     Beside what an arm in order leaves stands whether the error is in order. Where nothing extends the model there is no column
@@ -156,8 +159,10 @@ def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float
     judged = [(_judged([float(x[j]) for x in errors], float(floor[j])),) if name == _LEFT_IN_ORDER else () for j in range(joints)]
     rows = tuple((j + 1, *torques[j::joints], *judged[j], *shares[j::joints]) for j in range(joints))
     asked = ("beside it",) if name == _LEFT_IN_ORDER else ()
-    heads = ("torque error now [N m]", "extended [N m]", f"{name} [N m]", *asked, "now [% of rated]", "extended [% of rated]") \
-        if extended else ("torque error [N m]", f"{name} [N m]", *asked, "error [% of rated]")
+    unit = units.torque
+    heads = (f"torque error now [{unit}]", f"extended [{unit}]", f"{name} [{unit}]", *asked, "now [% of rated]",
+             "extended [% of rated]") if extended else (
+        f"torque error [{unit}]", f"{name} [{unit}]", *asked, "error [% of rated]")
     return Table(("joint", *heads), rows, f"Of what was held out, root mean square. {words}".strip())
 
 

@@ -10,6 +10,7 @@ from pipelines.model.excitation.rehearse import Rehearsal
 from pipelines.model.excitation.result import DrawnPlan, Result
 from pipelines.report.diagnosis_words import without_keys
 from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
+from pipelines.report.joint_units import unit_of
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import joint_signal_figure
 from pipelines.report.style import format_number, format_unit
@@ -17,9 +18,7 @@ from pipelines.report.style import format_number, format_unit
 __all__ = ["excitation_report"]
 
 _UNCHECKED = "Self-collision is not checked, nor is collision with anything around the robot."
-_AIMS = {
-         "A": "smallest relative std", "D": "smallest confidence ellipsoid",
-         "E": "best known worst direction",
+_AIMS = {"A": "smallest relative std", "D": "smallest confidence ellipsoid", "E": "best known worst direction",
          "condition": "smallest condition number", "frobenius": "smallest Frobenius condition number"}
 _DRAWN_PLANS = 6
 _NEAR_BOUND = 1.5  # times: what is farther from the bound is no percentage of it
@@ -124,8 +123,9 @@ def _safety(result: Result) -> Section:
         end = ", ".join(_trouble(result, found)) or "no drive saturates, no joint exceeds its speed"
         text.append(f"Its first {found.seconds:.3g} s were rehearsed in simulation under PD control of 8 Hz a joint, without "
                     f"feed-forward: {end}. Another controller will follow otherwise.")
-        tables.append(Table(("joint", "away, rms [rad]", "away, most [rad]", "torque, peak [N m]", "limit [N m]",
-                             "speed, peak [rad/s]", "limit [rad/s]", "saturated [%]"), tuple(
+        position, torque, speed = (unit_of(result.limits, quantity) for quantity in ("position", "torque", "speed"))
+        tables.append(Table(("joint", f"away, rms [{position}]", f"away, most [{position}]", f"torque, peak [{torque}]",
+                             f"limit [{torque}]", f"speed, peak [{speed}]", f"limit [{speed}]", "saturated [%]"), tuple(
             (name, found.position_rms[j], found.position_max[j], found.torque_peak[j], found.torque_limit[j], found.speed_peak[j],
              found.speed_limit[j], 100 * found.saturated[j]) for j, name in enumerate(result.joints))))
     return Section("Before the robot moves", tuple(text), tuple(tables), warning=_UNCHECKED)
@@ -146,11 +146,13 @@ def _motion(result: Result) -> Section | None:
     c = result.course
     if c is None:
         return None
-    kinds = [("position", "positions", c.q, "position [rad]", "Positions over one period, as Fig. 8 of the paper."),
-             ("speed", "speeds", c.dq, "speed [rad/s]", "Speeds; dashed, limits that are near."),
-             ("acceleration", "accelerations", c.ddq, "acceleration [rad/s²]", "Accelerations; dashed, limits that are near.")]
+    own = {quantity: format_unit(unit_of(result.limits, quantity)) for quantity in ("position", "speed", "acceleration", "torque")}
+    kinds = [("position", "positions", c.q, f"position [{own['position']}]", "Positions over one period, as Fig. 8 of the paper."),
+             ("speed", "speeds", c.dq, f"speed [{own['speed']}]", "Speeds; dashed, limits that are near."),
+             ("acceleration", "accelerations", c.ddq, f"acceleration [{own['acceleration']}]",
+              "Accelerations; dashed, limits that are near.")]
     if c.tau is not None:
-        kinds.append(("torque", "torques", c.tau, "torque [N m]", f"Torques that the model expects; dashed, "
+        kinds.append(("torque", "torques", c.tau, f"torque [{own['torque']}]", f"Torques that the model expects; dashed, "
                       f"{100 * result.torque_share:.0f} % of the limits, what the plan may use."))
     figures: list[Figure] = []
     for quantity, name, values, label, caption in kinds:
@@ -278,7 +280,8 @@ def _plans_safety(result: Result) -> Section:
         text.append("The excitation moves the arm away from its slow turn, as it is to.")
     if result.rehearsal_failed:
         text.append(f"The rest failed: {result.rehearsal_failed}.")
-    head = ("experiment", "rehearsed [s]", "away, rms [rad]", "away, most [rad]", "torque, of its limit [%]",
+    position = unit_of(result.limits, "position")
+    head = ("experiment", "rehearsed [s]", f"away, rms [{position}]", f"away, most [{position}]", "torque, of its limit [%]",
             "speed, of its limit [%]", "saturated [%]")
     return Section("Before the robot moves", tuple(text), (Table(head, tuple(rows)),), warning=_UNCHECKED)
 
@@ -286,5 +289,5 @@ def _plans_safety(result: Result) -> Section:
 def _plan_figure(plan: DrawnPlan, result: Result) -> Figure:
     own = np.ptp(plan.q, axis=0) > 0.0
     names = tuple(name for name, moves in zip(result.joints, own, strict=True) if moves)
-    return joint_signal_figure(plan.name, f"{plan.name}: {plan.words}.", plan.t, plan.q[:, own], "rad", quantity="position",
-                               names=names)
+    return joint_signal_figure(plan.name, f"{plan.name}: {plan.words}.", plan.t, plan.q[:, own], unit_of(result.limits, "position"),
+                               quantity="position", names=names)

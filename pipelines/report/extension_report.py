@@ -5,6 +5,7 @@ from __future__ import annotations
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.report.diagnosis_report import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_words import held_out_words, named, title_of, torque_errors, without_keys
+from pipelines.report.joint_units import Units, units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
@@ -18,17 +19,19 @@ _NOISE = ("noise of the residual", "Noise of the residual: what of it no model c
 def extension_report(result: Extension) -> Report:
     """Verdict, key figures, one section a cause, what was refused."""
     tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
+    units = units_in(result)
     sections = [section for number, one in enumerate(result.findings, 1)
-                for section in (finding_section(number, one, offer=False, floor="the noise"), numbers_section(number, one))]
+                for section in (finding_section(number, one, offer=False, floor="the noise", units=units),
+                                numbers_section(number, one, units))]
     if result.rejected:
         rows = tuple((title_of(one.cause), one.joint, without_keys(one.reason)) for one in result.rejected)
         sections.insert(0, Section("Not accepted", ("The held-out logs do not bear it out. There is no way around that.",),
                                    (Table(("cause", "joint", "why"), rows),)))
-    sections.append(_basis(result))
+    sections.append(_basis(result, units))
     if result.doctor:
         sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
-                  torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.floor, *_NOISE),
+                  torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.floor, *_NOISE, units),
                   tuple(sections))
 
 
@@ -53,7 +56,7 @@ def _first_reason(result: Extension) -> str:
     return f"{reason[:1].upper()}{reason[1:]}."
 
 
-def _basis(result: Extension) -> Section:
+def _basis(result: Extension, units: Units) -> Section:
     text = [held_out_words(result.held_out),
             "A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its "
             "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the "
@@ -63,6 +66,7 @@ def _basis(result: Extension) -> Section:
     if result.model is not None:
         text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --like LOG\" "
                     "simulates it.")
-    tables = (gain_table(result.gain, "Gain of all accepted causes together, on held-out time, root mean square."),) \
+    tables = (gain_table(result.gain, "Gain of all accepted causes together, on held-out time, root mean square.",
+                         units),) \
         if result.gain is not None and len(result.findings) > 1 else ()
     return Section("What this rests on", tuple(text), tables)

@@ -13,6 +13,7 @@ from pipelines.model.writing.design import Designed
 from pipelines.model.writing.first_validation import FirstValidation
 from pipelines.report import figures, style
 from pipelines.report.figures import Array
+from pipelines.report.joint_units import each, joined
 from pipelines.report.report import Figure
 from pipelines.report.simulation_report import draw_compared
 from pipelines.report.style import format_unit, printable
@@ -53,7 +54,7 @@ def split_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None
             axis.locator_params(axis="y", nbins=4)
         axes[-1].set_xlabel("time [s]")
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderpad=0.0)
-        drawing.supylabel(f"torque [{found.torque_units[0]}]", fontsize="medium")
+        drawing.supylabel(f"torque [{joined(found.torque_units)}]", fontsize="medium")
 
     return Figure(f"split-{found.name}", "What the model's torque is made of, and what it leaves of the measured one.", draw,
                   figures.joint_size(len(joints)))
@@ -130,7 +131,7 @@ def executed_figure(cases: Sequence[Case]) -> Figure | None:
 def simulated_figures(name: str, course: SimulatedCourse, unit: str, torque_unit: str) -> list[Figure]:
     """Position, speed and torque, measured and simulated."""
     signals = [("position", course.position, course.position_simulated, unit),
-               ("speed", course.speed, course.speed_simulated, f"{unit}/s")]
+               ("speed", course.speed, course.speed_simulated, each(unit, "/s"))]
     if course.torque is not None and course.torque_simulated is not None:
         signals.append(("torque", course.torque, course.torque_simulated, torque_unit))
     return [_compared(f"simulated-{quantity}-{name}", f"{quantity.capitalize()}, measured and simulated.", course.t, one, two, own,
@@ -152,7 +153,8 @@ def task_figures(task: Designed, joints: Sequence[str]) -> list[Figure]:
              Figure("tip-speed", "The speed of the tip: fast within a stroke, at rest in corners.",
                     lambda drawing: draw_speed(drawing.subplots(), task), (6.0, 2.2))]
     for name, values, power in (("position", task.q, ""), ("speed", task.dq, "/s"), ("acceleration", task.ddq, "/s^2")):
-        found.append(_signal(f"joint-{name}", f"{name.capitalize()} of the joints.", task.t, values, task.units[0] + power, name,
+        found.append(_signal(f"joint-{name}", f"{name.capitalize()} of the joints.", task.t, values,
+                             each(joined(task.units), power), name,
                              joints))
     return found
 

@@ -12,6 +12,7 @@ from pipelines.model.writing.design import Designed
 from pipelines.model.writing.first_validation import FirstValidation, Largest
 from pipelines.model.writing.result import Result
 from pipelines.report.bps import torque_figure
+from pipelines.report.joint_units import each, joined
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.style import format_number, format_unit
 from pipelines.report.writing_figures import error_map_figure, executed_figure, simulated_figures, split_figure, task_figures
@@ -85,7 +86,7 @@ def _key_figures(result: Result) -> Table | None:
                     (float(f"{result.simulation.position_rms[j]:.3g}"),
                      None if result.simulation.torque_rms is None else float(f"{result.simulation.torque_rms[j]:.3g}"))))
                  for j, name in enumerate(result.joints))
-    unit, position = format_unit(log.torque_units[0]), "rad" if log.torque_units[0] == "N m" else "m"
+    unit, position = joined(log.torque_units), joined("rad" if own == "N m" else "m" for own in log.torque_units)
     return Table(("joint", f"torque, rms [{unit}]", f"model misses, rms [{unit}]", "of it [%]", "below the gate",
                   f"simulated position off by, rms [{position}]", f"simulated torque off by, rms [{unit}]"), rows,
                  f"The model: {result.model}.",
@@ -218,8 +219,8 @@ def _simulation_section(result: Result) -> Section:
     rows = tuple((name, *(None if x is None else float(f"{x[j]:.3g}") for x in (found.position_rms, found.position_max,
                                                                                found.speed_rms, found.torque_rms)))
                  for j, name in enumerate(result.joints))
-    unit, torque_unit = found.units[0], found.torque_units[0]
-    table = Table(("joint", f"position, rms [{unit}]", f"position, largest [{unit}]", f"speed, rms [{unit}/s]",
+    unit, torque_unit = joined(found.units), joined(found.torque_units)
+    table = Table(("joint", f"position, rms [{unit}]", f"position, largest [{unit}]", f"speed, rms [{each(unit, '/s')}]",
                    f"torque, rms [{torque_unit}]"), rows, "Simulated minus measured.")
     drawn = () if found.course is None else tuple(simulated_figures(found.name, found.course, unit, torque_unit))
     return Section("The task simulated", text, (table,), drawn)
