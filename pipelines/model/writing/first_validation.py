@@ -138,7 +138,8 @@ def first_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts:
         int(known.sum()), tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints),
         _rms(left), size, _ratio(_rms(left), size), cutoff, _ratio(_rms(smooth[known]), _rms(whole[known])),
         {name: _rms(getattr(parts, name)[known]) for name in _PARTS}, marks.kind, marks.text,
-        _letters(log, smooth, known, marks, _rms(whole[known])), _largest(log, smooth, known, marks, tip), online,
+        _letters(log, smooth, known, marks, _rms(whole[known])),
+        _largest(log, smooth, _seen_from_both_sides(log, known, cutoff), marks, tip), online,
         _course(log, parts, tip, known) if draw else None)
 
 
@@ -195,6 +196,18 @@ def _letters(log: ExperimentLog, left: Array, known: npt.NDArray[np.bool_], mark
             found.append(LetterError(label, float(log.t[here[0]] - log.t[0]), float(log.t[here[-1]] - log.t[0]),
                                      tuple(rms.tolist()), tuple(_ratio(rms, whole).tolist())))
     return tuple(found)
+
+
+def _seen_from_both_sides(log: ExperimentLog, known: npt.NDArray[np.bool_], cutoff: float | None) -> npt.NDArray[np.bool_]:
+    """Of the `known` samples those that stand a period of the low-pass or more from both ends of the log; all where none does.
+
+    Nearer to an end a zero-phase filter and a smoother see one side only: what is left there is theirs, not the model's.
+    """
+    if cutoff is None or not known.any():
+        return known
+    t = log.t[known]
+    inner = known & (log.t - t[0] >= 1.0 / cutoff) & (t[-1] - log.t >= 1.0 / cutoff)
+    return inner if inner.any() else known
 
 
 def _largest(log: ExperimentLog, left: Array, known: npt.NDArray[np.bool_], marks: Marks, tip: Array) -> tuple[Largest, ...]:

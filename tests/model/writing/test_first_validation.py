@@ -107,3 +107,16 @@ def test_one_sample_at_a_time_is_the_same_model(log: ExperimentLog, motion: Reco
     later, _ = online_validation(log, motion, arm)
     assert later.observer == "a Kalman observer after the fact"
     assert (later.relative_error > online.relative_error).all()
+
+
+def test_the_largest_miss_is_not_what_filters_make_of_an_end(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
+    """A jolt in the last ten milliseconds, beside a smaller one in the middle of the second letter: that one is named."""
+    tau = log.tau.copy()
+    tau[-10:] += 20.0
+    middle = log.n_samples // 2
+    tau[middle:middle + 100] += 2.0
+    found = judged(with_signal(log, tau=tau), motion, arm)
+    assert found.low_pass_hz is not None
+    for one in found.largest:
+        assert abs(one.t - (log.t[middle + 50] - log.t[0])) < 0.2
+        assert log.t[-1] - log.t[0] - one.t > 1.0 / found.low_pass_hz
