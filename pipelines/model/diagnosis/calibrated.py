@@ -3,6 +3,7 @@
     Calibration(origin_of(...), conditions_of(prepared), ..., bounds_of(families, gain, own), ...)
     refuse_unfit(made, prepared, families, "twin")      C02 where it is not for these logs
     thresholds_of(made, families, data, given)          for these families and so many rows
+    following_of(made, prepared, given)                 of what has no name
 
 What an arm in order shows of a cause depends on how it is driven, sampled and moved. A calibration therefore holds for the same
 robot and controller at the same rate, in experiments of the same kind that move about as fast; nothing else is asked of the logs.
@@ -34,7 +35,7 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.wide import WideCause
 
-__all__ = ["bounds_of", "conditions_of", "origin_of", "refuse_unfit", "thresholds_of"]
+__all__ = ["bounds_of", "conditions_of", "following_of", "origin_of", "refuse_unfit", "thresholds_of"]
 
 _ALIKE = 1.5  # times the speed, acceleration or range of a joint
 _OTHER = 1.5  # times the thresholds, for other motion: of four excitations nine of ten were less than 1.8 times the first's
@@ -59,6 +60,19 @@ def thresholds_of(made: Calibration, families: Sequence[Family], prepared: Prepa
     origin = f"{made.origin.replicas} replicas of the twin{', stored by an earlier diagnosis' if given else ''}"
     return Thresholds(scale * [one.gain for one in own], scale * [one.own for one in own], origin, made.weight,
                       tuple(family.joint for family in families), wide)
+
+
+def following_of(made: Calibration, prepared: Prepared, given: bool) -> Array | None:
+    """(joints,) how far an arm in order follows the motion of its joints: in shorter logs chance follows farther, as 1/rows.
+
+    Args:
+        given: as in `thresholds_of`.
+    """
+    if made.following is None:
+        return None
+    shorter = np.maximum(1.0, made.conditions.rows / np.maximum(_rows(prepared.data), 1.0))
+    other = _OTHER if given and not _same_motion(made.conditions, conditions_of(prepared)) else 1.0
+    return np.asarray(other * shorter * made.following)
 
 
 def _wide_causes(made: Calibration, families: Sequence[Family]) -> tuple[WideCause, ...]:

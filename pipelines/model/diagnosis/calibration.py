@@ -76,5 +76,6 @@ class Calibration:
     causes: tuple[CauseBound, ...]
     wide: Wide | None  # of causes of the whole arm
     floors: tuple[Floors, ...]  # spectra
+    following: Array | None = None  # (joints,) the most that any replica's residual follows the joint's own motion; None: not known
     format: Literal["rrrid-calibration"] = field(default=FORMAT, kw_only=True)
     format_version: Literal[1] = field(default=FORMAT_VERSION, kw_only=True)

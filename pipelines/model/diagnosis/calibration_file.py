@@ -113,6 +113,8 @@ def _fault(made: Calibration) -> str:
     if not (np.isfinite(arrays[0]).all() and all(np.isfinite(one).all() for one in arrays[2:])
             and made.conditions.row_time > 0.0):
         return "a floor, or conditions, that are no numbers"  # the noise of the drives is unknown without a twin
+    if made.following is not None and not (made.following.shape == (joints,) and (made.following >= 0.0).all()):
+        return "how far an arm in order follows its motion, that is no number or of other joints"
     if made.wide is None:
         return "" if stored else "causes of the whole arm are missing"
     return _fault_of_sums(made.wide, joints, sum(one.joint is None for one in made.causes))

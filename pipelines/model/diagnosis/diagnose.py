@@ -18,7 +18,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.beside import Held, Judged, acted, judged
-from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origin_of, refuse_unfit, thresholds_of
+from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, following_of, origin_of, refuse_unfit, thresholds_of
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.carried import carried
@@ -35,13 +35,14 @@ from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import Settled, settled, unlike_held_out, unnamed
+from pipelines.model.diagnosis.own_motion import following
+from pipelines.model.diagnosis.pruned import Settled, settled, unlike_held_out, unlike_motion, unnamed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, Rejected, ResidualRms, Threshold
 from pipelines.model.diagnosis.search import Explored, Found, Step, clean, gap_first, gives_way, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.since import Probed, since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import drive_noise, make_twin, replayable, white
 from pipelines.model.diagnosis.verdict import Ruling, rule
@@ -92,7 +93,8 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     found = search(case, chosen.most, rough)
     known = floored.thresholds is not None
     done = settled(found, rule(found, floored.rms, known), case, prepared, floored.rms, known)
-    return _told(first, case, done, floored, chosen)
+    usual = None if floored.calibration is None else following_of(floored.calibration, prepared, calibration is not None)
+    return _told(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 
 
 def _nameable(case: Case, stiff: Compliance | None) -> Case:
@@ -147,7 +149,8 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
     return Calibration(
         origin_of("twin", [prepared.motions[place][0] for place in places], model.nominal, chosen), conditions_of(prepared), weight,
         twin.rms, twin.noise, bounds_of(case.families, found.gain, found.own), found.wide,
-        floors_of(twin.data, twin.fits[0].left) if chosen.evidence else ())
+        floors_of(twin.data, twin.fits[0].left) if chosen.evidence else (),
+        following(*twin.weighted(weight)).max(axis=1))
 
 
 def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given: Calibration | None,
@@ -200,7 +203,7 @@ def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings,
-          probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None = None) -> Diagnosis:
+          probed: Probed | None = None) -> Diagnosis:
     done, responded, own = _held_against(first, case, done, floored, chosen)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
@@ -251,10 +254,12 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: _Floore
     return believed, responded if believed is done else judged(held, believed.found.final), own
 
 
-def _limits(last: Step, case: Case, prepared: Prepared, probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None,
+def _limits(last: Step, case: Case, prepared: Prepared, probed: Probed | None,
             ) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
     """By hiding causes in what the last model leaves; with reference logs beside these."""
-    probe, bounds = (Probe.of(last.before, case.judge), last.thresholds) if probed is None else probed(last.before, case.judge)
+    arm = case.screened_by(last.before.model)
+    probe, bounds = ((Probe.of(last.before, case.judge, arm), last.thresholds) if probed is None else
+                     probed(last.before, case.judge, arm))
     return detectable(last.screened, bounds, prepared.data.logs[0].log.robot.revolute, probe)
 
 

@@ -20,12 +20,13 @@ from pipelines.model.diagnosis.gains import Simulation, farther, simulation_erro
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mistaken import imitated
+from pipelines.model.diagnosis.own_motion import following, standing_out
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unnamed", "vague"]
+__all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unlike_motion", "unnamed", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
@@ -98,6 +99,20 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array) -> Settled:
     doubts = dict(done.ruling.doubts) | dict.fromkeys(done.ruling.named, "it does not explain the held-out logs")
     ruling = Ruling("unknown", (), f"{model} leaves, of {high} in those held out, {times}", doubts)
     return Settled(replace(done.found, final=done.found.nominal), ruling, ())
+
+
+def unlike_motion(done: Settled, usual: Array) -> Settled:
+    """"unknown" where nothing was found, and what the nominal model leaves of a joint follows from the motion of that joint far
+    more than in an arm in order, (joints,) `usual`: a cause without a name here."""
+    if done.ruling.verdict != "nothing-wrong":
+        return done
+    nominal = done.found.nominal
+    joints = standing_out(following(nominal.fit, nominal.residual[None])[:, 0], usual)
+    if not joints:
+        return done
+    where = ", ".join(f"joint {j + 1}" for j in joints)
+    reason = f"what is left of {where} follows from its own motion, which noise does not, and no cause explains it"
+    return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
 
 
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:

@@ -25,6 +25,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
+from pipelines.model.diagnosis.waves import without_waves
 
 __all__ = ["Explored", "Found", "Step", "clean", "gap_first", "gives_way", "provisional", "search"]
 
@@ -131,7 +132,7 @@ def _share(one: Screened, now: Refined) -> float:
 
 
 def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
-    return tuple(screen(case.data, now.fit, case.families, now.model.arm))
+    return tuple(screen(case.data, now.fit, case.families, case.screened_by(now.model)))
 
 
 def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened]) -> Explored:
@@ -200,7 +201,8 @@ def _fewest(tried: Sequence[Tried]) -> Tried | None:
 
 
 def clean(explored: Explored, most: int = 8) -> Array:
-    """(rows,) [N m] what is left when everything that the most promising causes could explain is taken away, right or wrong.
+    """(rows,) [N m] what is left when everything that the most promising causes could explain is taken away, right or wrong, and
+    every line along an angle, of which no cause need know.
 
     Noise is in it, and hardly any fault: a fault would pass for noise, and the twin would be too noisy to show anything.
     """
@@ -209,7 +211,7 @@ def clean(explored: Explored, most: int = 8) -> Array:
     tables = [laid_whole(now.data, one.shape[0].full(), now.model.arm) for one in best]
     basis = orthonormal(np.concatenate([fit.project(table) for table in tables]))
     residual = fit.residual - (basis @ fit.residual) @ basis
-    return np.asarray(residual / fit.weights)
+    return without_waves(now.data, np.asarray(residual / fit.weights))
 
 
 def _reweighted(done: Refined) -> Refined:

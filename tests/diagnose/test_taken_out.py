@@ -1,0 +1,31 @@
+"""A cause that is taken out of the library leaves something without a name: no arm in order."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from tests.diagnose.sessions import but, session
+
+_LIBRARY = but("torque_offset", "stribeck")  # neither is like what is hidden here
+
+
+def diagnosed(cause: str = "", joint: int | None = None) -> Diagnosis:
+    settings = DiagnosisSettings(limits=False, evidence=False, replicas=6, without=_LIBRARY)
+    return diagnose(Logs.by_role(session(cause, joint, 4.0, 3)), settings)
+
+
+@pytest.mark.parametrize(("cause", "joint"), [
+    ("encoder_eccentricity", 1),  # 1.4 times the floor: within what an arm in order may leave, but no noise
+    ("cogging", 3)])  # a line along the angle had passed for noise of the drive, and the floor stood high
+def test_something_is_wrong_that_has_no_name(cause: str, joint: int) -> None:
+    found = diagnosed(cause, joint)
+    assert found.verdict == "unknown"
+    assert f"joint {joint}" in found.reason
+
+
+def test_nothing_is_wrong_with_the_same_arm_in_order() -> None:
+    assert diagnosed().verdict == "nothing-wrong"
