@@ -8,7 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.search import clean, provisional
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.twin import white
 from pipelines.model.diagnosis.waves import without_waves
+from pipelines.model.rigid.body import Motion
+from tests.diagnose.sessions import but
+from tests.model.diagnosis.arms import hidden
 
 ROWS, STEP = 1500, 8e-3  # [s]
 
@@ -48,3 +59,23 @@ def test_noise_alone_is_left_alone(angle: np.ndarray) -> None:
 def test_a_joint_at_rest_has_no_angle_to_speak_of() -> None:
     drawn = noise(1)
     assert np.array_equal(without_waves(rows_of(np.full(ROWS, 0.3), drawn), drawn), drawn)
+
+
+def ripple(motion: Motion) -> np.ndarray:
+    """0.1 N m at joint 3, 35 waves a turn, and a third of it with twice as many."""
+    out = np.zeros_like(motion.q)
+    out[:, 2] = 0.1 * np.sin(35.0 * motion.q[:, 2] + 0.3) + 0.035 * np.sin(70.0 * motion.q[:, 2] + 0.7)
+    return out
+
+
+def test_a_ripple_that_nobody_looks_for_is_no_noise_of_the_drive() -> None:
+    """The twin would be as noisy as the ripple is quick, and nothing stand out of it."""
+    seen = []
+    for load in (None, ripple):
+        prepared = prepare(Logs((hidden(1, load), hidden(2, load))), DiagnosisSettings())
+        columns, fit = fit_nominal(prepared.data, prepared.columns)
+        model = Exact.start(columns, fit)
+        every = families(columns.laws, whole_motion(prepared.data), model.arm, but("torque_offset", "quadratic_drag"))
+        rough = provisional(Case(prepared.data, None, model, fit.weight, every, None))
+        seen.append(white(prepared.data, clean(rough[-1])))
+    assert (seen[1] < 3.0 * seen[0]).all()  # fifteen times as much with the ripple in it
