@@ -25,9 +25,10 @@ from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Family", "Laid", "families", "lay_family", "lay_one", "place_of", "runs_away", "whole_motion"]
+__all__ = ["Arms", "Family", "Laid", "families", "lay_family", "lay_one", "lay_shape", "place_of", "runs_away", "whole_motion"]
 
 Indices = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 _AT_ONCE = 48  # columns
 _AWAY = 1e50  # beyond any unit: what is larger runs away, and its square, weighted and summed, is no number any more
@@ -46,6 +47,17 @@ class Family:
         """Whether it happens once, in one log: its non-linear numbers belong to that."""
         one = self.shapes[0]
         return any(q.shape and q.name in one.per_log for q in one.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Arms:
+    """By whose columns causes are screened."""
+
+    now: Arm  # with all that was found
+    start: Arm  # for what just adds its torque, whatever else acts
+
+    def of(self, family: Family) -> Arm:
+        return self.start if family.shapes[0].adds else self.now
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,26 +111,48 @@ def whole_motion(data: Data) -> Motion:
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     """The columns of every shape, a few shapes at a time."""
-    whole, arm = arm, arm.unrecorded
-    with np.errstate(all="ignore"):
-        width = family.shapes[0].columns(_first_samples(data), arm).shape[2]
-    size = max(1, _AT_ONCE // max(width, 1))
+    size = _at_once(data, family, arm.unrecorded)
     for first in range(0, len(family.shapes), size):
-        some = family.shapes[first:first + size]
+        yield _lay_some(data, family, first, size, arm)
+
+
+def lay_shape(data: Data, family: Family, place: int, arm: Arm) -> Array:
+    """(k, rows) of shape number `place`, kept with those that `lay_family` lays beside it."""
+    size = _at_once(data, family, arm.unrecorded)
+    laid = _lay_some(data, family, place // size * size, size, arm)
+    whole = np.zeros((laid.table.shape[1], data.rows))
+    whole[:, laid.rows] = laid.table[place - laid.first]
+    return whole
+
+
+def _lay_some(data: Data, family: Family, first: int, size: int, whole: Arm) -> Laid:
+    some, arm = family.shapes[first:first + size], whole.unrecorded
+    with np.errstate(all="ignore"):
+        kept = some[0].from_motion and family.joint and whole is arm
+        acting, parts = _own(data, some, arm) if kept else _anywhere(data, some, arm, whole, not family.event)
+    rows = np.flatnonzero(acting[data.joint])
+    found = np.concatenate(parts, axis=2)
+    if not data.counts.all():
+        found = np.where(data.counts[rows], found, 0.0)
+    return Laid(first, found, rows)
+
+
+def _at_once(data: Data, family: Family, arm: Arm) -> int:
+    """Shapes that are laid together."""
+    first = family.shapes[0]
+
+    def width() -> Array:
         with np.errstate(all="ignore"):
-            kept = some[0].from_motion and family.joint and whole is arm
-            acting, parts = _own(data, some, arm) if kept else _anywhere(data, some, arm, whole, not family.event)
-        rows = np.flatnonzero(np.isin(data.joint, acting))
-        found = np.concatenate(parts, axis=2)
-        if not data.counts.all():
-            found = np.where(data.counts[rows], found, 0.0)
-        yield Laid(first, found, rows)
+            return np.array(first.columns(_first_samples(data), arm).shape[2])
+
+    columns = width() if family.event else data.logs[0].keep(("columns", first), width)
+    return max(1, _AT_ONCE // max(int(columns), 1))
 
 
-def _own(data: Data, some: Sequence[Effect], arm: Arm) -> tuple[Indices, list[Array]]:
+def _own(data: Data, some: Sequence[Effect], arm: Arm) -> tuple[Mask, list[Array]]:
     """The joint that they act on, and of each log (shapes, k, rows of that joint): kept, for they follow from the motion alone."""
     laid = [one.keep(tuple(some), partial(_laid_own, one, some, arm)) for one in data.logs]
-    return np.array([(some[0].joint or 1) - 1]), [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
+    return np.arange(data.n_joints) == (some[0].joint or 1) - 1, [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
 
 
 def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
@@ -128,12 +162,21 @@ def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
     return one.lay_signals(table.reshape(-1, table.shape[2]))
 
 
-def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bool) -> tuple[Indices, list[Array]]:
+def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bool) -> tuple[Mask, list[Array]]:
     """Joints that they act on, and of each log (shapes, k, rows of those joints); kept for the next time the same arm is asked."""
-    laid = [one.keep((tuple(some), one.kept.number(whole)), partial(_laid_anywhere, one, some, arm, whole)) if keep
-            else _laid_anywhere(one, some, arm, whole) for one in data.logs]
-    acting = np.flatnonzero([any(x[:, :, j].any() for x in laid) for j in range(data.n_joints)])
-    return acting, [x[:, :, acting].reshape(*x.shape[:2], -1) for x in laid]
+    laid, acts = [], np.zeros(data.n_joints, dtype=bool)
+    for one in data.logs:
+        lay, key = partial(_laid_anywhere, one, some, arm, whole), (tuple(some), one.kept.number(whole)) if keep else None
+        laid.append(lay() if key is None else one.keep(key, lay))
+        there = partial(_acting, laid[-1])
+        acts |= there() if key is None else one.keep((*key, "acting"), there)
+    joints = slice(None) if acts.all() else np.flatnonzero(acts)
+    return acts, [x[:, :, joints].reshape(*x.shape[:2], -1) for x in laid]
+
+
+def _acting(laid: Array) -> Mask:
+    """(joints,) of (shapes, k, joints, rows): which have something."""
+    return np.array([laid[:, :, joint].any() for joint in range(laid.shape[2])])
 
 
 def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.candidates import Arms, Family
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.held_out import held_out_left
@@ -18,6 +18,8 @@ from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.thresholds import Thresholds
 
 __all__ = ["Case", "Changed", "held_out"]
+
+_ALIKE = 0.05  # of a joint's torque, by which two arms may differ and have the same columns to first order
 
 Changed = Callable[[Refined, Sequence[bool]], tuple[Sequence[Screened], Thresholds]]
 
@@ -37,6 +39,16 @@ class Case:
     changed: Changed | None = None  # what has changed since the reference logs
     again: bool = True  # a cause that may act more than once at its place may be found more than once
     beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
+
+    def arms(self, model: Exact) -> Arms:
+        """By whose columns causes are screened beside `model`: what just adds its torque by those of the start, which are laid
+        already, as long as that arm has the same torque.
+
+        Columns are of first order. Those of an arm that differs by a twentieth are off by as much, and gain a thousandth less.
+        """
+        torque = model.torque(self.data)
+        more = self.data.rms(self.model.torque(self.data) - torque)
+        return Arms(model.arm, self.model.arm if (more <= _ALIKE * self.data.rms(torque)).all() else model.arm)
 
 
 def held_out(done: Refined, case: Case) -> float:

@@ -119,7 +119,7 @@ class LogData:
             return out
         return out.reshape(table.shape[1], table.shape[2], self.rows).transpose(1, 0, 2)
 
-    def keep(self, key: Hashable, lay: Callable[[], Array]) -> Array:
+    def keep(self, key: Hashable, lay: Callable[[], npt.NDArray[Any]]) -> npt.NDArray[Any]:
         """What `lay()` makes, or made before under the same key; not to be written to."""
         return self.kept.of((self.place, key), lay)
 

@@ -37,12 +37,11 @@ from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.own_motion import following
 from pipelines.model.diagnosis.pruned import Settled, settled, unlike_held_out, unlike_motion, unnamed
-from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, Rejected, ResidualRms, Threshold
 from pipelines.model.diagnosis.search import Explored, Found, Step, clean, gap_first, gives_way, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.since import Probed, since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import drive_noise, make_twin, replayable, white
 from pipelines.model.diagnosis.verdict import Ruling, rule
@@ -203,7 +202,7 @@ def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings,
-          probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None = None) -> Diagnosis:
+          probed: Probed | None = None) -> Diagnosis:
     done, responded, own = _held_against(first, case, done, floored, chosen)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
@@ -254,10 +253,12 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: _Floore
     return believed, responded if believed is done else judged(held, believed.found.final), own
 
 
-def _limits(last: Step, case: Case, prepared: Prepared, probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]] | None,
+def _limits(last: Step, case: Case, prepared: Prepared, probed: Probed | None,
             ) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
     """By hiding causes in what the last model leaves; with reference logs beside these."""
-    probe, bounds = (Probe.of(last.before, case.judge), last.thresholds) if probed is None else probed(last.before, case.judge)
+    arms = case.arms(last.before.model)
+    probe, bounds = ((Probe.of(last.before, case.judge, arms), last.thresholds) if probed is None else
+                     probed(last.before, case.judge, arms))
     return detectable(last.screened, bounds, prepared.data.logs[0].log.robot.revolute, probe)
 
 

@@ -45,7 +45,7 @@ def _in_range(case: Case, now: Refined, one: Screened, error: float) -> Tried | 
     fast it begins. Of all ends that it may come to, the nearest one goes least beyond what was seen.
     """
     best, least = None, np.inf
-    for laid in lay_family(case.data, one.family, now.model.arm):
+    for laid in lay_family(case.data, one.family, case.arms(now.model).of(one.family)):
         gains, _, _ = gains_of(laid, now.fit, now.residual[None])
         for k in np.flatnonzero(gains[:, 0] >= _NEARLY * one.gain[0]).tolist():
             shape = one.family.shapes[laid.first + k].full()
@@ -94,7 +94,7 @@ def _given(case: Case, now: Refined, one: Screened, amplitudes: Array) -> Effect
     """The shape that leaves least with the amplitudes that physics gives; screening, which fits them, takes half of a gap twice as
     wide for the same."""
     best, least = one.shape[0], np.inf
-    for laid in lay_family(case.data, one.family, now.model.arm):
+    for laid in lay_family(case.data, one.family, case.arms(now.model).of(one.family)):
         for k, table in enumerate(laid.table):
             column = np.zeros(case.data.rows)
             column[laid.rows] = amplitudes @ table

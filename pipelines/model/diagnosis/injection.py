@@ -1,6 +1,6 @@
 """The smallest strength of a cause that would have been found, by hiding it in the very logs that were diagnosed.
 
-    probe = Probe.of(final, judge)
+    probe = Probe.of(final, judge, arms)
     hidden = smallest(family, bound, probe)         amplitudes; None of what cannot be put in at a strength, an event say
 
 The cause is added to what the final model leaves, with and against it, in several of its shapes; the model is fitted anew, which
@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from pipelines.fit.bootstrap import apart_in, drawn
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
+from pipelines.model.diagnosis.candidates import Arms, Family, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.refit import Refined, refine
@@ -63,12 +63,13 @@ class Probe:
     fit: Fit  # of it
     later: Mask | None  # (rows,) in which something may have changed; None: in all
     held: Refined  # the same model on what is held out
+    arms: Arms  # by whose columns causes are screened
 
     @classmethod
-    def of(cls, final: Refined, judge: Data | None, stacked: tuple[Data, Fit, Mask] | None = None) -> Probe:
+    def of(cls, final: Refined, judge: Data | None, arms: Arms, stacked: tuple[Data, Fit, Mask] | None = None) -> Probe:
         """`judge`: held-out logs, if any; `stacked`: with reference logs both, the fit on both, and which rows are later."""
         data, fit, later = (final.data, final.fit, None) if stacked is None else stacked
-        return cls(final, data, fit, later, final if judge is None else refine(final.model, judge, final.weight, steps=0))
+        return cls(final, data, fit, later, final if judge is None else refine(final.model, judge, final.weight, steps=0), arms)
 
     @cached_property
     def draws(self) -> Array:
@@ -86,13 +87,18 @@ class Probe:
         inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
         return np.asarray((inverse @ unit) * self.final.weights / np.where(size > 0.0, size, 1.0)[:, None])
 
+    @cached_property
+    def _spanned(self) -> Array:
+        """(rank, rows of the final model) of the fit's basis."""
+        return self.fit.basis if self.later is None else self.fit.basis[:, self.later]
+
     def left_of(self, torque: Array) -> Array:
         """(…, rows) what the fit leaves, weighted, of `torque` (…, rows of the final model) [N m]."""
-        if self.later is None:
-            return self.fit.project(torque)
-        whole = np.zeros((*torque.shape[:-1], self.data.rows))
-        whole[..., self.later] = torque
-        return self.fit.project(whole)
+        own: Mask | slice = slice(None) if self.later is None else self.later
+        weighted = torque * self.fit.weights[own]
+        left = -(weighted @ self._spanned.T) @ self.fit.basis
+        left[..., own] += weighted
+        return np.asarray(left)
 
     def own(self, rows: npt.NDArray[np.intp], table: Array) -> Array:
         """(…, rows of the final model) of a `table` (…, those of `rows`) laid on the screened data."""
@@ -151,20 +157,20 @@ def _raised(factor: Callable[[float], float], strength: float) -> float:
 
 def _draws(family: Family, bound: float, probe: Probe) -> list[_Draw]:
     """Some shapes of the family in some directions, and from which strength on the best shape takes off more than `bound`."""
-    arm, count = probe.final.model.arm, len(family.shapes)
+    arm, count = probe.arms.of(family), len(family.shapes)
     chosen = set(np.unique(np.linspace(0, count - 1, min(count, _SHAPES)).round().astype(int)).tolist())
     hidden: list[tuple[Effect, Array, Array]] = []
     rows, scales = [], []
     for laid in lay_family(probe.data, family, arm):
         for place in sorted(chosen & set(range(laid.first, laid.first + len(laid.table)))):
             effect, columns = family.shapes[place], probe.own(laid.rows, laid.table[place - laid.first])
+            left, weighted = probe.left_of(columns), columns * probe.final.weights
             for direction in _directions(effect, len(columns)):
-                torque = direction @ columns
-                left = probe.left_of(torque)
-                size = float(np.linalg.norm(left))
-                if size > INVISIBLE * float(np.linalg.norm(torque * probe.final.weights)):
+                one = direction @ left
+                size = float(np.linalg.norm(one))
+                if size > INVISIBLE * float(np.linalg.norm(direction @ weighted)):
                     hidden.append((effect, columns, direction))
-                    rows.append(left * np.sqrt(bound) / size)
+                    rows.append(one * np.sqrt(bound) / size)
                     scales.append(np.sqrt(bound) / size)
     if not hidden:
         return []
@@ -178,7 +184,7 @@ def _quadratics(family: Family, probe: Probe, units: Array) -> list[tuple[Array,
     """Of some shapes at a time g(x⊥), b and g(r), each (shapes, units)."""
     found = []
     residuals = np.concatenate([probe.fit.residual[None], units])
-    for laid in lay_family(probe.data, family, probe.final.model.arm):
+    for laid in lay_family(probe.data, family, probe.arms.of(family)):
         width = laid.table.shape[1]
         products = (products_of(laid, probe.fit, residuals) if probe.later is None else  # a common column, and one of the change
                     products_apart(laid, probe.fit, residuals, probe.later[laid.rows]))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
@@ -80,7 +81,8 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
         raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
     columns = _columns(logs, arm)
     how = Reconstruction()
-    fitted, judging, referring = (motions_of(part, how) for part in (logs.identify, logs.validate, logs.reference))
+    motions = iter(motions_of((*logs.identify, *logs.validate, *logs.reference), how))
+    fitted, judging, referring = (tuple(islice(motions, len(part))) for part in (logs.identify, logs.validate, logs.reference))
     recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed), (*fitted, *referring))
     return _laid(logs, columns, recipe, fitted, judging, referring)
 

@@ -11,14 +11,16 @@ import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from pipelines.log.experiment import Array
 from pipelines.log.shared_work import shared_out
 
 __all__ = ["Kept", "together"]
+
+Rows = npt.NDArray[Any]
 
 P = TypeVar("P")
 A = TypeVar("A")
@@ -31,11 +33,11 @@ class Kept:
 
     def __init__(self, room: int = _ROOM) -> None:
         self._room, self._used = room, 0
-        self._rows: OrderedDict[Hashable, Array] = OrderedDict()
+        self._rows: OrderedDict[Hashable, Rows] = OrderedDict()
         self._numbered: list[tuple[weakref.ref[object], Hashable]] = []
         self._count = 0
 
-    def of(self, key: Hashable, lay: Callable[[], Array]) -> Array:
+    def of(self, key: Hashable, lay: Callable[[], Rows]) -> Rows:
         found = self._rows.pop(key, None)
         if found is None:
             found = lay()
@@ -64,11 +66,11 @@ class Kept:
         """Of all there is."""
         return frozenset(self._rows)
 
-    def since(self, before: frozenset[Hashable]) -> list[tuple[Hashable, Array]]:
+    def since(self, before: frozenset[Hashable]) -> list[tuple[Hashable, Rows]]:
         """What came in after `before`, the newest last."""
         return [(key, rows) for key, rows in self._rows.items() if key not in before]
 
-    def take(self, more: Iterable[tuple[Hashable, Array]]) -> None:
+    def take(self, more: Iterable[tuple[Hashable, Rows]]) -> None:
         for key, rows in more:
             self.of(key, partial(np.asarray, rows))
 
@@ -78,10 +80,10 @@ def together(stores: Iterable[Kept], work: Callable[[P], A], pieces: Sequence[P]
     own = list({id(store): store for store in stores}.values())
     before = [store.keys() for store in own]
 
-    def left() -> list[list[tuple[Hashable, Array]]]:
+    def left() -> list[list[tuple[Hashable, Rows]]]:
         return [store.since(keys) for store, keys in zip(own, before, strict=True)]
 
-    def take(more: list[list[tuple[Hashable, Array]]]) -> None:
+    def take(more: list[list[tuple[Hashable, Rows]]]) -> None:
         for store, rows in zip(own, more, strict=True):
             store.take(rows)
 

@@ -76,7 +76,7 @@ def _smallest(bounds: Mapping[Family, float], probe: Probe) -> dict[Family, Hidd
     """Of each family, by two processes."""
     _ = probe.draws, probe.absorbing  # once, before there are two
     found = for_each(probe.data, lambda family: smallest_hidden(family, bounds[family], probe), tuple(bounds),
-                     (probe.fit, probe.final.fit), probe.final.model.arm)
+                     (probe.fit, probe.final.fit), probe.arms.now, probe.arms.start)
     return dict(zip(bounds, found, strict=True))
 
 

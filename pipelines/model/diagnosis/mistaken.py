@@ -23,4 +23,5 @@ def imitated(step: Step, family: Family, case: Case) -> float:
     before = step.before
     taken = before.fit.project(before.left - step.best.done.left)
     whole = float(taken @ taken)
-    return float(screen_family(case.data, before.fit, family, before.model.arm, taken[None]).gain[0]) / max(whole, 1e-300)
+    seen = screen_family(case.data, before.fit, family, case.arms(before.model).of(family), taken[None])
+    return float(seen.gain[0]) / max(whole, 1e-300)

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.candidates import Family, Laid, lay_family
+from pipelines.model.diagnosis.candidates import Arms, Family, Laid, lay_family
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.kept import together
 from pipelines.model.diagnosis.nominal import Fit
@@ -75,21 +75,24 @@ class Screened:
         return self.family.joint
 
 
-def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm, residuals: Array | None = None) -> list[Screened]:
+def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm | Arms, residuals: Array | None = None) -> list[Screened]:
     """Every family; `residuals` (m, rows), weighted and orthogonal to the fit, that of the fit where left out."""
-    def one(family: Family) -> Screened:
-        return (screen_event if family.event else screen_family)(data, fit, family, arm, residuals).lean
+    arms = arm if isinstance(arm, Arms) else Arms(arm, arm)
 
-    found = for_each(data, one, candidates, (fit,), arm)
+    def one(family: Family) -> Screened:
+        return (screen_event if family.event else screen_family)(data, fit, family, arms.of(family), residuals).lean
+
+    found = for_each(data, one, candidates, (fit,), arms.now, arms.start)
     return [replace(seen, family=family) for seen, family in zip(found, candidates, strict=True)]
 
 
-def for_each(data: Data, work: Callable[[Family], A], candidates: Sequence[Family], fits: Iterable[Fit], arm: Arm) -> list[A]:
-    """What `work` makes of each family, by two processes; `fits` and `arm` are what it needs."""
+def for_each(data: Data, work: Callable[[Family], A], candidates: Sequence[Family], fits: Iterable[Fit], *arms: Arm) -> list[A]:
+    """What `work` makes of each family, by two processes; `fits` and `arms` are what it needs."""
     for fit in fits:
         _ = fit.basis, fit.residual  # once, before there are two
     for log in data.logs:
-        log.kept.number(arm)
+        for arm in arms:
+            log.kept.number(arm)
     return together([log.kept for log in data.logs], work, candidates)
 
 

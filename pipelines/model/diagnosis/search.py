@@ -132,7 +132,7 @@ def _share(one: Screened, now: Refined) -> float:
 
 
 def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
-    return tuple(screen(case.data, now.fit, case.families, now.model.arm))
+    return tuple(screen(case.data, now.fit, case.families, case.arms(now.model)))
 
 
 def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened]) -> Explored:

@@ -16,7 +16,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.absorbed import Absorbed, absorbed
 from pipelines.model.diagnosis.beside import less
-from pipelines.model.diagnosis.candidates import families, lay_one, whole_motion
+from pipelines.model.diagnosis.candidates import Arms, families, lay_one, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
@@ -30,8 +30,9 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.thresholds import Thresholds
 
-__all__ = ["Known", "Since", "since_reference"]
+__all__ = ["Known", "Probed", "Since", "since_reference"]
 
+Probed = Callable[[Refined, Data | None, Arms], tuple[Probe, Thresholds]]
 Known = tuple[Array, Mapping[tuple[str, int | None], float]]  # weights (joints,) and gains with these
 
 
@@ -46,7 +47,7 @@ class Since:
     acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
     absorbed: Callable[[Array], Absorbed | None]  # what base parameters show, less a torque (rows,) [N m] of the later logs
     chance: Chance
-    probed: Callable[[Refined, Data | None], tuple[Probe, Thresholds]]  # beside a final model: what limits are looked for with
+    probed: Probed  # beside a final model: what limits are looked for with
 
 
 def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = (),
@@ -81,9 +82,9 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     def changed(found: Refined, wanted: Sequence[bool]) -> tuple[Sequence[Screened], Thresholds]:
         return changes(data, later, nominal, common, _slopes(found, later), found.weight, every, wanted, arm, chance)
 
-    def probed(found: Refined, judge: Data | None) -> tuple[Probe, Thresholds]:
+    def probed(found: Refined, judge: Data | None, seen: Arms) -> tuple[Probe, Thresholds]:
         fit = fit_changed(data, later, nominal, common, _slopes(found, later), found.weight)
-        return Probe.of(found, judge, (data, fit, later)), bounds(every, [True] * len(every), fit, later, chance)
+        return Probe.of(found, judge, seen, (data, fit, later)), bounds(every, [True] * len(every), fit, later, chance)
 
     acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
     case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed,

@@ -22,7 +22,7 @@ from pipelines.fit.bootstrap import apart as apart_by_chance
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import CauseBound
-from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one
+from pipelines.model.diagnosis.candidates import Family, lay_family, lay_shape
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
 from pipelines.model.diagnosis.screen import Screened, for_each, products_apart, screen, screen_event
@@ -59,7 +59,7 @@ def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> 
     """
     able = [family for family in families if not family.event and not family.shapes[0].needs]
     found = screen(data, fit, able, arm)
-    tables = [fit.project(lay_one(data, one.shape[0], arm)) for one in found]
+    tables = [fit.project(lay_shape(data, one.family, one.family.shapes.index(one.shape[0]), arm)) for one in found]
     residual, basis = fit.residual, np.zeros((0, data.rows))
     powers = np.bincount(data.joint, residual**2, minlength=data.n_joints)
     chosen: list[tuple[int, float]] = []

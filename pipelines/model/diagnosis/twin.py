@@ -27,7 +27,7 @@ from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Noise, Simulated, simulate, simulate_together
+from pipelines.model.simulation import Experiment, Noise, Plant, Simulated, choose_step, simulate, simulate_together
 
 __all__ = ["Twin", "drive_noise", "imperfect", "make_twin", "replayable", "replica", "white"]
 
@@ -90,9 +90,12 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     rough = _roughness(mine, step)
     guess = rough * np.sqrt(step / log.sample_time)
 
+    experiment = Experiment.of_log(log)
+    steps = choose_step(Plant.of(model.nominal), experiment).per_sample  # fine enough for the noisy one too
+
     def of_replica(drawn: tuple[Array, int]) -> Array:
         level, own = drawn
-        done = simulate(model.nominal, Experiment.of_log(log), Noise(level, np.zeros_like(guess)), (own,))
+        done = simulate(model.nominal, experiment, Noise(level, np.zeros_like(guess)), (own,), steps=steps)
         copy, found = _analysed(motions[place], done, 0, recipe, model.columns, data, place)
         return _roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t))))
 

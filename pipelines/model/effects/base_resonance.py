@@ -11,7 +11,7 @@ import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, friction_at
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_torque, shifted
+from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_by, rigid_slopes, shifted
 
 __all__ = ["BaseResonance"]
 
@@ -46,9 +46,17 @@ class BaseResonance(Effect):
     needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        rigid, w, one = _rigid(arm), 2.0 * pi * self.frequency, np.ones(len(motion.t))
-        x = oscillation(motion.t, one, 2.0 * self.damping_ratio * w * one, w * w * one, -rigid(motion)[:, _FIRST])
-        return perturbed_torque(rigid, motion, _FIRST, *x)[..., None]
+        return self.several([self], motion, arm)[0]
+
+    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
+        """All bases are swung by the same torque, which has the same slopes for all."""
+        force, one, found = -_rigid(arm)(motion)[:, _FIRST], np.ones(len(motion.t)), []
+        slopes = rigid_slopes(arm.body, arm.p, motion, _FIRST)
+        for shape in shapes:
+            w = 2.0 * pi * shape.frequency
+            x = oscillation(motion.t, one, 2.0 * shape.damping_ratio * w * one, w * w * one, force)
+            found.append(perturbed_by(slopes, *x)[..., None])
+        return found
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for frequency in (8.0, 12.0, 17.0, 24.0, 28.0, 34.0, 48.0):

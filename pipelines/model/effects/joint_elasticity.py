@@ -12,7 +12,7 @@ import numpy as np
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, friction_at
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart
-from pipelines.model.rigid.perturbation import deflection, perturbed_torque, rate_of, shifted
+from pipelines.model.rigid.perturbation import deflection, perturbed_by, rate_of, rigid_slopes, shifted
 
 __all__ = ["JointElasticity"]
 
@@ -48,16 +48,20 @@ class JointElasticity(Effect):
     needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        d, motor = self._give(motion, arm), self.motor_inertia
-        rate = rate_of(d, motion.t)
-        second = rate_of(rate, motion.t)
-        tau = perturbed_torque(_rigid(arm), motion, self._index, d, rate, second)
-        tau[:, self._index] -= motor * second
-        return tau[..., None]
+        return self.several([self], motion, arm)[0]
 
-    def _give(self, motion: Motion, arm: ArmModel) -> Array:
-        """x k (samples,) [N m]."""
-        return np.asarray(self.motor_inertia * self.own(motion.ddq) - self.own(_rigid(arm)(motion)))
+    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
+        """All springs feel the same torque, which has the same slopes for all; d = x k [N m]."""
+        force, found = self.own(_rigid(arm)(motion)), []
+        slopes = rigid_slopes(arm.body, arm.p, motion, self._index)
+        for shape in shapes:
+            d = shape.motor_inertia * self.own(motion.ddq) - force
+            rate = rate_of(d, motion.t)
+            second = rate_of(rate, motion.t)
+            tau = perturbed_by(slopes, d, rate, second)
+            tau[:, self._index] -= shape.motor_inertia * second
+            found.append(tau[..., None])
+        return found
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """No motor, a light one and one of a third of what the joint feels; lightly damped."""

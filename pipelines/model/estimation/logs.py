@@ -11,6 +11,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.fit.least_squares import Errors
 from pipelines.fit.statistics import Triangles, gather
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.shared_work import shared_out
 from pipelines.model.estimation.blocks import Stretches, by_blocks, by_stretches
 from pipelines.model.estimation.conditioning import HIGHEST, condition, cutoff_at, wanted_cutoff
 from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
@@ -82,7 +83,26 @@ class Judged:
 
 
 def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
-    return tuple((log, reconstruct(log, how)) for log in logs)
+    """Each log with its motion, by two processes.
+
+    Raises:
+        UsageError, InputRejected: as `reconstruct`, of the first log that it cannot be done for.
+    """
+    def moved(place: int) -> Reconstructed | UsageError | InputRejected:
+        try:
+            return reconstruct(logs[place], how)
+        except (UsageError, InputRejected) as no:  # which of several logs is told does not hang on who was quicker
+            return no
+
+    longest = sorted(range(len(logs)), key=lambda place: -logs[place].n_samples)
+    found = dict(zip(longest, shared_out(moved, longest), strict=True))
+    motions = []
+    for place, log in enumerate(logs):
+        one = found[place]
+        if isinstance(one, Exception):
+            raise one
+        motions.append((log, one))
+    return tuple(motions)
 
 
 def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool = True,

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["deflection", "oscillation", "perturbed_torque", "rate_of", "shifted"]
+__all__ = ["deflection", "oscillation", "perturbed_by", "perturbed_torque", "rate_of", "rigid_slopes", "shifted"]
 
 Torque = Callable[[Motion], Array]
 
@@ -46,6 +46,23 @@ def perturbed_torque(torque: Torque, motion: Motion, index: int, d: Array, rate:
     e = _STEP / size
     ahead, behind = (torque(shifted(motion, index, s * d, s * rate, s * second)) for s in (e, -e))
     return np.asarray((ahead - behind) / (2.0 * e))
+
+
+def perturbed_by(slopes: tuple[Array, Array, Array], d: Array, rate: Array, second: Array) -> Array:
+    """P_j(d) (samples, joints) by the slopes K_j, C_j, M_j."""
+    spring, drag, mass = slopes
+    return np.asarray(spring * d[:, None] + drag * rate[:, None] + mass * second[:, None])
+
+
+def rigid_slopes(body: RigidBody, p: Array, motion: Motion, index: int) -> tuple[Array, Array, Array]:
+    """Columns K_j, C_j, M_j (samples, joints) of the rigid arm, for whoever asks P_j of several directions."""
+    zero, one = np.zeros(len(motion.t)), np.ones(len(motion.t))
+
+    def torque(there: Motion) -> Array:
+        return body.torque(there.q, there.dq, there.ddq, p)
+
+    spring, drag = (perturbed_torque(torque, motion, index, *unit) for unit in ((one, zero, zero), (zero, one, zero)))
+    return spring, drag, body.mass_matrix(motion.q, p)[:, :, index]
 
 
 def deflection(torque: Torque, motion: Motion, index: int, stiffness: float, damping: float,
