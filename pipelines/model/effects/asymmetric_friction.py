@@ -17,12 +17,15 @@ __all__ = ["AsymmetricFriction"]
 
 @dataclass(frozen=True)
 class AsymmetricFriction(Effect):
-    """τ = ½ ΔFc |tanh(w v)| + ½ ΔFv |v|, with Δ the positive direction's minus the negative one's.
+    """τ = ½ s (ΔFc tanh(w v) + ΔFv v), with Δ the positive direction's minus the negative one's and s the direction.
 
-    Beside Fc tanh(w v) + Fv v these are Fc ± ½ ΔFc and Fv ± ½ ΔFv in the two directions.
+    Beside Fc tanh(w v) + Fv v these are Fc ± ½ ΔFc and Fv ± ½ ΔFv in the two directions: s = sign v, each to the last; or they
+    go over into each other as gradually as friction changes its sign, s = tanh(w v), for a lip does not lift at once. A joint that
+    creeps about standstill, |v| < 1/w, tells the two apart.
     """
 
     sharpness: float = 100.0  # w [s/rad]
+    gradual: float = 0.0  # 1: s = tanh(w v)
 
     name = "asymmetric_friction"
     title = "Asymmetric friction"
@@ -30,6 +33,8 @@ class AsymmetricFriction(Effect):
         Quantity("coulomb_difference", "N m", -20.0, 20.0, "Coulomb friction of the positive minus the negative direction"),
         Quantity("viscous_difference", "N m s/rad", -10.0, 10.0, "viscous friction of the positive minus the negative direction"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
+        Quantity("gradual", "1", 0.0, 1.0, "1: the directions go over into each other as friction changes its sign, 0: at once",
+                 shape=True, discrete=True, unsaid=0.0),
     )
     signature = "A part of the torque that is even in speed: larger friction one way than the other."
     explanation = "Preload, seal lips and worm or harmonic gears rub more in one direction of motion."
@@ -41,12 +46,24 @@ class AsymmetricFriction(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         v = self.own(motion.dq)
-        return self.on_own_row(arm, 0.5 * np.abs(np.tanh(self.sharpness * v)), 0.5 * np.abs(v))
+        turned = np.tanh(self.sharpness * v)
+        half = 0.5 * (turned if self.gradual else np.sign(v))
+        return self.on_own_row(arm, half * turned, half * v)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
             yield replace(self, sharpness=sharpness)
 
+    def forms(self) -> tuple[Self, ...]:
+        return (replace(self, gradual=1.0),)
+
     def own_load(self, values: Values) -> OwnLoad:
         (coulomb, viscous), sharpness = (0.5 * self.amplitudes(values)).tolist(), values["sharpness"]
-        return lambda angle, speed: coulomb * abs(math.tanh(sharpness * speed)) + viscous * abs(speed)
+        if not values["gradual"]:
+            return lambda angle, speed: coulomb * abs(math.tanh(sharpness * speed)) + viscous * abs(speed)
+
+        def load(angle: float, speed: float) -> float:
+            turned = math.tanh(sharpness * speed)
+            return turned * (coulomb * turned + viscous * speed)
+
+        return load
