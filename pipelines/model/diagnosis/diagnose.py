@@ -68,10 +68,9 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
     prepared = memory.prepared(logs, chosen, arm)
-    plain = _case(prepared, chosen)
     if logs.frf:
         say("looking at the frequency responses")
-    first = responding(plain, prepared, chosen.without)
+    first = responding(_plain(prepared, chosen, calibration, memory), prepared, chosen.without)
     if first.held.prepared.reference is not None:
         say("comparing with the reference logs")
         return _changed(first, first.held.prepared.reference, chosen, calibration, memory)
@@ -99,6 +98,13 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
 def _nameable(case: Case, stiff: Compliance | None) -> Case:
     """Where frequency responses show no spring, what gives way may be a gap, which the residual then names."""
     return replace(case, nameable=(*case.nameable, "reversals")) if stiff is not None and not stiff.named else case
+
+
+def _plain(prepared: Prepared, chosen: DiagnosisSettings, given: Calibration | None, memory: Memory) -> Case:
+    """With nothing taken out: of the comparison with the reference logs, where there is no more to do before it."""
+    if prepared.reference is None or prepared.logs.frf or given is not None:
+        return _case(prepared, chosen)
+    return replace(memory.since(prepared, chosen).case, beside=())
 
 
 def _case(prepared: Prepared, chosen: DiagnosisSettings) -> Case:
