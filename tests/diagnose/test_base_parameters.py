@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pipelines.model.diagnosis.diagnose import diagnose
@@ -29,3 +31,11 @@ def test_a_payload_is_one() -> None:
     found = since("payload", None)
     assert [one.cause for one in found.findings] == ["payload"]
     assert found.findings[0].parameters["mass"].value == pytest.approx(0.5, rel=0.03)
+
+
+def test_a_longer_link_is_no_payload_beside() -> None:
+    """Twelve millimetres; the masses beyond sit elsewhere then, and base parameters move as if some weight were gone."""
+    few = replace(_FEW, without=but("link_length", "payload"))
+    found = diagnose(Logs.by_role((*healthy_again(session()), *session("link_length", None))), few)
+    assert [one.cause for one in found.findings] == ["link_length"]
+    assert "payload" in [one.cause for one in found.rejected]

@@ -45,6 +45,8 @@ from pipelines.model.diagnosis.since import Probed, since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import drive_noise, make_twin, replayable, white
 from pipelines.model.diagnosis.verdict import Ruling, rule
+from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
 
 __all__ = ["diagnose"]
 
@@ -188,12 +190,23 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     if told.verdict == "unknown" or told.extended is None:
         why = "the base parameters have moved as it moves them, beside something that has no name"
         return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
+    if (like := _alike(moved.effect, told.findings)) is not None:
+        why = f"the base parameters have moved, but {like.title[:1].lower()}{like.title[1:]}, which was found, moves them too"
+        return replace(told, rejected=(*told.rejected, Rejected(moved.effect.name, moved.effect.joint, why)))
     one = carried(moved, done.found.final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
         return replace(told, rejected=(*told.rejected, Rejected(one.finding.cause, one.finding.joint, one.doubt)))
     findings = _strongest((one.finding, *told.findings))
     return replace(told, verdict="cause", findings=findings, reason="", extended=one.arm,
                    summary=_sentence(Ruling("cause", (), ""), findings))
+
+
+def _alike(effect: Effect, found: Iterable[Finding]) -> Finding | None:
+    """What was found that `effect` could be mistaken for.
+
+    A longer link, say, moves masses that lie beyond it, and which part of a base parameter these are no torque tells.
+    """
+    return next((one for one in found if one.cause in effect.twins or effect.name in find_effect(one.cause).twins), None)
 
 
 def _with_load(found: Found, case: Case, now: Prepared, before: Array, noise: Array | None, seed: int) -> Array:
