@@ -18,6 +18,7 @@ from pipelines.batch.parts import Part, place_of
 from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.log.model_file import ModelFile, StoredEffect
+from pipelines.report.diagnosis_words import title_of
 from pipelines.report.figure_words import figure_in_words
 
 __all__ = ["against", "known_figures", "unheld"]
@@ -59,7 +60,7 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: 
     have the items of the baseline's robot: laid together, they are asked again.
     """
     done = [(record.called(part), part) for record in records if record.status in ("ok", "found") for part in record.parts]
-    others = [name for name, part in done if _robot(baseline) not in ("", part.robot)]
+    strange = [name for name, part in done if _robot(baseline) not in ("", part.robot)]
     judged = [part for _, part in done if _robot(baseline) in ("", part.robot)]
     if not judged:
         what, remedy = ("item of this shard", "lay the shards together, and judge them with --resume") if sharded else (
@@ -67,9 +68,14 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: 
         return (_warned(f"the baseline is of {_robot(baseline)}, and no {what} is: nothing is held against it", remedy,
                         gate=not sharded),) if done else ()
     said = []
+    if strange:
+        said.append(_warned(f"{len(strange)} of {len(done)} items are of another robot than the baseline, and not held against it: "
+                            f"{', '.join(strange[:3])}", "give the folders of each robot a batch of their own"))
+    others = sorted({place for part in judged for place in _laws_apart(part, baseline)})
     if others:
-        said.append(_warned(f"{len(others)} of {len(done)} items are of another robot than the baseline, and not held against it: "
-                            f"{', '.join(others[:3])}", "give the folders of each robot a batch of their own"))
+        joints, laws = sorted({str(joint) for joint, _ in others}), dict.fromkeys(title_of(law) for _, law in others)
+        said.append(_warned(f"of the baseline, the friction of joint {_listed(joints)} follows other laws: it has "
+                            f"{_listed(list(laws))}, and {stage} fits none", "run 'rrrid batch' with --stage run, or give a model of the same laws"))
     missing = [name for name, part in _kinds(baseline).items() if not _met(part, judged)]
     nothing = not any(part.diagnosed or known_figures(baseline, part.figures) for part in judged)
     if missing:
@@ -141,14 +147,35 @@ def _moved(part: Part, baseline: ModelFile) -> Iterator[str]:
     """The figures beyond the baseline's, in words."""
     # The causes that were found are held against the baseline one by one, below.
     found = [f"{finding['cause']} joint {finding['joint']} " for finding in part.findings]
+    apart = {joint for joint, _ in _laws_apart(part, baseline)}
+    strange = [one for one in baseline.friction if one.joint in apart]
     known = {name: figure for name, figure in known_figures(baseline, part.figures).items()
-             if not any(cause in name for cause in found)}
+             if not any(cause in name for cause in found) and not any(_is_of(name, one) for one in strange)}
     limit = _limit(len(known))
     for name, (value, std) in known.items():
         new, own, unit = part.figures[name]
         away = _change(name, unit, new, value) / math.hypot(own, std)
         if abs(away) > limit:
             yield f"{figure_in_words(name)} {new:.4g} {unit}, {value:.4g} before ({away:+.1f} std)"
+
+
+def _laws_apart(part: Part, baseline: ModelFile) -> list[tuple[int, str]]:
+    """(joint, law) of the baseline's friction that a part lacks where it has other laws of that joint.
+
+    A Coulomb level beside Stribeck friction is not the one without: the two are not held against each other.
+    """
+    fitted = known_figures(dataclasses.replace(baseline, base_parameters=(), effects=()), part.figures)
+    found = list[tuple[int, str]]()
+    for joint in sorted({one.joint for one in baseline.friction if one.joint is not None}):
+        own = [one for one in baseline.friction if one.joint == joint and any(p.std for p in one.parameters.values())]
+        there = {one.effect for one in own if any(_is_of(name, one) for name in fitted)}
+        found += [(joint, one.effect) for one in own if there and one.effect not in there]
+    return found
+
+
+def _is_of(name: str, one: StoredEffect) -> bool:
+    """Whether a figure is one of an effect at its place, however results spell it."""
+    return any(f" {begun}" in f" {name}" for begun in (f"{one.effect}:{one.joint}:", f"{one.effect} joint {one.joint} "))
 
 
 def _change(name: str, unit: str, new: float, old: float) -> float:

@@ -169,6 +169,24 @@ def test_what_no_item_can_be_held_against_is_said() -> None:
     assert unheld("run", [Record("a", "a", "rejected", 3)], baseline) == ()
 
 
+def test_a_level_beside_another_law_is_not_the_same_level() -> None:
+    """Coulomb friction fitted with Stribeck friction and without: 3.65 and 3.93 N m of one and the same joint. It is said, and no
+    change; with the same laws it is one."""
+    laws = {"coulomb": ("level", 3.65), "stribeck": ("amplitude", 1.06)}
+    friction = tuple(StoredEffect(law, 1, {name: StoredValue(value, 0.014, "N m", "fitted")})
+                     for law, (name, value) in laws.items())
+    baseline = dataclasses.replace(_baseline(), friction=friction, effects=())
+    figures = {"p1": (1.0, STD, "kg m^2"), "coulomb:1:level": (3.93, 0.01, "N m")}
+    alone = _record("a", figures=figures)
+    assert against(alone, baseline) == alone
+    (said,) = unheld("estimate-bps", [alone], baseline)
+    assert not said.gate
+    assert "the friction of joint 1 follows other laws: it has Stribeck friction, and estimate-bps fits none" in said.message
+    both = _known(alone, figures=figures | {"stribeck:1:amplitude": (1.06, 0.02, "N m")})
+    assert against(both, baseline).status == "found"
+    assert unheld("run", [both], baseline) == ()
+
+
 def test_a_baseline_that_meets_nothing_is_a_gate() -> None:
     """Another robot's, a stage without figures, a model without uncertainties: what was asked for cannot be done at all."""
     baseline = dataclasses.replace(_baseline(), robot='name = "arm"')
