@@ -75,7 +75,8 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: 
     if others:
         joints, laws = sorted({str(joint) for joint, _ in others}), dict.fromkeys(title_of(law) for _, law in others)
         said.append(_warned(f"of the baseline, the friction of joint {_listed(joints)} follows other laws: it has "
-                            f"{_listed(list(laws))}, and {stage} fits none", "run 'rrrid batch' with --stage run, or give a model of the same laws"))
+                            f"{_listed(list(laws))}, and {stage} fits none",
+                            "run 'rrrid batch' with --stage run, or give a model of the same laws"))
     missing = [name for name, part in _kinds(baseline).items() if not _met(part, judged)]
     nothing = not any(part.diagnosed or known_figures(baseline, part.figures) for part in judged)
     if missing:
