@@ -146,10 +146,15 @@ def _few(group: Any, where: str) -> None:
 
 
 def _only(group: Any, known: tuple[str, ...], where: str) -> None:
-    """S19: nothing but what the format names."""
+    """S19: nothing but what the format names; X04, a group besides, however deep: it is not looked into."""
+    import h5py
+
     _few(group, where)
     for name in group:
         if name not in known:
+            if group.get(name, getclass=True) is h5py.Group:
+                raise InputRejected("X04", f"group '{name}' is not in format version {schema.FORMAT_VERSION}, and not looked into",
+                                    where=where, remedy="remove it")
             raise InputRejected("S19", f"'{name}' is not in format version {schema.FORMAT_VERSION}", where=where,
                                 remedy="remove it")
 

@@ -86,9 +86,10 @@ def test_hostile_names_reach_no_terminal(tmp_path: Path) -> None:
 
 @pytest.mark.row("P13")
 def test_no_home_no_terminal_no_display(logs: Path) -> None:
-    """P13: HOME missing and read-only, no DISPLAY, a dumb terminal: the command works and says nothing else."""
+    """P13: HOME missing and read-only (/proc, where the superuser may not write either), no DISPLAY, a dumb terminal: the command
+    works and says nothing else."""
     (logs / "home").mkdir(mode=0o555)
-    for home in (logs / "home", Path("/nonexistent")):
+    for home in (logs / "home", Path("/proc"), Path("/nonexistent")):
         done = rrrid("convert", "logs", "--out", "out", cwd=logs, env={"HOME": str(home), "TERM": "dumb", "DISPLAY": ""})
         assert (done.returncode, done.stderr) == (0, "")
 

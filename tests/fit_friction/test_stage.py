@@ -174,7 +174,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("code", BAD)
+@pytest.mark.parametrize("code", [pytest.param(code, marks=pytest.mark.row(code)) for code in BAD])
 def test_bad_input_is_a_clear_finding(code: str, good: ExperimentLog, tmp_path: Path) -> None:
     """No reversal, a wrong sign, saturated torque, a locked joint that moves, amperes: named, with what to do, and exit 1."""
     found = stage(tmp_path, BAD[code](good), check=True)

@@ -69,6 +69,7 @@ def test_the_ends_of_a_log_are_covered(order: int) -> None:
     assert np.mean(shares, axis=0).min() > 0.92
 
 
+@pytest.mark.row("D01", "D02", "T03")
 @pytest.mark.parametrize("length", [1, 3, 10, 30, 300])
 def test_gaps_are_covered_too(length: int) -> None:
     """D01, D02: inside missing stretches and beside them the truth is within two deviations, which grow with the gap."""

@@ -6,9 +6,10 @@ A fresh process costs half a second, and there are a few hundred cases; the star
 from __future__ import annotations
 
 import json
+import re
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -49,11 +50,17 @@ class Done:
 
 Command = Callable[..., Done]
 
+# Rows that ask for no word: strange names work, hostile texts are inert, nothing is opened or told.
+_SILENT = {"C07", "X06", "X08", "X09", "X10", "X11", "X13", "X14", "P13"}
+
 
 @pytest.fixture
-def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
-    """`command("inspect", "a.h5")` in tmp_path, with --json."""
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+            request: pytest.FixtureRequest) -> Iterator[Command]:
+    """`command("inspect", "a.h5")` in tmp_path, with --json. A test that bears a row has to have met its code in the end."""
     from rrrid_cli import main
+
+    met = set[str]()
 
     def run(*words: object, as_json: bool = True) -> Done:
         monkeypatch.chdir(tmp_path)
@@ -70,6 +77,9 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
             sys.unraisablehook = hook
         said = capsys.readouterr()
         assert "Traceback" not in said.err
+        met.update(re.findall(r"RRID-([A-Z]\d\d)", said.out + said.err))
         return Done(int(ended.value.code or 0), said.out, said.err, json.loads(said.out) if as_json and said.out else {})
 
-    return run
+    yield run
+    borne = {row for mark in request.node.iter_markers("row") for row in mark.args}
+    assert borne - met <= _SILENT, f"bears {sorted(borne)}, and met {sorted(met)}"

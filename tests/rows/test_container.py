@@ -53,6 +53,19 @@ def test_a_spoilt_log_is_refused(code: str, ending: str, spoil: Callable[[Path],
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.9, 0.999])
+@row("F02")
+def test_any_prefix_of_a_log_is_refused(share: float, command: Command, tmp_path: Path) -> None:
+    """How many bytes are there, of how many, and that the file be copied again; of a few bytes, that they are no log."""
+    write_log(tmp_path / "a.h5", small_log())
+    data = (tmp_path / "a.h5").read_bytes()
+    kept = int(share * len(data))
+    (tmp_path / "a.h5").write_bytes(data[:kept])
+    done = command("convert", "a.h5", "--out", "out")
+    done.refused("F02", 3, "a.h5", f"truncated: {kept} of {len(data)} bytes")
+    assert done.error["remedy"].startswith("copy")
+
+
 @row("F05")
 def test_a_log_that_nothing_vouches_for_is_read_with_one_warning(command: Command, tmp_path: Path) -> None:
     write_log(tmp_path / "a.h5", small_log())

@@ -35,7 +35,7 @@ def _edited(tmp_path: Path, edit: Edit) -> None:
 CASES: dict[str, tuple[str, Edit, str, str]] = {
     "signal missing": ("S01", lambda f: f["signals"].move("tau", "tua"), "a.h5", "tau missing, did you mean 'tua'"),
     "robot missing": ("S01", lambda f: f.__delitem__("robot"), "a.h5", "robot"),
-    "six joints": ("S02", _put(np.zeros((2000, 6))), "a.h5", "--joints"),
+    "six joints": ("S02", _put(np.zeros((2000, 6))), "a.h5", "6 columns for a robot of 3 joints"),
     "no units": ("S04", lambda f: f["signals/q"].attrs.__setitem__("units", ""), "signal q", "--assume-units"),
     "volts": ("S05", lambda f: f["signals/tau"].attrs.__setitem__("units", "V"), "signal tau", "torque needs one of N m"),
     "an angle for a torque": ("S05", lambda f: f["signals/tau"].attrs.__setitem__("units", "rad"), "signal tau", "position"),
@@ -50,7 +50,9 @@ CASES: dict[str, tuple[str, Edit, str, str]] = {
 def test_a_log_of_another_structure_is_refused(name: str, command: Command, tmp_path: Path) -> None:
     code, edit, where, says = CASES[name]
     _edited(tmp_path, edit)
-    command("convert", "a.h5", "--out", "out").refused(code, 3, where, says)
+    done = command("convert", "a.h5", "--out", "out")
+    done.refused(code, 3, where, says)
+    assert "--joints" in done.error["remedy"] or code != "S02"
     assert not (tmp_path / "out").exists()
 
 
@@ -85,3 +87,8 @@ def test_degrees_and_a_turned_array_are_mended_and_recorded(command: Command, tm
     assert "RRID-S06 a.h5" in done.out + done.err
     assert "RRID-S11 a.h5" in done.out + done.err
     np.testing.assert_allclose(open_log(tmp_path / "out/logs/a.parquet").log.q, log.q, rtol=1e-15)
+    looked = command("inspect", "a.h5", "--no-report", "--out", "looked")
+    for code in ("S06", "S11"):
+        (check,) = looked.told(code)
+        assert check["where"].startswith("a.h5")
+        assert check["message"]

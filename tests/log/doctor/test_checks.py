@@ -119,6 +119,7 @@ def test_a_rest_at_full_torque_is_not_saturation() -> None:
     assert [c for c in check_log(log) if c.code == "RRID-D05" and c.level != "ok"] == []
 
 
+@pytest.mark.row("D04")
 def test_locked_joints_may_stand_still() -> None:
     """A friction log of joint 2 has constant positions and torques elsewhere, and a hold log everywhere."""
     log = make_log(one_joint(turning(0.0, 1), 2), "friction", joint=2, noise=0.0)

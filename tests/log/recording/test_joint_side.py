@@ -64,12 +64,14 @@ def test_gear_ratios_alone_are_a_diagonal_matrix() -> None:
     assert np.allclose(joint["tau"] / [10.0, 20.0, -30.0], recording().signals["tau"], rtol=1e-14, atol=0)
 
 
+@pytest.mark.row("S10")
 def test_current_becomes_torque_and_is_kept() -> None:
     joint = convert(recording(), recipe(lambda s: s.replace('"N m"', '"mA"'), "[drive]\ntorque_constant = [0.1, 0.2, 0.3]\n"))
     assert np.allclose(joint["current"], 1e-3 * recording().signals["tau"], rtol=1e-15, atol=0)
     assert np.allclose(joint["tau"], joint["current"] * [0.1, 0.2, 0.3], rtol=1e-15, atol=0)
 
 
+@pytest.mark.row("S10")
 def test_s10_current_without_constant_is_refused() -> None:
     with pytest.raises(InputRejected, match=r"RRID-S10.*motor current instead of torque.*torque_constant"):
         convert(recording(), recipe(lambda s: s.replace('"N m"', '"A"')))
