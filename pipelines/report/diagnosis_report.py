@@ -238,7 +238,8 @@ def _others(result: Result) -> list[Section]:
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
         rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _hundredths(100.0 * t.threshold),
-                      _hundredths(100.0 * t.exact_gain), _hundredths(t.visibility), "accepted" if t.accepted else without_keys(t.reason))
+                      _hundredths(100.0 * t.exact_gain), _hundredths(t.visibility),
+                      "accepted" if t.accepted else without_keys(t.reason))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
         more = len(result.ledger) - len(rows)
