@@ -20,6 +20,7 @@ from pipelines.errors import Check, clean
 from pipelines.log.model_file import ModelFile, StoredEffect
 from pipelines.report.diagnosis_words import title_of
 from pipelines.report.figure_words import figure_in_words
+from pipelines.report.style import format_number, unit_in_words
 
 __all__ = ["against", "known_figures", "unheld"]
 
@@ -157,7 +158,8 @@ def _moved(part: Part, baseline: ModelFile) -> Iterator[str]:
         new, own, unit = part.figures[name]
         away = _change(name, unit, new, value) / math.hypot(own, std)
         if abs(away) > limit:
-            yield f"{figure_in_words(name)} {new:.4g} {unit}, {value:.4g} before ({away:+.1f} std)"
+            far = f"{'+' if away > 0.0 else '−'}{format_number(abs(away), 2)} std"
+            yield f"{figure_in_words(name)} {_told(new, unit)}, {format_number(value)} before ({far})"
 
 
 def _laws_apart(part: Part, baseline: ModelFile) -> list[tuple[int, str]]:
@@ -221,8 +223,8 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
         parameter, least = part.detectable.get(place, ("", math.inf))
         stored = one.parameters.get(parameter)
         if stored is not None and abs(stored.value) - LIMIT * (stored.std or 0.0) > least:
-            gone.append(f"{place} is not found any more: {parameter} {stored.value:.4g} {stored.unit} before, and from {least:.2g} "
-                        f"{stored.unit} on it would have been")
+            gone.append(f"{place} is not found any more: {parameter} {_told(stored.value, stored.unit)} before, and from "
+                        f"{_told(least, stored.unit, 2)} on it would have been")
         else:
             unsure.append(f"{place} is not found, and might be there: these logs would not show it for sure")
     return gone, unsure
@@ -237,7 +239,11 @@ def _otherwise(place: str, parameters: Mapping[str, Any], known: StoredEffect) -
         std = math.hypot(new["std"] or 0.0, stored.std or 0.0)
         change = _change(name, new["unit"], new["value"], stored.value)
         if abs(change) > limit * std:
-            yield f"{place} {name} {new['value']:.4g} {new['unit']}, {stored.value:.4g} before"
+            yield f"{place} {name} {_told(new['value'], new['unit'])}, {format_number(stored.value)} before"
+
+
+def _told(value: float, unit: str, digits: int = 4) -> str:
+    return f"{format_number(value, digits)} {unit_in_words(unit)}".strip()
 
 
 def _single(value: Any) -> bool:

@@ -129,7 +129,7 @@ def _wrong(summary: Summary) -> list[Section]:
 def _why(record: Record) -> str:
     if record.error is None:
         return without_keys(record.verdict)
-    where = f"{record.error['where']}: " if record.error["where"] not in ("", ".") else ""
+    where = f"{record.error['where']}: " if record.error["where"] not in ("", ".", record.name) else ""
     remedy = f" ({record.error['remedy']})" if record.error["remedy"] else ""
     return f"{where}{record.error['message']}{remedy}"
 
@@ -166,8 +166,8 @@ def _drift_section(drift: Drift, baseline: ModelFile | None, figures: bool) -> l
 
 def _figure_table(ranked: Sequence[Course]) -> Table:
     listed = min(_LISTED, max(_LEAST, sum(bool(c.moved) for c in ranked)))
-    rows = tuple((figure_in_words(c.name), _digits(c.chi_square), c.freedom, _digits(c.probability),
-                  _digits(float(np.max(np.abs(c.away)))), _digits(c.trend), _first_four(c.moved)) for c in ranked[:listed])
+    rows = tuple((figure_in_words(c.name), _tenths(c.chi_square), c.freedom, _digits(c.probability),
+                  _tenths(float(np.max(np.abs(c.away)))), _tenths(c.trend), _first_four(c.moved)) for c in ranked[:listed])
     tones: tuple[Tone, ...] = tuple("attention" if c.moved else "neutral" for c in ranked[:listed])
     more = "" if len(ranked) <= listed else f" The {len(ranked) - listed} that moved least stand in result.json."
     return Table(("figure", "χ²", "freedom", "probability", "largest [std]", "first to last [std]", "moved"), rows,
@@ -178,9 +178,12 @@ def _first_four(items: Sequence[str]) -> str:
     return ", ".join(items[:4]) + (f" and {len(items) - 4} more" if len(items) > 4 else "")
 
 
+def _tenths(x: float | None) -> float | None:
+    return None if x is None else round(x, 1)
+
+
 def _digits(x: float | None) -> float | None:
-    """Three of them are all that a deviation in std can use."""
-    return None if x is None else float(f"{x:.3g}")
+    return None if x is None else float(f"{x:.2g}")
 
 
 def _figures(drift: Drift, ranked: Sequence[Course], baseline: ModelFile | None) -> tuple[Figure, ...]:

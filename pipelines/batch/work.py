@@ -136,6 +136,7 @@ def undone(item: Item, problem: BaseException, plan: Plan, key: str) -> Record:
     known = isinstance(problem, InputRejected | NothingMatched)
     names = {plan.root: ""}
     words = {name: tilde(renamed(text, names)) for name, text in error.as_dict().items()}
+    words["where"] = words["where"] or clean(item.name)  # of its process, not of one of its files
     stops = isinstance(error, EnvironmentFault) and bool(plan.out) and Path(error.where).is_relative_to(plan.out)
     return Record(clean(item.name), item.slug, "rejected" if known else "failed", error.exit_code, words,
                   logs=tuple(relative(log, Path(plan.root)) for log in item.logs), key=key, stops=stops)

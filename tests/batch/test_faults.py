@@ -30,6 +30,7 @@ def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
         "segfault": "failed RRID-P04"}
     assert outcome.exit_code == 4
     said = {item["name"]: item["error"]["message"] for item in outcome.json["items"] if item["error"]}
+    assert all(item["error"]["where"] and item["error"]["remedy"] for item in outcome.json["items"] if item["error"])
     assert said["big"].startswith("memory")
     assert said["hung"].startswith("timeout")
     assert said["segfault"].startswith("crashed signal 11")
@@ -86,7 +87,8 @@ def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, 
     out = tmp_path / "out"
     assert not list(out.rglob(".rrrid-tmp-*"))
     there = json.loads((out / "result.json").read_text())["items"]
-    assert {item["error"]["code"] for item in there if item["status"] != "ok"} == {"RRID-P06"}
+    assert {(item["error"]["code"], item["error"]["where"] == item["name"], item["error"]["remedy"]) for item in there
+            if item["status"] != "ok"} == {("RRID-P06", True, "go on with --resume")}
     assert there[-1]["status"] == "failed"
     outcome = obey(lay({"05": "fine again"}), resume=True)
     assert outcome.exit_code == 0
