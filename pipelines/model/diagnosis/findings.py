@@ -32,6 +32,7 @@ _HALF = 0.5
 _NOTHING = 1e-9  # of the torque at the joint that an effect acts on most: what is smaller is rounding
 _ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
+_BLOCKS = 10  # of one log, that must agree as logs do
 _TELLS = 9.0  # times its variance, that the power of the predicted part must have in a log to be asked
 
 
@@ -127,12 +128,17 @@ def unlike(before: Refined, after: Refined, place: int, prepared: Prepared, bloc
     if worse := worse_log(data, *(held_out_left(one, prepared.judge, blocks) for one in (before, after))):
         return worse
     off = [f"{scale:.2g}" for scale in agreement(after, place, prepared) if not _AGREE[0] < scale < _AGREE[1]]
-    return f"logs do not agree on its size: {', '.join(off)} of it" if off else ""
+    parts = "parts of the log" if prepared.judge is None and len(prepared.data.logs) == 1 else "logs"
+    return f"{parts} do not agree on its size: {', '.join(off)} of it" if off else ""
 
 
 def agreement(done: Refined, place: int, prepared: Prepared) -> list[float]:
-    """The amplitude that each log asks for by itself, in parts of the one found; of logs that can tell."""
+    """The amplitude that each log asks for by itself, in parts of the one found; each block of time where there is one log.
+
+    Only of those that can tell.
+    """
     scales = []
+    alone = prepared.judge is None and len(prepared.data.logs) == 1  # it would be asked what it was asked before
     for data in (prepared.data, prepared.judge):
         if data is None:
             continue
@@ -140,8 +146,9 @@ def agreement(done: Refined, place: int, prepared: Prepared) -> list[float]:
         share = torque - done.model.without(place).torque(data)
         left = data.y - torque
         weights = done.weight[data.joint]
-        for log in range(len(data.logs)):
-            own = data.log_of == log
+        parts = data.blocks(_BLOCKS) if alone else data.log_of
+        for part in range(int(parts.max()) + 1):
+            own = parts == part
             s, r = share[own] * weights[own], left[own] * weights[own]
             power = float(s @ s)
             if power > _TELLS * float(r @ r) / max(len(r), 1) * 10.0:
