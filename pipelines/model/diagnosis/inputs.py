@@ -19,6 +19,7 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.sharper import sharpened
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
@@ -84,6 +85,7 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     motions = iter(motions_of((*logs.identify, *logs.validate, *logs.reference), how))
     fitted, judging, referring = (tuple(islice(motions, len(part))) for part in (logs.identify, logs.validate, logs.reference))
     recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed), (*fitted, *referring))
+    fitted, judging, referring = (sharpened(part, how, recipe.cutoff_hz) for part in (fitted, judging, referring))
     return _laid(logs, columns, recipe, fitted, judging, referring)
 
 
