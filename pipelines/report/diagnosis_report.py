@@ -39,6 +39,7 @@ from pipelines.report.style import format_decimals, format_number, to_one_place
 __all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
 
 _LEDGER = 40  # lines
+_OUT_OF_REACH = "A threshold above 100 % is told as a dash: an arm in order leaves so much of it that such logs cannot show it."
 _TURNING = Units()
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
 
@@ -96,6 +97,11 @@ def _torque(one: Finding, units: Units) -> str:
 
 def _rounded(x: float) -> float | None:
     return float(f"{x:.3g}") if math.isfinite(x) else None
+
+
+def _reachable(threshold: float) -> float | None:
+    """[%] a threshold, where anything could exceed it: no gain is more than the whole residual."""
+    return _hundredths(100.0 * threshold) if threshold <= 1.0 else None
 
 
 def _hundredths(x: float) -> float | None:
@@ -237,7 +243,7 @@ def _others(result: Result) -> list[Section]:
     shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
-        rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _hundredths(100.0 * t.threshold),
+        rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _reachable(t.threshold),
                       _hundredths(100.0 * t.exact_gain), _hundredths(t.visibility),
                       "accepted" if t.accepted else without_keys(t.reason))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
@@ -247,7 +253,7 @@ def _others(result: Result) -> list[Section]:
         sections.append(Section("Ledger of hypotheses", text, (Table(
             ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
-            f"believed.{_alike(len(result.residual_rms.identify))}", tones),)))
+            f"believed. {_OUT_OF_REACH}{_alike(len(result.residual_rms.identify))}", tones),)))
     return sections
 
 
@@ -272,10 +278,10 @@ def _basis(result: Result) -> Section:
         text.append(f"Left out, because you said so: {', '.join(map(title_of, result.without))}.")
     best: dict[tuple[str, int | None], float] = {(one.cause, one.joint): one.gain for one in result.thresholds
                                                     if math.isfinite(one.gain)}
-    rows = tuple((title_of(cause), joint, _rounded(100.0 * gain)) for (cause, joint), gain in sorted(
+    rows = tuple((title_of(cause), joint, _reachable(gain)) for (cause, joint), gain in sorted(
         best.items(), key=lambda item: (item[0][0], item[0][1] or 0)))
     table = Table(("cause", "joint", "share of the squared residual to exceed [%]"), rows,
-                  "Thresholds of what these logs can show.")
+                  f"Thresholds of what these logs can show. {_OUT_OF_REACH}")
     return Section("What this rests on", tuple(text), (table,) if rows else ())
 
 

@@ -9,9 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.result import BeforeAfter, Diagnosis, Finding, Gain, ResidualRms, Rival, TorqueGain, Value
+from pipelines.model.diagnosis.outcome import Result
+from pipelines.model.diagnosis.result import (
+    BeforeAfter,
+    Diagnosis,
+    Finding,
+    Gain,
+    ResidualRms,
+    Rival,
+    Threshold,
+    TorqueGain,
+    Trial,
+    Value,
+)
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.report.diagnosis_report import finding_section, gain_table, numbers_section
+from pipelines.report.diagnosis_report import diagnosis_report, finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_words import held_out_floor, named, spoken, told_values, torque_errors, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
@@ -79,3 +91,21 @@ def test_a_change_is_told_in_figures_that_show_its_sign() -> None:
     rows = gain_table(gain, "").rows
     assert [row[3] for row in rows] == ["−0.0004 to 0.0001", "−0.2300 to −0.2000"]
     assert [row[4:] for row in rows] == [(0.0487, 0.0474), (0.213, 0.0156)]
+
+
+def test_a_threshold_that_nothing_can_exceed_is_no_figure() -> None:
+    """No gain is more than the whole residual: 604 % says nothing but that the cause cannot be shown."""
+    nothing: Any = {field.name: () for field in fields(Result)} | {
+        "verdict": "nothing-wrong", "question": "what is wrong", "reason": "", "floor_origin": "twin", "held_out": "logs",
+        "held_out_floor": None, "replicas": 0, "robot": "", "residual_rms": ResidualRms(*(np.ones(2),) * 3),
+        "after_rms": ResidualRms(*(np.ones(2),) * 3), "noise": np.ones(2), "memory": None, "rated": (50.0, 50.0)}
+    trials = tuple(Trial(1, "cogging", joint, 0.02, threshold, 0.95, float("nan"), False, "below its threshold")
+                   for joint, threshold in ((1, 0.05), (2, 6.04)))
+    bounds = tuple(Threshold("cogging", joint, threshold, "blocks") for joint, threshold in ((1, 0.05), (2, 6.04)))
+    page = diagnosis_report(Result(**(nothing | {"ledger": trials, "thresholds": bounds})))
+    tables = {section.title: section.tables[0] for section in page.sections if section.tables}
+    for title, heading in (("Ledger of hypotheses", "threshold [%]"), ("What this rests on",
+                                                                       "share of the squared residual to exceed [%]")):
+        table = tables[title]
+        assert [row[table.columns.index(heading)] for row in table.rows] == [5.0, None]
+        assert "above 100 % is told as a dash" in table.caption
