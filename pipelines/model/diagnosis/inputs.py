@@ -82,10 +82,13 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
         raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
     columns = _columns(logs, arm)
     how = Reconstruction()
-    motions = iter(motions_of((*logs.identify, *logs.validate, *logs.reference), how))
-    fitted, judging, referring = (tuple(islice(motions, len(part))) for part in (logs.identify, logs.validate, logs.reference))
-    recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed), (*fitted, *referring))
-    fitted, judging, referring = (sharpened(part, how, recipe.cutoff_hz) for part in (fitted, judging, referring))
+    parts = (logs.identify, logs.validate, logs.reference)
+    motions = motions_of([log for part in parts for log in part], how)
+    judged = slice(len(logs.identify), len(logs.identify) + len(logs.validate))
+    recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed),
+                         (*motions[:judged.start], *motions[judged.stop:]))
+    sharp = iter(sharpened(motions, how, recipe.cutoff_hz))
+    fitted, judging, referring = (tuple(islice(sharp, len(part))) for part in parts)
     return _laid(logs, columns, recipe, fitted, judging, referring)
 
 

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.estimation.logs import Motions
+from pipelines.model.estimation.logs import Motions, of_each
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.signal.observer import design
 from pipelines.signal.tuning import smoother_bandwidth
@@ -36,7 +36,7 @@ def sharpened(motions: Motions, how: Reconstruction, cutoff_hz: float | None) ->
     `cutoff_hz` of the equations; as they are where there is none, or no smoother."""
     if cutoff_hz is None:
         return motions
-    return tuple((log, _sharper(log, found, how, cutoff_hz)) for log, found in motions)
+    return of_each([log for log, _ in motions], lambda place: _sharper(*motions[place], how, cutoff_hz))
 
 
 def _sharper(log: ExperimentLog, found: Reconstructed, how: Reconstruction, cutoff_hz: float) -> Reconstructed:

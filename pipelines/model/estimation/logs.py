@@ -20,7 +20,7 @@ from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
-           "with_cutoff"]
+           "of_each", "with_cutoff"]
 
 Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
@@ -83,14 +83,19 @@ class Judged:
 
 
 def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
-    """Each log with its motion, by two processes.
+    """Each log with its motion.
 
     Raises:
         UsageError, InputRejected: as `reconstruct`, of the first log that it cannot be done for.
     """
+    return of_each(logs, lambda place: reconstruct(logs[place], how))
+
+
+def of_each(logs: Sequence[ExperimentLog], work: Callable[[int], Reconstructed]) -> Motions:
+    """Each log with the motion that `work` makes for its place, by two processes, the longest first; raises what comes first."""
     def moved(place: int) -> Reconstructed | UsageError | InputRejected:
         try:
-            return reconstruct(logs[place], how)
+            return work(place)
         except (UsageError, InputRejected) as no:  # which of several logs is told does not hang on who was quicker
             return no
 
