@@ -58,7 +58,7 @@ class AsymmetricFriction(Effect):
         return (replace(self, gradual=1.0),)
 
     def own_load(self, values: Values) -> OwnLoad:
-        (coulomb, viscous), sharpness = (0.5 * self.amplitudes(values)).tolist(), values["sharpness"]
+        (coulomb, viscous), sharpness = map(float, 0.5 * self.amplitudes(values)), values["sharpness"]
         if not values["gradual"]:
             return lambda angle, speed: coulomb * abs(math.tanh(sharpness * speed)) + viscous * abs(speed)
 
