@@ -82,7 +82,8 @@ def test_a_signal_ends_a_batch_and_leaves_the_cluster_free(lay: Lay, tmp_path: P
     with subprocess.Popen([sys.executable, "-c", program, str(root), cluster.address], text=True, stderr=subprocess.PIPE,
                           env=os.environ | QUIET | {"PYTHONPATH": str(REPO)}, start_new_session=True) as process:
         deadline = time.monotonic() + 60.0
-        while not all(path.exists() for path in begun):
+        known = [tmp_path / "out/ledger/0.json", tmp_path / "out/ledger/1.json"]  # the workers have said so
+        while not all(path.exists() for path in (*begun, *known)):
             assert process.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.02)
@@ -127,10 +128,10 @@ def test_no_item_is_lost_with_its_worker(lay: Lay, tmp_path: Path, cluster: Clus
 
 def test_a_scheduler_that_is_gone_is_exit_6_and_can_be_gone_on_from(lay: Lay, tmp_path: Path, cluster: Cluster) -> None:
     """It goes away in the middle: what is done is kept, the rest is done by --resume, here or on another cluster."""
-    root = lay({f"{i}": f"sleep 0.2 started {tmp_path / 'started'}{i}" for i in range(6)})
+    root = lay({f"{i}": f"sleep {0.2 if i < 4 else 3.0} started {tmp_path / 'started'}{i}" for i in range(6)})
 
     def kill() -> None:
-        while not (tmp_path / "started3").exists():
+        while not (tmp_path / "started4").exists() or not (tmp_path / "out/ledger/0.json").exists():
             time.sleep(0.01)
         cluster.scheduler.kill()
 
