@@ -98,15 +98,14 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], stream: Any = 
 
 
 def _laid_out(head: Sequence[str], cells: Sequence[int]) -> tuple[list[list[str]], list[int]]:
-    """The headings in lines, and the widths of the columns whose cells need `cells`: no wider together than a terminal, if that
-    can be had by breaking headings."""
-    heads, widths = list[list[str]](), list(cells)
+    """The headings in lines, and the widths of the columns whose cells need `cells`: no wider together than a terminal where
+    breaking headings brings that about, else as they read best."""
+    tried = []
     for least in _HEADS if head else ():
         heads = [_heading(words, max(width, least), least < _HEADS[0]) for words, width in zip(head, cells, strict=True)]
-        widths = [max(width, *map(len, lines)) for width, lines in zip(cells, heads, strict=True)]
-        if sum(widths) + 2 * len(widths) <= _WIDE:
-            break
-    return heads, widths
+        tried.append((heads, [max(width, *map(len, lines)) for width, lines in zip(cells, heads, strict=True)]))
+    fitting = (one for one in tried if sum(one[1]) + 2 * len(cells) <= _WIDE)
+    return next(fitting, tried[0] if tried else ([], list(cells)))
 
 
 def _heading(words: str, width: int, tight: bool) -> list[str]:
