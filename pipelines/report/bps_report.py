@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from pipelines.model.estimation.balance import ALONE, CLOSED, TOGETHER, Balance
+from pipelines.model.estimation.balance import ALONE
 from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
 from pipelines.report.bps import convergence_figure, torque_figure
-from pipelines.report.diagnosis_words import without_keys as plain
+from pipelines.report.bps_balance import balance_table, balance_words
+from pipelines.report.figure_words import figure_in_words as plain
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.style import format_number, format_unit, with_std
 
@@ -50,6 +51,15 @@ def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
 
 def _percent(share: float) -> str:
     return f"{format_number(100.0 * share, 2)} %"
+
+
+def _signed(x: float) -> str:
+    return f"{'+' if x > 0.0 else ''}{format_number(x, 2)}"
+
+
+def _formula(text: str) -> str:
+    """A combination of parameters as it is written: a2² m3 − √(p5² + p6²) ≥ 0."""
+    return text.replace("^2", "²").replace(">=", "≥").replace("- ", "− ").replace("sqrt(", "√(")
 
 
 def _seen(p: Estimated) -> str:
@@ -129,7 +139,7 @@ def _parameter_section(result: Result) -> Section:
     known = any(p.known is not None for p in result.parameters)
     columns = ("parameter", "value ± std", "unit", "seen", *(("described",) if known else ()), "stands for")
     rows = [(plain(p.name), "not determined" if p.value is None or p.std is None else with_std(p.value, p.std),
-             format_unit(p.unit), _seen(p), *((p.known,) if known else ()), p.combination)
+             format_unit(p.unit), _seen(p), *((p.known,) if known else ()), _formula(p.combination))
             for p in result.parameters]
     tones: tuple[Tone, ...] = tuple(
         "good" if p.visible else "bad" if p.value is None else "attention" for p in result.parameters)
@@ -151,7 +161,7 @@ def _described_words(result: Result) -> tuple[str, ...]:
     if not far:
         return (f"All {len(apart)} values of the described links lie within {ALONE:g} standard deviations of the estimate.",)
     return (f"{len(far)} of {len(apart)} values of the described links lie more than {ALONE:g} standard deviations from the "
-            f"estimate, those of {', '.join(map(plain, far[:4]))} farthest.",)
+            f"estimate, those of {', '.join(plain(name, True) for name in far[:4])} farthest.",)
 
 
 def _rotor_words(result: Result) -> tuple[str, ...]:
@@ -186,21 +196,21 @@ def _torque_unit(result: Result) -> str:
 
 def _trust_section(result: Result) -> Section:
     weak = Table(("singular value", "combination"), tuple(
-        (d.singular_value, " ".join(f"{weight:+.2f} {plain(name)}" for name, weight in d.parameters[:4]))
+        (d.singular_value, " ".join(f"{_signed(weight)} {plain(name, True)}" for name, weight in d.parameters[:4]))
         for d in result.hard_to_see),
         "The directions that these logs show worst; 1 is a column on its own.")
     tables = [weak]
     if result.consistency is not None and result.consistency.inequalities:
         tables.append(Table(("condition", "value", "holds"), tuple(
-            (i.condition, with_std(i.value, i.std), "yes" if i.holds else "no") for i in result.consistency.inequalities),
+            (_formula(i.condition), with_std(i.value, i.std), "yes" if i.holds else "no") for i in result.consistency.inequalities),
             "What positive mass demands of these parameters."))
-    if (balance := _balance_table(result)) is not None:
+    if (balance := balance_table(result)) is not None:
         tables.append(balance)
     growth = convergence_figure(
         "convergence", "Estimates as samples come in, each in units of its final value; every one ends at 1. What matters is "
         "the second half: the frame is set by it, and cuts earlier parts off. Parameters that move least are grey.",
         result.convergence_samples, result.convergence, result.convergence_std, tuple(plain(p.name) for p in result.parameters))
-    return Section("What the estimate rests on", (*_balance_words(result), *_settling_words(result)), tuple(tables), (growth,))
+    return Section("What the estimate rests on", (*balance_words(result), *_settling_words(result)), tuple(tables), (growth,))
 
 
 def _settling_words(result: Result) -> tuple[str, ...]:
@@ -212,58 +222,10 @@ def _settling_words(result: Result) -> tuple[str, ...]:
     k = int(np.argmax(moved))
     if not moved[k] > 0.0:
         return ()
-    words = f"The second half of the samples moves {plain(result.parameters[k].name)} most, by {moved[k]:.1f} standard deviations"
+    most = plain(result.parameters[k].name, True)
+    words = f"The second half of the samples moves {most} most, by {moved[k]:.1f} standard deviations"
     return (f"{words}; below {ALONE:g} the largest of so many may be chance." if moved[k] < ALONE else
             f"{words}: more than noise explains. The model lacks something, or it changed during the experiment.",)
-
-
-def _balance_words(result: Result) -> tuple[str, ...]:
-    """What the balance of power says, and what a difference would mean."""
-    balance = result.balance
-    if balance is None:
-        return ()
-    together = (f"all differences together make χ² = {balance.chi_square:.3g} in {balance.freedom} degrees of freedom, the largest "
-                f"is {max(balance.apart):.1f} standard deviations")
-    late = (f"torque lies {with_std(1e3 * abs(balance.delay), 1e3 * balance.delay_std)} ms "
-            f"{'behind' if balance.delay > 0 else 'ahead of'} the position")
-    if balance.agree:
-        return (f"The balance of power, which needs no acceleration, gives the same parameters: {together}; {late}.",)
-    unlike = (f"the reconstructed motion contradicts itself by {_percent(balance.closure)} of the energy: its acceleration is not "
-              "the slope of its speed, as after an observer that lags, or where the motion is faster than a smoother follows.")
-    if _nothing_else(balance):
-        return ("The balance of power, which needs no acceleration, finds the same parameters but cannot confirm them: "
-                f"{unlike}",)
-    meanings = [unlike] if balance.closure > CLOSED else []
-    if abs(balance.delay) > ALONE * balance.delay_std:
-        meanings.append(f"{late}: a drive or a filter delays one of them, or their clocks differ.")
-    if differing := [plain(name) for name, apart in zip(balance.names, balance.apart, strict=True) if apart > ALONE]:
-        meanings.append(f"too far apart: {', '.join(differing)}. Either the reconstructed acceleration is too small or too large, "
-                        "or the model lacks an effect.")
-    if not meanings:
-        meanings.append("No one of them stands out, all of them together do: most likely the model lacks an effect.")
-    return (f"The balance of power, which needs no acceleration, does not confirm the parameters: {together}.",
-            *(f"{words[0].upper()}{words[1:]}" for words in meanings))
-
-
-def _nothing_else(balance: Balance) -> bool:
-    """Whether parameters and delay agree, and the motion's own contradiction alone stands against it."""
-    return balance.closure > CLOSED and max(balance.apart) < ALONE and balance.deviate < TOGETHER and (
-        abs(balance.delay) < ALONE * balance.delay_std)
-
-
-def _balance_table(result: Result) -> Table | None:
-    if result.balance is None:
-        return None
-    fitted, balance = {p.name: p for p in result.parameters}, result.balance
-    rows = [(plain(name), "not determined" if (p := fitted[name]).value is None or p.std is None else with_std(p.value, p.std),
-             with_std(value, std), format_unit(p.unit), round(apart, 1))
-            for name, value, std, apart in zip(balance.names, balance.value, balance.std, balance.apart, strict=True)]
-    rows.append(("torque behind position", "taken for 0", with_std(1e3 * balance.delay, 1e3 * balance.delay_std), "ms",
-                 round(abs(balance.delay) / balance.delay_std, 1)))
-    tones: tuple[Tone, ...] = tuple("attention" if float(row[4]) > ALONE else "good" for row in rows)
-    return Table(("parameter", "by the torques", "by the balance of power", "unit", "apart [std]"), tuple(rows),
-                 f"{balance.windows} balances of work and energy. Above {ALONE:g} standard deviations a difference is not chance.",
-                 tones)
 
 
 def _winner(comparison: tuple[Compared, ...]) -> str:
@@ -287,7 +249,7 @@ def _winner(comparison: tuple[Compared, ...]) -> str:
 
 def _comparison_section(result: Result) -> Section:
     rows = tuple((c.method, 100 * c.identify, 100 * c.validate,
-                  "" if c.used or not c.value else f"{100 * c.apart[0]:+.2g} … {100 * c.apart[1]:+.2g}",
+                  "" if c.used or not c.value else f"{_signed(100 * c.apart[0])} … {_signed(100 * c.apart[1])}",
                   c.failed or ", ".join(filter(None, ("used here" if c.used else "", "as good as the best" if c.tied else ""))))
                  for c in result.comparison)
     errors = Table(("motion by", "fitted [%]", "held out [%]", "held out, minus the one used [%]", ""), rows,

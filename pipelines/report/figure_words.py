@@ -20,17 +20,22 @@ _HARMONIC = re.compile(r" ([23])$")
 _METHOD = re.compile(r"\b(?:varpro|output-error|ekf) ")
 
 
-def figure_in_words(name: str) -> str:
-    """`name`, which `log.result_figures` gave, with its cause in words; as it is where it is of none."""
+def figure_in_words(name: str, within: bool = False) -> str:
+    """`name`, which `log.result_figures` gave, with its cause in words; as it is where it is of none.
+
+    Args:
+        within: it stands within a sentence, and begins small.
+    """
     for start in (word.start() for word in _WORD.finditer(name)):
         for pattern in _CAUSES:
             if (found := pattern.fullmatch(name, start)) is not None and found[1] in effect_names():
-                return _told(name[:start].strip(), found[1], None if found[2] is None else int(found[2]), found[3] or "")
+                return _told(name[:start].strip(), found[1], None if found[2] is None else int(found[2]), found[3] or "",
+                             within)
     return name
 
 
-def _told(before: str, cause: str, joint: int | None, what: str) -> str:
+def _told(before: str, cause: str, joint: int | None, what: str, within: bool) -> str:
     said = named(cause, joint)
     parameter = spoken(_HARMONIC.sub(r"_\1", _METHOD.sub("", what)).replace(".", " "))
-    said = f"{before}: {said}" if before else f"{said[:1].upper()}{said[1:]}"
+    said = f"{before}: {said}" if before else said if within else f"{said[:1].upper()}{said[1:]}"
     return f"{said}, {parameter}" if parameter else said

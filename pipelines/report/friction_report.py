@@ -10,6 +10,7 @@ from pipelines.model.effects import find_effect
 from pipelines.model.friction.break_away import REST, WITHIN
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.result import JointResult, Result, Value
+from pipelines.report.diagnosis_words import spoken
 from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
@@ -97,6 +98,12 @@ def _plain(law: str) -> str:
     return law.replace("three_sigmoid", "three sigmoids").replace("stribeck", "Stribeck").replace("_", " ").replace("+", " + ")
 
 
+def _called(name: str) -> str:
+    """"Coulomb friction, level" for "coulomb.level"; the paper's own letters stay."""
+    effect, dot, quantity = name.partition(".")
+    return f"{find_effect(effect).title}, {spoken(quantity)}" if dot else name
+
+
 def _meaning(joint: JointResult, name: str) -> str:
     """What a number of the joint's law stands for."""
     law = law_named(joint.law)
@@ -127,9 +134,9 @@ def _summary(result: Result) -> Section:
     for name in names:
         having = [joint.parameters.get(name) for joint in result.joints]
         first = next(joint for joint in result.joints if name in joint.parameters)
-        rows.append((name, *(None if value is None else with_std(value.value, value.std) for value in having),
+        rows.append((_called(name), *(None if value is None else with_std(value.value, value.std) for value in having),
                      format_unit(first.parameters[name].unit)))
-        meanings.append((name, _meaning(first, name)))
+        meanings.append((_called(name), _meaning(first, name)))
     rows.append(("J", *(with_std(joint.inertia.value, joint.inertia.std) for joint in result.joints),
                  format_unit(result.joints[0].inertia.unit) if result.joints else ""))
     meanings.append(("J", "inertia about the joint, the others held"))

@@ -14,7 +14,7 @@ from pipelines.model.writing.result import Result
 from pipelines.report.bps import torque_figure
 from pipelines.report.joint_units import each, joined
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
-from pipelines.report.style import format_number, format_unit
+from pipelines.report.style import format_decimals, format_number, format_unit
 from pipelines.report.writing_figures import error_map_figure, executed_figure, simulated_figures, split_figure, task_figures
 
 __all__ = ["writing_report"]
@@ -144,7 +144,7 @@ def _worst(log: FirstValidation, one: Largest, joint: str) -> str:
     if end := _at_the_edge(log, one.t):
         return (f"{said}. Its largest sample, {size} at {at}, stands within one period of the low-pass of the {end} of the log: "
                 "there filter and smoother see one side only, and it says nothing of the model.")
-    return f"{said}, up to {size} at {at}, tip at ({', '.join(f'{x:.3f}' for x in one.tip)}) m."
+    return f"{said}, up to {size} at {at}, tip at ({', '.join(format_decimals(x, 3) for x in one.tip)}) m."
 
 
 def _at_the_edge(log: FirstValidation, t: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -124,3 +125,12 @@ def test_described_links_that_differ_are_named(result: Result) -> None:
     off = replace(result, parameters=(replace(first, known=first.value + 10.0 * first.std), *equal[1:]))
     assert f"1 of {len(equal)} values of the described links" in page(off)
     assert f"All {len(equal)} values of the described links" in page(replace(result, parameters=equal))
+
+
+def test_nothing_is_told_by_its_key(result: Result) -> None:
+    """Parameters by their cause in words, powers and comparisons as they are written by hand."""
+    page = bps_report(result)
+    cells = [str(cell) for section in page.sections for table in section.tables for row in table.rows for cell in row]
+    told = [*cells, *(text for section in page.sections for text in section.text)]
+    assert "Coulomb friction at joint 1, level" in cells
+    assert not [text for text in told if re.search(r"[a-z]:\d|\d:[a-z]|\w\^\d|sqrt|>=|\de[+-]\d", text)]
