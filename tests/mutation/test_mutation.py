@@ -41,13 +41,23 @@ def _outcomes(reader: Reader, folder: Path, examples: int) -> list[Outcome]:
         @given(st.integers(0, len(seeds) - 1), edits())
         def meet(which: int, many: list[Edit]) -> None:
             data = damaged(seeds[which], many)
-            outcome = child.run(data)
+            outcome = _alone(child, data)
             if outcome.exit not in reader.exits or outcome.seconds > _SECONDS or outcome.words.startswith("INCOMPLETE"):
                 (folder / f"bad-{len(found)}{reader.ending}").write_bytes(data)
             found.append(outcome)
 
         meet()
     return found
+
+
+def _alone(child: Contained, data: bytes) -> Outcome:
+    """The outcome with the time that the input needs: what took too long is timed twice more, and a machine that stood still for a
+    while is not the file's. One that hangs has hung."""
+    outcome = child.run(data)
+    for _ in range(2):
+        if outcome.seconds > _SECONDS and outcome.exit >= 0:
+            outcome = min(outcome, child.run(data), key=lambda one: one.seconds)
+    return outcome
 
 
 def _table(reader: Reader, found: list[Outcome]) -> str:
