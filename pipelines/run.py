@@ -251,7 +251,9 @@ def _exit_code(result: Result, check: bool) -> int:
 
 
 def _checks(result: Result) -> tuple[Check, ...]:
-    return tuple(check for group in result.groups for step in group.stages for check in step.checks)
+    of = {group.name: f"{group.name}, " if result.runs else "" for group in result.groups}
+    return tuple(dataclasses.replace(check, where=f"{of[group.name]}{check.where}".removesuffix(", "))
+                 for group in result.groups for step in group.stages for check in step.checks)
 
 
 def _remakes(name: str) -> bool:

@@ -107,6 +107,8 @@ def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> Non
     assert outcome.json["stages"] == []
     assert [group["name"] for group in outcome.json["runs"]] == ["rrr-tue", "other"]
     assert {p.name for p in (tmp_path / "out").iterdir() if p.is_dir()} == {"rrr-tue", "other", ".cache"}
+    lacking = [check.where for check in outcome.checks if check.code == "RRID-C06"]
+    assert sorted({where.split(", ")[0] for where in lacking}) == ["other", "rrr-tue"]  # whose logs lack something is said
 
 
 def session(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> dict[str, set[str]]:

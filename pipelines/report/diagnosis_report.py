@@ -25,6 +25,7 @@ from pipelines.report.diagnosis_words import (
     per_joint,
     spoken,
     title_of,
+    together,
     told_value,
     told_values,
     unit_or_dash,
@@ -66,7 +67,7 @@ def _verdict(result: Result) -> str:
         return f"Something is wrong that has no name here: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
-    others = f"; and {', '.join(named(one.cause, one.joint) for one in more)}" if more else ""
+    others = f"; and {', '.join(words for _, words in together((one.cause, one.joint) for one in more))}" if more else ""
     size = f", {_size(first, units_in(result))}" if math.isfinite(first.torque_rms) else ""
     tip = first.gain.tip_error_rms
     moved = f"; for it the simulated tip is {format_number(1e3 * tip.before, 2)} mm off" if tip is not None else ""
@@ -75,10 +76,10 @@ def _verdict(result: Result) -> str:
 
 
 def _advice(result: Result) -> tuple[str, ...]:
-    """What to look at on the machine, finding by finding."""
-    several = len(result.findings) > 1
-    return tuple(f"What to check{f' for {named(one.cause, one.joint)}' if several else ''}: "
-                 f"{_sentence(find_effect(one.cause).remedy)}" for one in result.findings)
+    """What to look at on the machine, cause by cause."""
+    causes = together((one.cause, one.joint) for one in result.findings)
+    return tuple(f"What to check{f' for {words}' if len(result.findings) > 1 else ''}: {_sentence(find_effect(cause).remedy)}"
+                 for cause, words in causes)
 
 
 def _at(joint: int | None) -> str:

@@ -16,7 +16,8 @@ from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
 __all__ = ["cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "meaning_of", "named",
-           "per_joint", "spoken", "title_of", "told_value", "told_values", "torque_errors", "unit_or_dash", "without_keys"]
+           "per_joint", "spoken", "title_of", "together", "told_value", "told_values", "torque_errors", "unit_or_dash",
+           "without_keys"]
 
 _PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
 _COUNTED = {"_2": "second ", "_3": "third "}  # harmonics
@@ -57,6 +58,21 @@ def named(cause: str, joint: int | None) -> str:
     title = title_of(cause)
     words = title if title.startswith(_PERSONS) else f"{title[:1].lower()}{title[1:]}"
     return words if joint is None else f"{words} at joint {joint}"
+
+
+def together(places: Iterable[tuple[str, int | None]]) -> list[tuple[str, str]]:
+    """(cause, words) of causes and joints, each cause once with all its joints: "Stribeck friction at joints 1 and 3"."""
+    joints: dict[str, list[int | None]] = {}
+    for cause, joint in places:
+        joints.setdefault(cause, []).append(joint)
+    return [(cause, _at_joints(cause, own)) for cause, own in joints.items()]
+
+
+def _at_joints(cause: str, joints: Sequence[int | None]) -> str:
+    if len(joints) < 2:
+        return named(cause, joints[0])
+    *first, last = map(str, joints)
+    return f"{named(cause, None)} at joints {', '.join(first)} and {last}"
 
 
 def spoken(parameter: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.report.diagnosis_report import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_words import held_out_words, named, title_of, torque_errors, without_keys
+from pipelines.report.diagnosis_words import held_out_words, title_of, together, torque_errors, without_keys
 from pipelines.report.joint_units import Units, units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
@@ -36,10 +36,10 @@ def extension_report(result: Extension) -> Report:
 
 
 def _verdict(result: Extension) -> str:
-    refused = ", ".join(named(one.cause, one.joint) for one in result.rejected)
+    refused, found = (", ".join(words for _, words in together((one.cause, one.joint) for one in some))
+                      for some in (result.rejected, result.findings))
     if not result.findings:
         return f"Not accepted: {refused}; no model was written. {_first_reason(result)}"
-    found = ", ".join(named(one.cause, one.joint) for one in result.findings)
     gain = result.gain
     told = ""
     if gain is not None and gain.tip_error_rms is not None:

@@ -47,12 +47,17 @@ def _title(result: Result) -> str:
 
 
 def _verdicts(group: Group) -> list[str]:
-    """What diagnosis says, then the extended model, then whatever is not in order; without these, what the last stage says."""
+    """What diagnosis says, then the extended model, then whatever is not in order; without these, what the last stage says.
+
+    Of several robots or days each has its first answer there; the table of stages has the others.
+    """
     done = [step for step in group.stages if step.result is not None]
     answers = [step for kind in (Diagnosis, Extension) for step in done if isinstance(step.result, kind)]
     others = [step for step in group.stages if step not in answers and step.report.tone in ("attention", "bad")]
     shown = [*answers, *others] or done[-1:]
-    return [f"{group.name}: {step.report.verdict}" if group.name else step.report.verdict for step in shown]
+    if group.name:
+        return [f"{group.name}: {step.report.verdict}" for step in shown[:1]]
+    return [step.report.verdict for step in shown]
 
 
 def _key_figures(steps: list[Step]) -> Table | None:

@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.result import (
 )
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_report import diagnosis_report, finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_words import held_out_floor, named, spoken, told_values, torque_errors, without_keys
+from pipelines.report.diagnosis_words import held_out_floor, named, spoken, together, told_values, torque_errors, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
@@ -67,6 +67,13 @@ def test_a_stored_reason_is_read_without_keys() -> None:
         "absorbed by Coulomb friction at joint 1, p3 and torque offset at joint 2")
     assert without_keys("spring and friction stay as they are: 3 of 4") == "spring and friction stay as they are: 3 of 4"
     assert named("payload", None) == "a load at the tip"
+
+
+def test_one_cause_at_several_joints_is_told_once() -> None:
+    """Three joints with Stribeck friction need no advice three times."""
+    found = [("stribeck", 1), ("payload", None), ("stribeck", 3), ("cogging", 2), ("stribeck", 2)]
+    assert [words for _, words in together(found)] == ["Stribeck friction at joints 1, 3 and 2", "a load at the tip",
+                                                       "cogging at joint 2"]
 
 
 def test_whether_an_error_is_in_order_is_said() -> None:

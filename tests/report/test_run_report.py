@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import fields
 
 import numpy as np
@@ -90,3 +91,15 @@ def test_findings_that_build_on_one_another_stand_in_that_order() -> None:
     """The drag was found beside the cogging, and is the stronger: the cogging comes first all the same."""
     steps = [line.step for line in ledger_lines(told(DRAG, RIPPLE))]
     assert steps[:3] == ["rigid body and friction, as diagnose fits them", "+ cogging at joint 2", "+ quadratic drag at joint 1"]
+
+
+def test_of_several_robots_each_has_one_sentence() -> None:
+    """What its diagnosis says; what the extension says stands in the table of stages. One robot alone is told in full."""
+    def of(name: str) -> Group:
+        group = told(RIPPLE)
+        words = {"diagnose": "Cogging.", "extend": "Better."}
+        return dataclasses.replace(group, name=name, stages=tuple(
+            dataclasses.replace(step, report=Report("", words[step.name])) for step in group.stages))
+
+    assert run_report(Result((), (of("a"), of("b")))).verdict == "a: Cogging. b: Cogging."
+    assert run_report(Result(of("").stages)).verdict == "Cogging. Better."
