@@ -42,13 +42,14 @@ class Case:
 
     def arms(self, model: Exact) -> Arms:
         """By whose columns causes are screened beside `model`: what just adds its torque by those of the start, which are laid
-        already, as long as that arm has the same torque.
+        already, as long as that arm has the same torque, and what was found does not change how any torque is recorded.
 
         Columns are of first order. Those of an arm that differs by a twentieth are off by as much, and gain a thousandth less.
         """
         torque = model.torque(self.data)
         more = self.data.rms(self.model.torque(self.data) - torque)
-        return Arms(model.arm, self.model.arm if (more <= _ALIKE * self.data.rms(torque)).all() else model.arm)
+        alike = (more <= _ALIKE * self.data.rms(torque)).all() and not any(one.effect.last for one in model.effects)
+        return Arms(model.arm, self.model.arm if alike else model.arm)
 
 
 def held_out(done: Refined, case: Case) -> float:

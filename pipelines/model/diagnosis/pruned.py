@@ -110,8 +110,8 @@ def unlike_motion(done: Settled, usual: Array) -> Settled:
     joints = standing_out(following(nominal.fit, nominal.residual[None])[:, 0], usual)
     if not joints:
         return done
-    where = ", ".join(f"joint {j + 1}" for j in joints)
-    reason = f"what is left of {where} follows from its own motion, which noise does not, and no cause explains it"
+    where = " and of ".join(f"joint {j + 1}" for j in joints)
+    reason = f"what is left of {where} follows from the joint's own motion, which noise does not, and no cause explains it"
     return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
 
 

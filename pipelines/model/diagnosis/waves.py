@@ -16,7 +16,9 @@ from pipelines.model.diagnosis.data import Data
 __all__ = ["without_waves"]
 
 _MOST = 6  # of a joint in a log
-_SHARE = 0.1  # of the squared residual, that a wave takes away at least: of noise the strongest of a few hundred takes a hundredth
+_SHARE = 0.1  # of the squared residual, that a wave takes away at least
+# Over the number of rows, the same: of white noise a wave with slopes takes about four over it, the strongest of a thousand 25.
+_CHANCE = 40.0
 _BINS, _FINE = 2048, 4  # along the range of the joint; orders a wave over it
 _LEAST, _HIGHEST = 2, 256  # waves over the range: slower ones are no line, faster ones are blurred by the bins
 
@@ -35,6 +37,7 @@ def _rest(q: Array, x: Array) -> Array:
     if span <= 0.0:
         return x
     place = np.minimum((_BINS * (q - q.min()) / span).astype(int), _BINS - 1)
+    share = max(_SHARE, _CHANCE / len(x))
     for _ in range(_MOST):
         # X(m) = Σ_n x_n exp(-2πi m (q_n - q_min) / (4 span)): bins first, which a fast transform then sums
         lines = np.abs(np.fft.rfft(np.bincount(place, x, minlength=_BINS), n=_FINE * _BINS))[:_FINE * _HIGHEST]
@@ -43,7 +46,7 @@ def _rest(q: Array, x: Array) -> Array:
         wave = np.stack([np.sin(angle), np.cos(angle)])
         wave = np.concatenate([wave, (q - q.mean()) * wave])  # slopes: its order lies between two lines
         less = x - np.linalg.lstsq(wave.T, x, rcond=None)[0] @ wave
-        if less @ less > (1.0 - _SHARE) * (x @ x):
+        if less @ less > (1.0 - share) * (x @ x):
             break
         x = less
     return x
