@@ -35,10 +35,12 @@ _WIDER = 2.3
 def sharpened(motions: Motions, how: Reconstruction, cutoff_hz: float | None) -> Motions:
     """The logs with their motions reconstructed by smoothers that are `_WIDER` times as wide, joint by joint, where these reach the
     `cutoff_hz` of the equations; as they are where there is none, or no smoother."""
+    if cutoff_hz is None:
+        return motions
     return of_each([log for log, _ in motions], lambda place: _sharper(*motions[place], how, cutoff_hz))
 
 
-def _sharper(log: ExperimentLog, found: Reconstructed, how: Reconstruction, cutoff_hz: float | None) -> Reconstructed:
+def _sharper(log: ExperimentLog, found: Reconstructed, how: Reconstruction, cutoff_hz: float) -> Reconstructed:
     observers, felt = found.observers, cutoff_at(cutoff_hz, 1.0 / log.sample_time)
     if felt is None or observers is None or not observers.twice:  # derived before, or as asked for
         return found
