@@ -22,8 +22,8 @@ _SIGNS = {"ok": "·", "warn": "!", "bad": "x"}
 def compare(
     common: Common,
     a: Annotated[Path, typer.Argument(help="A folder that a command has left, its result.json, or a model.json.",
-                                      show_default=False, readable=False)],
-    b: Annotated[Path, typer.Argument(help="Another one of the same command.", show_default=False, readable=False)],
+                                      show_default=False, readable=False, metavar="A")],
+    b: Annotated[Path, typer.Argument(help="Another one of the same command.", show_default=False, readable=False, metavar="B")],
     alpha: Annotated[float | None, typer.Option(help="How often two results of one arm may be said to differ. [0.01]")] = None,
 ) -> None:
     """Compare two results: what differs beyond its uncertainty; with --check exit 1 where something does."""

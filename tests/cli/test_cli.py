@@ -104,6 +104,7 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     (("convert", "logs", "--ot", "x"),
      "RRID-C01 rrrid convert: no such option '--ot', did you mean '--out'? See 'rrrid convert --help'."),
     (("convert",), "RRID-C02 rrrid convert: missing argument 'LOGS'. See 'rrrid convert --help'."),
+    (("compare", "logs"), "RRID-C02 rrrid compare: missing argument 'B'. See 'rrrid compare --help'."),
     (("reconstruct", "logs", "--order", "x"), "RRID-C02 rrrid reconstruct: invalid value for '--order': "),
     (("convert", "logs", "-q", "-v"), "RRID-C02 -q, -v: "),
 ])
