@@ -27,6 +27,7 @@ __all__ = ["KINDS", "Summary", "rows_of", "summary_report"]
 _TONES: Final[dict[Status, Tone]] = {"ok": "good", "found": "attention", "rejected": "bad", "failed": "bad"}
 _ROWS = 2000  # items in one table of the page
 _CHANCE = 0.01  # of calling something moved where nothing did, once in so many batches
+_QUESTIONS = 2  # that are asked of every figure
 _DRAWN = 6  # figures of one robot
 _LISTED, _LEAST = 40, 10  # of them in the table at most; where fewer moved
 KINDS: Final[dict[str, type]] = {"item": str, "status": str, "exit": int, "code": str, "message": str, "verdict": str,
@@ -105,9 +106,24 @@ def _verdict(summary: Summary) -> str:
 
 
 def _beyond_chance(drift: Drift) -> bool:
-    """Whether a robot's figures moved farther than chance moves the farthest of so many (Šidák 1967)."""
-    single = -math.expm1(math.log1p(-_CHANCE) / max(1, len(drift.figures)))
-    return any(c.moved and (c.probability or 0.0) < single for c in drift.figures)
+    """Whether a robot's figures moved farther than chance moves the farthest of so many (Šidák 1967).
+
+    χ² of the whole course shows many items that moved a little, and hardly a single one among hundreds: the farthest item is asked
+    by itself as well, in the two-sided probability of a normal one, and either may speak.
+    """
+    figures, items = len(drift.figures), sum(len(c.items) for c in drift.figures)
+    return any(c.moved and ((c.probability or 0.0) < _single(figures) or _of_normal(float(np.max(np.abs(c.away)))) < _single(items))
+               for c in drift.figures)
+
+
+def _single(numbers: int) -> float:
+    """The probability that each of `numbers` may have, where all answers of a robot are wrong once in so many batches."""
+    return -math.expm1(math.log1p(-_CHANCE) / (_QUESTIONS * max(1, numbers)))
+
+
+def _of_normal(far: float) -> float:
+    """How often a normal number is so far [std] from its mean, on either side."""
+    return math.erfc(far / math.sqrt(2.0))
 
 
 def _unmet(summary: Summary) -> bool:

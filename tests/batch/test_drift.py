@@ -107,6 +107,35 @@ def test_the_page_says_figures_in_words_and_the_file_has_their_keys() -> None:
         assert ("Coulomb friction at joint 3, level: " in page.verdict) is (step > 0.0)
 
 
+def _tone(values: np.ndarray) -> str:
+    """Of the page of a batch whose items have these values."""
+    records = tuple(item_of(f"{k:03d}", figures={"p1": (float(x), STD, "kg m^2")}, robot="arm") for k, x in enumerate(values))
+    return summary_report(Summary("estimate-bps", records, drift_of(records)), figures=False).tone
+
+
+def test_one_item_among_hundreds_is_not_lost_in_them() -> None:
+    """One of 50 at 6 std, of 200 at 10: χ² of the whole course hardly sees it, and the batch is no less worth a look."""
+    rng = np.random.default_rng(7)
+    for count, step in ((50, 6.0), (200, 10.0)):
+        values = 1.0 + STD * rng.normal(size=count)
+        values[count // 3] += step * STD
+        assert _tone(values) == "attention"
+
+
+def test_hundreds_of_items_that_scatter_are_in_order() -> None:
+    """One of 200 is beyond 3 std by chance in four batches of ten; the page calls something moved in one of a hundred."""
+    rng = np.random.default_rng(8)
+    tones = [_tone(1.0 + STD * rng.normal(size=200)) for _ in range(100)]
+    assert tones.count("attention") <= 4  # of 100 with 0.01 each, more come once in 300 times
+
+
+def test_a_little_in_every_item_is_not_lost_either() -> None:
+    """Every item 1.7 std to one side or the other, and one at 3.7, as there may be among so many: together they have moved."""
+    values = 1.0 + 1.7 * STD * np.resize([1.0, -1.0], 200)
+    values[0] += 2.0 * STD
+    assert _tone(values) == "attention"
+
+
 def test_the_summary_table_holds_every_figure(lay: Lay) -> None:
     """summary.parquet, one row a figure, for whoever wants to plot it: with value, std, unit, and how far it is away."""
     import pyarrow.parquet as pq
