@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -18,16 +19,20 @@ from pipelines.batch.parts import Part, place_of
 from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.log.model_file import ModelFile, StoredEffect
+from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_words import title_of
 from pipelines.report.figure_words import figure_in_words
 from pipelines.report.style import format_number, unit_in_words
 
 __all__ = ["against", "known_figures", "unheld"]
 
+_LAW = re.compile(r"\b(?P<law>[a-z_]+)(?::(?P<at>\d+):| joint (?P<joint>\d+) )")  # "coulomb:3:level", "coulomb joint 3 level"
+
 
 def against(record: Record, baseline: ModelFile) -> Record:
     """`record` as it stands with the baseline in mind: "ok" where it holds nothing new, "found" with the changes where it does.
 
+    What is wrong beside named causes, or in another robot, no baseline explains: the record's words stand before the changes.
     What is of another robot than the baseline's is not judged by it.
     """
     own = [part for part in record.parts if _robot(baseline) in ("", part.robot)]
@@ -40,14 +45,14 @@ def against(record: Record, baseline: ModelFile) -> Record:
         of = f"{part.name}: " if part.name else ""
         changes += [f"{of}{words}" for words in (*moved, *gone)]
         remarks += [f"{of}{words}" for words in unsure]
-    if changes:
-        return dataclasses.replace(record, status="found", verdict=_limited("Beyond the baseline", [*changes, *remarks]))
     elsewhere = any(part.findings for part in record.parts if part not in own)
-    if record.status == "ok" or (record.accepts and not elsewhere):
-        more = f" {_limited('Of the baseline', remarks)}" if remarks else ""
-        said = record.verdict if record.status == "ok" else f"Nothing beyond the baseline. {record.verdict}"
-        return dataclasses.replace(record, status="ok", verdict=f"{said}{more}")
-    return record
+    explained = record.status == "ok" or (record.accepts and not elsewhere)
+    if changes:
+        told = _limited("Beyond the baseline", [*changes, *remarks])
+        return dataclasses.replace(record, status="found", verdict=told if explained else f"{record.verdict} {told}".strip())
+    more = f" {_limited('Of the baseline', remarks)}" if remarks else ""
+    before = "Nothing beyond the baseline. " if explained and record.status == "found" else ""
+    return dataclasses.replace(record, status="ok" if explained else "found", verdict=f"{before}{record.verdict}{more}")
 
 
 def _limited(about: str, words: Sequence[str]) -> str:
@@ -72,12 +77,7 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: 
     if strange:
         said.append(_warned(f"{len(strange)} of {len(done)} items are of another robot than the baseline, and not held against it: "
                             f"{', '.join(strange[:3])}", "give the folders of each robot a batch of their own"))
-    others = sorted({place for part in judged for place in _laws_apart(part, baseline)})
-    if others:
-        joints, laws = sorted({str(joint) for joint, _ in others}), dict.fromkeys(title_of(law) for _, law in others)
-        said.append(_warned(f"of the baseline, the friction of joint {_listed(joints)} follows other laws: it has "
-                            f"{_listed(list(laws))}, and {stage} fits none",
-                            "run 'rrrid batch' with --stage run, or give a model of the same laws"))
+    said += _other_laws(stage, judged, baseline)
     missing = [name for name, part in _kinds(baseline).items() if not _met(part, judged)]
     nothing = not any(part.diagnosed or known_figures(baseline, part.figures) for part in judged)
     if missing:
@@ -87,6 +87,19 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: 
         said.append(_warned(f"the baseline has no number with an uncertainty, and {stage} names no causes: nothing is held to it",
                             "give a model.json that a command has fitted", gate=True))
     return tuple(said)
+
+
+def _other_laws(stage: str, judged: Sequence[Part], baseline: ModelFile) -> Iterator[Check]:
+    """Joints whose friction is not held against the baseline, for one of the two has a law more."""
+    for laws_of, words, remedy in (
+            (_laws_apart, f"it has {{}}, and {stage} fits none",
+             "run 'rrrid batch' with --stage run, or give a model of the same laws"),
+            (_laws_beside, f"{stage} fits {{}}, and it has none", "give a model of the same laws")):
+        found = sorted({place for part in judged for place in laws_of(part, baseline)})
+        if found:
+            joints, laws = sorted({str(joint) for joint, _ in found}), dict.fromkeys(title_of(law) for _, law in found)
+            yield _warned(f"of the baseline, the friction of joint {_listed(joints)} follows other laws: "
+                          f"{words.format(_listed(list(laws)))}", remedy)
 
 
 def _kinds(baseline: ModelFile) -> dict[str, ModelFile]:
@@ -149,7 +162,7 @@ def _moved(part: Part, baseline: ModelFile) -> Iterator[str]:
     """The figures beyond the baseline's, in words."""
     # The causes that were found are held against the baseline one by one, below.
     found = [f"{finding['cause']} joint {finding['joint']} " for finding in part.findings]
-    apart = {joint for joint, _ in _laws_apart(part, baseline)}
+    apart = {joint for joint, _ in (*_laws_apart(part, baseline), *_laws_beside(part, baseline))}
     strange = [one for one in baseline.friction if one.joint in apart]
     known = {name: figure for name, figure in known_figures(baseline, part.figures).items()
              if not any(cause in name for cause in found) and not any(_is_of(name, one) for one in strange)}
@@ -174,6 +187,29 @@ def _laws_apart(part: Part, baseline: ModelFile) -> list[tuple[int, str]]:
         there = {one.effect for one in own if any(_is_of(name, one) for name in fitted)}
         found += [(joint, one.effect) for one in own if there and one.effect not in there]
     return found
+
+
+def _laws_beside(part: Part, baseline: ModelFile) -> list[tuple[int, str]]:
+    """(joint, law) that a part has fitted together with friction of the baseline, and that the baseline does not have there.
+
+    One that a diagnosis has found is new, and is told as that.
+    """
+    known = {(one.effect, one.joint) for one in (*baseline.friction, *baseline.effects)}
+    known |= {(str(finding["cause"]), finding["joint"]) for finding in part.findings}
+    laws = {name: law for name in part.figures if (law := _law_of(name)) is not None}
+    held = known_figures(dataclasses.replace(baseline, base_parameters=(), effects=()), part.figures)
+    # What another stage has fitted is another model: a level is that beside the laws of its own.
+    together = {(laws[name][0], laws[name][2]) for name in held if name in laws}
+    return sorted({(joint, law) for before, law, joint in laws.values()
+                   if (before, joint) in together and (law, joint) not in known})
+
+
+def _law_of(name: str) -> tuple[str, str, int] | None:
+    """(the stage before it, friction law, joint) of a figure of one, however results spell it."""
+    found = _LAW.search(name)
+    if found is None or found["law"] not in effect_names() or not find_effect(found["law"]).friction:
+        return None
+    return name[:found.start()], found["law"], int(found["at"] or found["joint"])
 
 
 def _is_of(name: str, one: StoredEffect) -> bool:
@@ -212,9 +248,11 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
     """The effects of the baseline that a diagnosis does not name any more: those it would have found, and those it might not have.
 
     What the reference logs show as well is no finding, and there all the same. An effect is gone where it is larger than the
-    least that these logs would show by more than its own uncertainty explains.
+    least that these logs would show by more than its own uncertainty explains. A diagnosis of something without a
+    name tells no causes apart: of none it says that it is gone.
     """
     gone, unsure = list[str](), list[str]()
+    unnamed = part.verdict == "unknown"
     there = {*map(place_of, part.findings), *part.standing}
     for one in baseline.effects if part.diagnosed else ():
         place = place_of({"cause": one.effect, "joint": one.joint})
@@ -222,7 +260,9 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
             continue
         parameter, least = part.detectable.get(place, ("", math.inf))
         stored = one.parameters.get(parameter)
-        if stored is not None and abs(stored.value) - LIMIT * (stored.std or 0.0) > least:
+        if unnamed:
+            unsure.append(f"{place} is not found, and might be there: something is wrong that has no name")
+        elif stored is not None and abs(stored.value) - LIMIT * (stored.std or 0.0) > least:
             gone.append(f"{place} is not found any more: {parameter} {_told(stored.value, stored.unit)} before, and from "
                         f"{_told(least, stored.unit, 2)} on it would have been")
         else:

@@ -28,6 +28,7 @@ class Part:
     residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     findings: tuple[Mapping[str, Any], ...] = ()  # of a diagnosis: cause, joint, parameters
     diagnosed: bool = False  # its result names causes, be it none
+    verdict: str = ""  # of a diagnosis: "cause", "nothing-wrong", "unknown"
     standing: tuple[str, ...] = ()  # what the reference logs show as well: "stribeck:2"
     detectable: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, the least that is found
 
@@ -51,7 +52,7 @@ def _part(result: Mapping[str, Any], name: str, robot: str, recorded: str, turni
     least = {place_of(one): (str(one["parameter"]), float(one["smallest"]["value"])) for one in result.get("detectable") or ()
              if (one.get("smallest") or {}).get("value") is not None}
     return Part(name, robot, recorded, fitted(result), residuals(result, turning), findings, result.get("findings") is not None,
-                tuple(map(place_of, result.get("standing") or ())), least)
+                str(result.get("verdict") or ""), tuple(map(place_of, result.get("standing") or ())), least)
 
 
 def place_of(one: Mapping[str, Any]) -> str:

@@ -100,6 +100,29 @@ def test_a_level_beside_another_law_is_not_the_same_level() -> None:
     assert unheld("run", [both], baseline) == ()
 
 
+def test_a_level_beside_a_law_that_the_baseline_lacks_is_not_the_same_level() -> None:
+    """The other way round: a baseline of Coulomb friction alone, 3.93 N m, and Stribeck friction beside it in what is held to it.
+    Not where another stage alone has fitted that law, or the baseline has it as an effect; a law that was found is told as new."""
+    coulomb = StoredEffect("coulomb", 1, {"level": StoredValue(3.93, 0.014, "N m", "fitted")})
+    stribeck = StoredEffect("stribeck", 1, {"amplitude": StoredValue(1.06, 0.02, "N m", "fitted")})
+    baseline = dataclasses.replace(_baseline(), friction=(coulomb,), effects=())
+    for level, law in (("coulomb:1:level", "stribeck:1:amplitude"),
+                       ("extend model coulomb joint 1 level", "extend model stribeck joint 1 amplitude")):
+        figures = {"p1": (1.0, STD, "kg m^2"), level: (3.65, 0.01, "N m")}
+        both = item_of("a", figures=figures | {law: (1.06, 0.02, "N m")})
+        assert against(both, baseline) == both
+        (said,) = unheld("run", [both], baseline)
+        assert "the friction of joint 1 follows other laws: run fits Stribeck friction, and it has none" in said.message
+        finding = {"cause": "stribeck", "joint": 1, "parameters": {}}
+        for other, model in ((item_of("a", figures=figures), baseline),
+                             (_known(both, findings=(finding,)), baseline),
+                             (both, dataclasses.replace(baseline, effects=(stribeck,))),
+                             (item_of("a", figures=figures | {"fit-friction j stribeck joint 1 amplitude": (1.06, 0.02, "N m")}),
+                              baseline)):
+            assert "level 3.65 N m, 3.93 before" in against(other, model).verdict
+            assert not any("other laws" in one.message for one in unheld("run", [other], model))
+
+
 def test_a_baseline_that_meets_nothing_is_a_gate() -> None:
     """Another robot's, a stage without figures, a model without uncertainties: what was asked for cannot be done at all."""
     baseline = dataclasses.replace(_baseline(), robot='name = "arm"')
@@ -145,6 +168,27 @@ def test_a_known_cause_that_is_gone_is_told() -> None:
         assert "cogging:2 is not found, and might be there" in deaf.verdict
     assert against(_known(quiet, standing=("cogging:2",)), baseline) == _known(quiet, standing=("cogging:2",))
     assert against(_known(quiet, diagnosed=False), baseline).verdict == ""
+
+
+def test_where_something_has_no_name_no_cause_is_gone() -> None:
+    """A diagnosis that names nothing, for what it met is none of the causes, does not say that one is over; that something is wrong
+    stands first, with changes and without."""
+    said = "Something is wrong that has no name."
+    unnamed = dataclasses.replace(
+        item_of("a", "found", figures={"p1": (1.0, STD, "kg m^2")}, diagnosed=True, verdict="unknown",
+                detectable={"cogging:2": ("amplitude", 0.04)}), verdict=said)
+    judged = against(unnamed, _baseline())
+    assert judged.status == "found"
+    assert judged.verdict.startswith(f"{said} Of the baseline: cogging:2 is not found, and might be there")
+    moved = against(_known(unnamed, figures={"p1": (1.2, STD, "kg m^2")}), _baseline())
+    assert moved.verdict.startswith(f"{said} Beyond the baseline: p1 1.2 kg m²")
+    assert "not found any more" not in judged.verdict + moved.verdict
+    other = {"stages": [], "runs": [_run("arm", "arm", 0.6), _run("other", "other", 0.5)]}
+    elsewhere = Record("a", "a", "found", 1, verdict=said, parts=parts_of(other, "several", "2026-01-01"), accepts=True)
+    words = against(elsewhere, dataclasses.replace(_baseline(), robot='name = "arm"')).verdict
+    assert words.startswith(f"{said} Beyond the baseline: arm: cogging:2 amplitude 0.6 N m")
+    unknown = {"verdict": "unknown", "findings": [], "detectable": []}
+    assert [part.verdict for part in parts_of(unknown, "arm", "2026-01-01")] == ["unknown"]
 
 
 def _run(name: str, robot: str, amplitude: float | None, p1: float = 1.0) -> dict[str, Any]:
