@@ -19,6 +19,8 @@ _SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
 _NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
 _SILENT: Final = ("parameters", "result", "torque")
 _PASSED_OVER: Final = ("balance", "comparison", "ladder", "rejected", "detectable", "courses")
+_PICTURES: Final = "previews"  # whose units are of position and torque, not of joints
+_A_MODEL: Final = "model"  # whose "robot" is a whole description
 _MOST = 400  # figures of one item
 
 
@@ -55,16 +57,17 @@ def _sliding(value: Any) -> set[int]:
     """The joints, from 1, that slide by the units that a result gives of them."""
     if isinstance(value, Mapping):
         told = [unit for key in ("units", "torque_units") if isinstance(value.get(key), list) for unit in enumerate(value[key], 1)]
-        return {j for j, unit in told if unit in _SLIDING.values()}.union(*map(_sliding, value.values()))
+        return {j for j, unit in told if unit in _SLIDING.values()}.union(
+            *(_sliding(item) for key, item in value.items() if key != _PICTURES))
     return set[int]().union(*map(_sliding, value)) if isinstance(value, list) else set()
 
 
 def robot_of(result: Any) -> str:
-    """The first robot that a result names, however deep; "" where it names none."""
+    """The name of the first robot that a result is of, however deep; "" where it says none."""
     if isinstance(result, Mapping):
         if isinstance(result.get("robot"), str):
             return str(result["robot"])
-        return next(filter(None, map(robot_of, result.values())), "")
+        return next(filter(None, (robot_of(item) for key, item in result.items() if key != _A_MODEL)), "")
     return next(filter(None, map(robot_of, result)), "") if isinstance(result, list) else ""
 
 

@@ -36,6 +36,8 @@ def figure_in_words(name: str, within: bool = False) -> str:
 
 def _told(before: str, cause: str, joint: int | None, what: str, within: bool) -> str:
     said = named(cause, joint)
-    parameter = spoken(_HARMONIC.sub(r"_\1", _METHOD.sub("", what)).replace(".", " "))
+    # A law of several effects says which one a parameter is of; of the effect that it is named after, that is said already.
+    own = _METHOD.sub("", what).removeprefix(f"{cause.replace('_', ' ')}.")
+    parameter = spoken(_HARMONIC.sub(r"_\1", own).replace(".", " "))
     said = f"{before}: {said}" if before else said if within else f"{said[:1].upper()}{said[1:]}"
     return f"{said}, {parameter}" if parameter else said

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.log.result_figures import fitted, residuals
+from pipelines.log.result_figures import fitted, residuals, robot_of
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.figure_words import figure_in_words
 
@@ -20,6 +20,9 @@ from pipelines.report.figure_words import figure_in_words
     ("diagnose cogging joint 2 amplitude 3", "diagnose: cogging at joint 2, third amplitude"),
     ("extend model viscous joint 1 coefficient", "extend model: viscous friction at joint 1, coefficient"),
     ("fit-friction waist stribeck joint 1 varpro coulomb.level", "fit-friction waist: Stribeck friction at joint 1, coulomb level"),
+    ("fit-friction waist stribeck joint 1 varpro stribeck.speed", "fit-friction waist: Stribeck friction at joint 1, speed"),
+    ("fit-friction waist three_sigmoid joint 1 varpro three sigmoid.f1",
+     "fit-friction waist: friction of three sigmoids at joint 1, f1"),
     ("payload mass", "A load at the tip, mass"),
     ("diagnose cogging joint 2 torque rms", "diagnose: cogging at joint 2, torque rms"),
     ("estimate-bps p3", "estimate-bps p3"), ("torque rms validate joint 2", "torque rms validate joint 2"), ("", "")])
@@ -59,6 +62,16 @@ def test_a_joint_that_slides_has_its_own_units() -> None:
     for result, turning in (({**estimate, "torque_units": ["N m", "N"]}, ()), (estimate, (True, False))):
         assert [unit for _, unit in residuals(result, turning).values()] == ["N m", "N", "1"]
     assert [unit for _, unit in residuals(estimate).values()] == ["N m", "N m", "1"]
+    doctor = {"logs": [{"name": "a"}], "previews": [{"units": ["m", "N"]}]}  # position and torque of the first joint
+    assert [unit for _, unit in residuals({**estimate, "inspected": doctor}).values()] == ["N m", "N m", "1"]
     run = {"stages": [{"name": "estimate-bps", "result": {**estimate, "torque_units": ["N m", "N"]}},
                       {"name": "diagnose", "result": {"residual_rms": {"validate": [0.1, 0.2]}}}]}
     assert residuals(json.loads(json.dumps(run)))["diagnose residual rms validate joint 2"] == (0.2, "N")
+
+
+def test_a_robot_is_a_name() -> None:
+    """The one of the stage, of its logs or of those of a run; not the description that a model holds."""
+    model = {"model": {"robot": 'name = "arm"\n[[links]]'}}
+    for result, name in (({**model, "robot": "arm"}, "arm"), ({**model, "logs": [{"robot": "arm"}]}, "arm"), (model, ""),
+                         ({"stages": [{"name": "a", "result": None}, {"result": model}, {"result": {"robot": "arm"}}]}, "arm")):
+        assert robot_of(result) == name
