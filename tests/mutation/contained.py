@@ -37,6 +37,7 @@ class Outcome:
     words: str = ""
     seconds: float = 0.0
     memory: int = 0  # [B] largest resident size so far, of the child or of one of its own children
+    again: int = 0  # times that it was timed again
 
 
 class Contained:
