@@ -75,6 +75,14 @@ def test_the_file_says_where_thresholds_come_from(place: Path) -> None:
     """Logs by their digests, model, replicas, seed and versions; and it is what its schema says."""
     stored = json.loads((place / "first/calibration.json").read_text())
     jsonschema.validate(stored, calibration_schema())
+    older = {name: item for name, item in stored.items() if name != "following"}
+    (place / "older").mkdir()
+    (place / "older/calibration.json").write_text(json.dumps(older))
+    shutil.copy(place / "first/calibration.h5", place / "older")
+    assert read_calibration(place / "older").following is None
+    jsonschema.validate(older, calibration_schema())
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({name: item for name, item in stored.items() if name != "floor"}, calibration_schema())
     origin = stored["origin"]
     assert (origin["kind"], origin["replicas"], origin["seed"]) == ("twin", 2, 1)
     assert [len(log["sha256"]) for log in origin["logs"]] == [64]

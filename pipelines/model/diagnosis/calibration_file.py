@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,8 +31,12 @@ _AGAIN = "diagnose the logs of an arm in order again"
 
 
 def calibration_schema() -> dict[str, Any]:
-    """The JSON Schema of calibration.json."""
-    return object_schema(Calibration, "calibration.json of rrrid diagnose")
+    """The JSON Schema of calibration.json; what files lack that are older than it, they are read without."""
+    schema = object_schema(Calibration, "calibration.json of rrrid diagnose")
+    for kind, told in ((Calibration, schema), (Wide, schema["$defs"][Wide.__name__])):
+        later = {one.name for one in fields(kind) if one.default is not MISSING and not one.kw_only}
+        told["required"] = [name for name in told["required"] if name not in later]
+    return schema
 
 
 def write_calibration(folder: Path, made: Calibration) -> None:
