@@ -42,10 +42,17 @@ def report(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
 ) -> None:
     """Draw a report again from its stored result; nothing is computed."""
+    from pipelines.log.stored_result import read_result
     from pipelines.stored.redraw import redraw
 
     del debug  # `entry` looks for it
-    drawn, _ = redraw(folder.absolute(), None if out is None else out.absolute(), force)
+    home, target = folder.absolute(), None if out is None else out.absolute()
+    if home.is_dir() and read_result(home).command == "batch":
+        from pipelines.batch.redraw import redraw_batch
+
+        drawn = redraw_batch(home, target)
+    else:
+        drawn, _ = redraw(home, target, force)
     if not quiet:
         from rrrid_cli.console import say_verdict
 
