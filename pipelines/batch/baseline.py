@@ -18,7 +18,7 @@ from pipelines.batch.drift import LIMIT
 from pipelines.batch.parts import Part, place_of
 from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
-from pipelines.log.model_file import ModelFile, StoredEffect
+from pipelines.log.model_file import ModelFile, StoredEffect, StoredValue
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_words import title_of
 from pipelines.report.figure_words import figure_in_words
@@ -248,18 +248,19 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
     """The effects of the baseline that a diagnosis does not name any more: those it would have found, and those it might not have.
 
     What the reference logs show as well is no finding, and there all the same. An effect is gone where it is larger than the
-    least that these logs would show by more than its own uncertainty explains. A diagnosis of something without a
-    name tells no causes apart: of none it says that it is gone.
+    least that these logs would show by more than its own uncertainty explains. One that the baseline itself cannot tell from
+    nothing, an offset that was fitted with the rest, is not missed. A diagnosis of something without a name tells no causes
+    apart: of none it says that it is gone.
     """
     gone, unsure = list[str](), list[str]()
     unnamed = part.verdict == "unknown"
     there = {*map(place_of, part.findings), *part.standing}
     for one in baseline.effects if part.diagnosed else ():
         place = place_of({"cause": one.effect, "joint": one.joint})
-        if place in there:
-            continue
         parameter, least = part.detectable.get(place, ("", math.inf))
         stored = one.parameters.get(parameter)
+        if place in there or not any(map(_is_there, one.parameters.values() if stored is None else (stored,))):
+            continue
         if unnamed:
             unsure.append(f"{place} is not found, and might be there: something is wrong that has no name")
         elif stored is not None and abs(stored.value) - LIMIT * (stored.std or 0.0) > least:
@@ -268,6 +269,10 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
         else:
             unsure.append(f"{place} is not found, and might be there: these logs would not show it for sure")
     return gone, unsure
+
+
+def _is_there(stored: StoredValue) -> bool:
+    return stored.std is None or abs(stored.value) > LIMIT * stored.std
 
 
 def _otherwise(place: str, parameters: Mapping[str, Any], known: StoredEffect) -> Iterator[str]:

@@ -170,6 +170,18 @@ def test_a_known_cause_that_is_gone_is_told() -> None:
     assert against(_known(quiet, diagnosed=False), baseline).verdict == ""
 
 
+def test_what_the_baseline_cannot_tell_from_nothing_is_not_missed() -> None:
+    """An offset of 0.22 ± 0.11 N m, which estimate-bps fits with the rest, is no cause that could go; one of 0.22 ± 0.01 is."""
+    for std, status in ((0.11, "ok"), (0.01, "found")):
+        offset = StoredEffect("torque_offset", 2, {"offset": StoredValue(0.22, std, "N m", "fitted")})
+        baseline = dataclasses.replace(_baseline(), effects=(offset,))
+        silent = item_of("a", figures={"p1": (1.0, STD, "kg m^2")}, diagnosed=True,
+                         detectable={"torque_offset:2": ("offset", 0.025)})
+        assert against(silent, baseline).status == status
+        deaf = _known(silent, detectable={})
+        assert ("torque_offset:2" in against(deaf, baseline).verdict) is (status == "found")
+
+
 def test_where_something_has_no_name_no_cause_is_gone() -> None:
     """A diagnosis that names nothing, for what it met is none of the causes, does not say that one is over; that something is wrong
     stands first, with changes and without."""
