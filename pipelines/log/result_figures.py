@@ -85,6 +85,8 @@ def _walk(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
                 continue
             words = key.replace("_", " ")
             if isinstance(item, list):
+                if key == "postures" and len(item) == 1 and not _words(item[0]):
+                    continue  # of its only posture a joint says the same without it
                 for number, one in enumerate(item, 1):
                     yield from _walk(one, (*path, *(_words(one) or (words, str(number)))))
             else:

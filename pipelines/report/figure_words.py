@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from pipelines.model.effects import effect_names
+from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_words import named, spoken
 
 __all__ = ["figure_in_words"]
@@ -17,7 +17,7 @@ _WORD = re.compile(r"\S+")
 _CAUSES = (re.compile(r"([a-z_]+)(?::(\d+))?:([a-z_0-9]+)"),  # "coulomb:3:level", "payload:mass"
            re.compile(r"([a-z_]+)(?: joint (\d+))?(?: (.+))?"))  # "coulomb joint 3 level", "payload mass"
 _HARMONIC = re.compile(r" ([23])$")
-_METHOD = re.compile(r"\b(?:varpro|output-error|ekf) ")
+_METHOD = re.compile(r"(?:varpro|output-error|ekf) ")
 
 
 def figure_in_words(name: str, within: bool = False) -> str:
@@ -35,9 +35,19 @@ def figure_in_words(name: str, within: bool = False) -> str:
 
 
 def _told(before: str, cause: str, joint: int | None, what: str, within: bool) -> str:
-    said = named(cause, joint)
-    # A law of several effects says which one a parameter is of; of the effect that it is named after, that is said already.
-    own = _METHOD.sub("", what).removeprefix(f"{cause.replace('_', ' ')}.")
-    parameter = spoken(_HARMONIC.sub(r"_\1", own).replace(".", " "))
+    method = _METHOD.match(what)
+    said, parameter = _of_a_joint(cause, joint, what[method.end():]) if method else (named(cause, joint), what)
+    parameter = spoken(_HARMONIC.sub(r"_\1", parameter))
     said = f"{before}: {said}" if before else said if within else f"{said[:1].upper()}{said[1:]}"
     return f"{said}, {parameter}" if parameter else said
+
+
+def _of_a_joint(law: str, joint: int | None, what: str) -> tuple[str, str]:
+    """What fit-friction calls by the law of the joint: a parameter of one of the effects that make the law up, "coulomb.level", of
+    an effect that is the law, or of the joint itself, as its inertia is."""
+    effect, dot, quantity = what.partition(".")
+    if dot and effect.replace(" ", "_") in effect_names():
+        return named(effect.replace(" ", "_"), joint), quantity
+    if any(q.name.replace("_", " ") == what for q in find_effect(law).parameters):
+        return named(law, joint), what
+    return f"joint {joint}", what

@@ -19,7 +19,9 @@ from pipelines.report.figure_words import figure_in_words
     ("estimate-bps torque_offset:2:offset", "estimate-bps: torque offset at joint 2, offset"),
     ("diagnose cogging joint 2 amplitude 3", "diagnose: cogging at joint 2, third amplitude"),
     ("extend model viscous joint 1 coefficient", "extend model: viscous friction at joint 1, coefficient"),
-    ("fit-friction waist stribeck joint 1 varpro coulomb.level", "fit-friction waist: Stribeck friction at joint 1, coulomb level"),
+    ("fit-friction waist stribeck joint 1 varpro coulomb.level", "fit-friction waist: Coulomb friction at joint 1, level"),
+    ("fit-friction waist stribeck joint 1 varpro gravity sine", "fit-friction waist: joint 1, gravity sine"),
+    ("fit-friction waist three_sigmoid joint 1 varpro f1", "fit-friction waist: friction of three sigmoids at joint 1, f1"),
     ("fit-friction waist stribeck joint 1 varpro stribeck.speed", "fit-friction waist: Stribeck friction at joint 1, speed"),
     ("fit-friction waist three_sigmoid joint 1 varpro three sigmoid.f1",
      "fit-friction waist: friction of three sigmoids at joint 1, f1"),
@@ -51,6 +53,15 @@ def test_every_figure_of_a_result_has_a_name_of_its_own() -> None:
     writing = {"logs": [{"name": "w", "letters": [{"label": "letter 1, 'R'", "relative_error": [0.1]},
                                                   {"label": "letter 2, 'R'", "relative_error": [0.2]}]}]}
     assert list(residuals(writing)) == ["w letter 1, 'R' relative error joint 1", "w letter 2, 'R' relative error joint 1"]
+
+
+def test_what_a_joint_is_in_its_only_posture_is_told_once() -> None:
+    """Of several postures each has its own inertia."""
+    inertia = {"inertia": {"value": 0.8, "std": 0.1, "unit": "kg m^2"}}
+    once = {"joints": [{"joint": 1, **inertia, "postures": [inertia]}]}
+    assert list(fitted(once)) == ["joint 1 inertia"]
+    twice = {"joints": [{"joint": 1, **inertia, "postures": [inertia, inertia]}]}
+    assert list(fitted(twice)) == ["joint 1 inertia", "joint 1 postures 1 inertia", "joint 1 postures 2 inertia"]
 
 
 def test_a_joint_that_slides_has_its_own_units() -> None:
