@@ -87,7 +87,7 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     judged = slice(len(logs.identify), len(logs.identify) + len(logs.validate))
     recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed),
                          (*motions[:judged.start], *motions[judged.stop:]))
-    sharp = iter(sharpened(motions, how, recipe.cutoff_hz))
+    sharp = iter(sharpened(motions, recipe))
     fitted, judging, referring = (tuple(islice(sharp, len(part))) for part in parts)
     return _laid(logs, columns, recipe, fitted, judging, referring)
 

@@ -1,6 +1,6 @@
 """Motion whose reversals are sharp: friction that changes sign bends it more quickly than cross-validation of the position sees.
 
-    motions = sharpened(motions, how, cutoff_hz)
+    motions = sharpened(motions, recipe)
 
 When a joint with dry friction F turns round, its acceleration jumps by 2 F/D. A smoother spreads this over its own time, so
 that the speed passes through zero early or late, and friction, which follows its sign, is predicted early or late: a pulse in
@@ -9,7 +9,8 @@ against the noise of all other samples, and of the position, which a jump of the
 
 What passes the smoother above the cut-off of the equations, their low-pass takes away. So a smoother that reaches it may be
 wider at no cost but in the speed that friction is looked up with, whose noise stays far below that over which friction
-changes sign. One that does not reach it would let noise into the equations, and stays as it is.
+changes sign. One that does not reach it would let noise into the equations, and stays as it is. So does that of a joint whose slow
+samples are left out: no reversal of it is among the equations.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ import numpy as np
 
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.estimation.conditioning import cutoff_at
-from pipelines.model.estimation.logs import Motions, of_each
-from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
+from pipelines.model.estimation.logs import Motions, Recipe, of_each
+from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.signal.observer import design
 from pipelines.signal.tuning import smoother_bandwidth
 
@@ -32,23 +33,23 @@ __all__ = ["sharpened"]
 _WIDER = 2.3
 
 
-def sharpened(motions: Motions, how: Reconstruction, cutoff_hz: float | None) -> Motions:
+def sharpened(motions: Motions, recipe: Recipe) -> Motions:
     """The logs with their motions reconstructed by smoothers that are `_WIDER` times as wide, joint by joint, where these reach the
-    `cutoff_hz` of the equations; as they are where there is none, or no smoother."""
-    if cutoff_hz is None:
+    cut-off of the equations and these hold its reversals; as they are where there is no cut-off, or no smoother."""
+    if recipe.cutoff_hz is None or min(recipe.min_speed) > 0.0:
         return motions
-    return of_each([log for log, _ in motions], lambda place: _sharper(*motions[place], how, cutoff_hz))
+    return of_each([log for log, _ in motions], lambda place: _sharper(*motions[place], recipe))
 
 
-def _sharper(log: ExperimentLog, found: Reconstructed, how: Reconstruction, cutoff_hz: float) -> Reconstructed:
-    observers, felt = found.observers, cutoff_at(cutoff_hz, 1.0 / log.sample_time)
+def _sharper(log: ExperimentLog, found: Reconstructed, recipe: Recipe) -> Reconstructed:
+    observers, felt = found.observers, cutoff_at(recipe.cutoff_hz, 1.0 / log.sample_time)
     if felt is None or observers is None or not observers.twice:  # derived before, or as asked for
         return found
     own = observers.smoothing
-    wide = smoother_bandwidth(own, twice=True) >= felt
+    wide = (smoother_bandwidth(own, twice=True) >= felt) & (np.broadcast_to(np.array(recipe.min_speed), log.n_joints) == 0.0)
     if not wide.any():
         return found
     # σ ∝ bandwidth^order: `sigma_for_bandwidth`
     sigma = own.jerk_std * np.where(wide, _WIDER**own.order, 1.0)
     wider = replace(observers, smoothing=design(own.sample_time, sigma, own.noise_variance, own.order))
-    return reconstruct(log, how, found.good, wider)
+    return reconstruct(log, recipe.how, found.good, wider)

@@ -15,12 +15,16 @@ from pipelines.bench.session import as_log
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis.sharper import sharpened
 from pipelines.model.estimation.conditioning import wanted_cutoff
-from pipelines.model.estimation.logs import Motions, motions_of
+from pipelines.model.estimation.logs import Motions, Recipe, motions_of
 from pipelines.model.motion import Reconstruction
 from pipelines.signal.tuning import smoother_bandwidth
 
 HOW = Reconstruction()
 _ENDS = 100  # samples
+
+
+def recipe(cutoff_hz: float | None, *min_speed: float) -> Recipe:
+    return Recipe(HOW, cutoff_hz, min_speed=min_speed or (0.0,))
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +63,7 @@ def test_friction_is_looked_up_with_the_speed_that_it_had(recorded: tuple[Experi
             apart[:, j] = torque(speed[:, j]) - torque(recording.true_dq[:, j])
         return np.asarray(np.sqrt(np.mean(np.square(passed(apart, cutoff)), axis=0)))
 
-    before, after = missed(motions), missed(sharpened(motions, HOW, cutoff))
+    before, after = missed(motions), missed(sharpened(motions, recipe(cutoff)))
     assert (after < 0.55 * before).all()
     assert before[0] > 0.01  # half of what an arm in order leaves of this joint
 
@@ -67,7 +71,7 @@ def test_friction_is_looked_up_with_the_speed_that_it_had(recorded: tuple[Experi
 def test_what_the_equations_see_of_the_noise_stays_as_it_was(recorded: tuple[ExperimentLog, Recording, Machine], motions: Motions,
                                                              cutoff: float) -> None:
     """Below the cut-off both pass the motion whole: away from reversals the acceleration, low-passed there, is the same."""
-    plain, sharp = (passed(one[0][1].motion.ddq, cutoff) for one in (motions, sharpened(motions, HOW, cutoff)))
+    plain, sharp = (passed(one[0][1].motion.ddq, cutoff) for one in (motions, sharpened(motions, recipe(cutoff))))
     fast = np.abs(recorded[1].true_dq).min(axis=1)[_ENDS:-_ENDS] > 0.5
     assert fast.sum() > 500
     apart = np.sqrt(np.mean(np.square((sharp - plain)[fast]), axis=0))
@@ -76,9 +80,9 @@ def test_what_the_equations_see_of_the_noise_stays_as_it_was(recorded: tuple[Exp
 
 def test_a_smoother_that_noise_keeps_below_the_cut_off_stays_as_it_is(motions: Motions) -> None:
     band = smoother_bandwidth(motions[0][1].observers.smoothing, twice=True)  # type: ignore[union-attr]
-    (_, found), = sharpened(motions, HOW, float(1.05 * band.max()))
+    (_, found), = sharpened(motions, recipe(float(1.05 * band.max())))
     assert found is motions[0][1]
-    (_, wider), = sharpened(motions, HOW, float(0.95 * band.max()))
+    (_, wider), = sharpened(motions, recipe(float(0.95 * band.max())))
     assert wider.observers is not None
     assert motions[0][1].observers is not None
     changed = wider.observers.smoothing.jerk_std > motions[0][1].observers.smoothing.jerk_std
@@ -87,6 +91,16 @@ def test_a_smoother_that_noise_keeps_below_the_cut_off_stays_as_it_is(motions: M
 
 def test_what_is_not_low_passed_or_was_asked_for_stays_as_it_is(recorded: tuple[ExperimentLog, Recording, Machine],
                                                                motions: Motions) -> None:
-    assert sharpened(motions, HOW, None) is motions
+    assert sharpened(motions, recipe(None)) is motions
     asked = motions_of([recorded[0]], replace(HOW, bandwidth=(60.0,)))
-    assert sharpened(asked, HOW, 20.0)[0][1] is asked[0][1]
+    assert sharpened(asked, recipe(20.0))[0][1] is asked[0][1]
+
+
+def test_of_a_joint_whose_slow_samples_are_left_out_no_reversal_is_asked(motions: Motions) -> None:
+    """Its reversals are none of the equations, and a wider smoother would only pass more noise."""
+    assert sharpened(motions, recipe(20.0, 0.1)) is motions
+    (_, found), = sharpened(motions, recipe(20.0, 0.0, 0.1, 0.1))
+    assert found.observers is not None
+    assert motions[0][1].observers is not None
+    changed = found.observers.smoothing.jerk_std > motions[0][1].observers.smoothing.jerk_std
+    assert changed.tolist() == [True, False, False]
