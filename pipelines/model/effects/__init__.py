@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 
 __all__ = ["all_effects", "effect_names", "find_effect"]
 
+_CONTRACT = ("base", "terms")  # what every effect is written in
+
 
 @lru_cache(maxsize=1)
 def effect_names() -> tuple[str, ...]:
     """Identifiers of all effects, sorted."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name != "base"))
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name not in _CONTRACT))
 
 
 def find_effect(name: str) -> type[Effect]:

@@ -38,132 +38,17 @@ motion handed in is one log from its first sample (time in a log counts from mot
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, Protocol, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.robot import RobotDescription
-from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.effects.terms import ArmModel, Hooks, OwnLoad, Predict, Quantity, SpeedCurve, Values, friction_at
+from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ArmModel", "Effect", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
-
-Values = Mapping[str, float]
-
-
-class ArmModel(Protocol):
-    """What an effect may ask of the arm it acts on: the arm as modelled without this effect."""
-
-    @property
-    def robot(self) -> RobotDescription: ...
-
-    @property
-    def n_joints(self) -> int: ...
-
-    @property
-    def body(self) -> RigidBody: ...
-
-    @property
-    def p(self) -> Array:
-        """Base parameters (parameters,)."""
-        ...
-
-    def torque(self, motion: Motion) -> Array:
-        """Predicted torque (samples, joints) [N m]."""
-        ...
-
-    def friction_torque(self, motion: Motion) -> Array:
-        """The part of it (samples, joints) [N m] that the friction laws make."""
-        ...
-
-    def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
-        """The friction laws at a joint (1-based) as curves of its speed; None where one of them is more than that."""
-        ...
-
-    def with_body(self, body: RigidBody, p: Array) -> ArmModel:
-        """The same arm with another rigid body: new geometry, gravity or load."""
-        ...
-
-
-Predict = Callable[[Motion, ArmModel], Array]
-OwnLoad = Callable[[float, float], float]  # angle [rad], speed [rad/s] -> [N m]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One parameter of an effect: its unit and the range it is expected in before any log is seen."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    meaning: str
-    shape: bool = False  # non-linear: a field of the effect, scanned by `shapes`; otherwise an amplitude
-    discrete: bool = False  # a shape that is a whole number, such as another joint: chosen, never moved a little
-    derived: bool = False  # follows from the other parameters
-    joint: bool = False  # the number of another joint of the arm, 1-based
-    unsaid: float | None = None  # what holds where a model file does not say: the law from before the number was known
-
-    def unfit(self, value: float, own: int | None, n_joints: int) -> str:
-        """Why no arm of `n_joints` joints can have this value of an effect at joint `own`; empty where it can."""
-        if not self.joint or (value in range(1, n_joints + 1) and value != own):
-            return ""
-        return f"{self.name} = {value:g} is no other joint of this arm, which has {n_joints}"
-
-    def unit_at(self, revolute: bool) -> str:
-        """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m."""
-        if revolute:
-            return self.unit
-        return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m")
-
-
-@dataclass(frozen=True)
-class SpeedCurve:
-    """A torque that depends on the speed of its own joint alone: τ = constant + viscous v + Σ height tanh(sharpness v).
-
-    What has this form the simulation computes for all joints at once, and for one robot without any array.
-    """
-
-    constant: float = 0.0  # [N m]
-    viscous: float = 0.0  # [N m s/rad]
-    heights: tuple[float, ...] = ()  # [N m]
-    sharpnesses: tuple[float, ...] = ()  # [s/rad]
-
-    def torque(self, speed: Array) -> Array:
-        """[N m] at each speed [rad/s]."""
-        tau = self.constant + self.viscous * speed
-        for height, sharpness in zip(self.heights, self.sharpnesses, strict=True):
-            tau += height * np.tanh(sharpness * speed)
-        return tau
-
-
-@dataclass(frozen=True)
-class Hooks:
-    """How an effect enters the forward simulation. What is left out changes nothing.
-
-    The first axis of every array holds replicas, so that many simulations run at once. `states` numbers of memory each
-    replica keeps, zero or `start` at the start; `rate` moves them in continuous time, `update` once per control sample
-    (a delay line): after `sensor` was asked, before the command acts. A command is the torque as it reaches this effect:
-    of several the last one meets it first. The motion handed in is the true one with ddq
-    zero: what multiplies acceleration goes to `inertia` or `arm`. Where a sensor is in error, `settled` says where the arm
-    truly is when it reads its first position, so that the run does not begin with a jump; it and `start` are given the first
-    acceleration too, as far as that is known.
-    """
-
-    load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
-    alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based) in plain numbers: `Effect.own_load`
-    actuator: Callable[[Array, Motion, Array], Array] | None = None  # command, motion, states -> applied torque [N m]
-    sensor: Callable[[Array, Array], Array] | None = None  # true q, states -> measured q [rad]
-    inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)
-    arm: ArmModel | None = None  # the arm as it truly is
-    states: int = 0
-    settled: Callable[[Motion, Array], Motion] | None = None  # as measured at the first sample, with its torque -> as it truly is
-    start: Callable[[Motion, Array], Array] | None = None  # motion and torque at the first sample -> states
-    rate: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> d(states)/dt
-    update: Callable[[Motion, Array, Array], Array] | None = None  # motion, command, states -> next states
-    record: Callable[[Array, Array], Array] | None = None  # t (samples,), command (samples, joints) -> torque as the log has it
 
 
 @dataclass(frozen=True)
@@ -346,24 +231,6 @@ class Effect(ABC):
         if self.joint is None:
             raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
         return self.joint - 1
-
-
-def friction_at(arm: ArmModel, joint: int) -> Callable[[Motion, Array], Array]:
-    """Friction [N m] (samples,) of a joint (1-based) whose drive turns at a speed of its own: friction(motion, speed).
-
-    Made once for a simulation, which asks it at every step.
-    """
-    curves = arm.friction_curves(joint)
-
-    def by_curves(motion: Motion, speed: Array) -> Array:
-        return np.asarray(sum((curve.torque(speed) for curve in curves or ()), np.zeros(len(speed))))
-
-    def by_laws(motion: Motion, speed: Array) -> Array:
-        dq = motion.dq.copy()
-        dq[:, joint - 1] = speed
-        return np.asarray(arm.friction_torque(replace(motion, dq=dq))[:, joint - 1])
-
-    return by_laws if curves is None else by_curves
 
 
 _KEPT: list[tuple[ArmModel, Motion, Array]] = []  # the last few, newest first; compared by identity, for a motion is its arrays
