@@ -2,33 +2,63 @@
 
     found = absorbed(case...)        a load at the tip, say, with its numbers
 
-The same base parameters before and after, and the cause's columns after: what that explains of the difference between one set of
-parameters for all and one for each. A cause takes ten numbers at most, the parameters of the RRR arm are fifteen.
+A load moves them. What else they can imitate they take in as well, and nothing of it is left in the residual: a constant torque at
+a joint whose weight turns through a small angle is some more weight. But masses do not change by themselves: where one law, acting
+after the reference only, leaves the base parameters where they were, it is the simpler story. The move is that of all columns of
+the rigid body with coefficients of their own before and after; a cause explains it as far as the parameters no longer move beside
+its columns, which are zero before (an analysis of covariance, Fisher 1932).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.candidates import lay_one
+from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one, place_of
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.linear import deviations
-from pipelines.model.diagnosis.nominal import fit_columns
+from pipelines.model.diagnosis.linear import covariance, deviations
+from pipelines.model.diagnosis.nominal import Fit, fit_columns
 from pipelines.model.diagnosis.result import Value
+from pipelines.model.diagnosis.screen import gains_of
 from pipelines.model.diagnosis.standing import Mask, apart
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Absorbed", "absorbed"]
+__all__ = ["Absorbed", "Move", "Sessions", "absorbed", "chosen"]
 
-_EXPLAINS = 0.7  # of what one set of parameters for all leaves too much
+_EXPLAINS = 0.7  # of the move: a load, whose ten numbers move the parameters freely within what a body does
+_ALONE = 0.9  # the same of a law, which has to put all of them back by its few numbers
 _WORTH = 0.05  # of the squared residual, that separate parameters take away at least
-_SURE = 5.0  # standard deviations of its first number
+_SURE = 5.0  # standard deviations of a number
+_TELLS = 25.0  # of what is left of the move, in variances: five standard deviations between two stories
+_PARSIMONY = 0.02  # of the move
+_CHANCE = 3.0  # times what the parameters move between parts of the reference logs
+
+
+@dataclass(frozen=True, eq=False)
+class Sessions:
+    """Rows of reference and later logs, and the columns of a model of both."""
+
+    data: Data
+    later: Mask  # (rows,)
+    rigid: Array  # (k, rows) of the rigid body
+    others: Array  # (m, rows) of friction, with coefficients of their own before and after
+    common: Array  # (n, rows) of the standing set
+    weight: Array  # (joints,)
+
+    def fit(self, moved: bool, more: Array | None = None) -> Fit:
+        """With base parameters of their own before and after, or one set for both, beside further columns."""
+        rigid = apart(self.rigid, self.later) if moved else self.rigid
+        beside = [apart(self.others, self.later), self.common, *(() if more is None else (more,))]
+        return fit_columns(self.data, np.concatenate([rigid, *beside]), weight=self.weight)
+
+    def acting(self, effect: Effect, arm: Arm) -> Array:
+        """(k, rows) its columns, zero in the reference."""
+        return np.where(self.later, lay_one(self.data, effect, arm), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,48 +70,113 @@ class Absorbed:
     parameters: dict[str, Value]
     std: dict[str, float]  # of the values that were fitted
     explained: float  # of the difference between one set of base parameters and two
+    gain: float  # squared weighted residual that it takes away beside one set, in parts of that difference
+    rivals: tuple[Effect, ...] = ()  # elsewhere, that explain it as well: no name then
+
+    @property
+    def count(self) -> int:
+        """Numbers that were fitted."""
+        return len(self.std) + len(self.effect.free)
+
+    @property
+    def unsure(self) -> str:
+        """Why it is not named; empty where nothing speaks against it."""
+        places = [place_of(one.name, one.joint) for one in (self.effect, *self.rivals)]
+        return f"the base parameters have moved as {' or '.join(places)} moves them" if self.rivals else ""
 
 
-def absorbed(data: Data, later: Mask, rigid: Array, others: Array, common: Array, weight: Array, arm: Arm,
-             without: Sequence[str] = ()) -> Absorbed | None:
+@dataclass(frozen=True)
+class Move:
+    """How the base parameters differ."""
+
+    power: float  # squared weighted residual that two sets of them take off what one leaves
+    whole: float  # what two leave
+    variances: float  # the same move in units of its covariance: chi-squared where nothing moved
+
+
+def absorbed(two: Sessions, arm: Arm, families: Sequence[Family] = (), usual: float = 0.0, without: Sequence[str] = (),
+             ) -> Absorbed | None:
     """The cause that explains best how the base parameters moved; None where they did not, or none does.
 
     Args:
-        rigid: (k, rows) columns of the rigid body.
-        others: (m, rows) of friction, with coefficients of their own before and after.
-        common: (n, rows) of the standing set.
+        families: laws to be asked beside the causes that act on base parameters; none where the residual shows what is wrong.
+        usual: share of the squared residual that parameters of their own take away where nothing changed.
     """
-    beside = np.concatenate([apart(others, later), common])
-    one = fit_columns(data, np.concatenate([rigid, beside]), weight=weight)
-    two = fit_columns(data, np.concatenate([apart(rigid, later), beside]), weight=weight)
-    powers = [float(fit.residual @ fit.residual) for fit in (one, two)]
-    if powers[0] - powers[1] < _WORTH * powers[1]:
+    one = two.fit(moved=False)
+    move = _moved(two, one)
+    if move is None:
         return None
-    best: Absorbed | None = None
-    for kind in all_effects():
-        if kind.evidence != "base parameters" or kind.name in without:
+    places = [kind_at.full() for kind in all_effects() if kind.evidence == "base parameters" and kind.name not in without
+              for kind_at in kind.everywhere(arm.n_joints)]
+    found = [*(_tried(effect, two, arm, move, _EXPLAINS, 1) for effect in places),
+             *(_tried(effect, two, arm, move, _ALONE, None) for effect in _laws(two, one, families, arm, move))]
+    best = chosen([one for one in found if one is not None], move)
+    if best is None or best.effect.evidence == "base parameters" or move.power >= _CHANCE * usual * move.whole:
+        return best
+    return None
+
+
+def _moved(two: Sessions, one: Fit) -> Move | None:
+    """None where it is not worth a cause."""
+    apart_fit, k = two.fit(moved=True), len(two.rigid)
+    if _power(one) - _power(apart_fit) < _WORTH * _power(apart_fit):
+        return None
+    whole = covariance(apart_fit.table * apart_fit.weights, apart_fit.residual)[:2 * k, :2 * k]
+    difference = np.concatenate([-np.eye(k), np.eye(k)], axis=1)
+    by, spread = difference @ apart_fit.beta[:2 * k], difference @ whole @ difference.T
+    size = np.sqrt(np.maximum(np.diag(spread), 1e-300))
+    unit = np.linalg.pinv(spread / size[:, None] / size, rcond=1e-9, hermitian=True)
+    return Move(_power(one) - _power(apart_fit), _power(apart_fit), float((by / size) @ unit @ (by / size)))
+
+
+def _power(fit: Fit) -> float:
+    return float(fit.residual @ fit.residual)
+
+
+def _laws(two: Sessions, one: Fit, families: Sequence[Family], arm: Arm, move: Move) -> Iterator[Effect]:
+    """Each law in the shape that takes away most beside one set of base parameters, where that may be enough."""
+    for family in families:
+        if family.event:
             continue
-        for place in kind.everywhere(arm.n_joints):
-            found = _tried(place.full(), data, later, np.concatenate([rigid, beside]), weight, arm, powers)
-            if found is not None and (best is None or found.explained > best.explained):
-                best = found
-    return best
+        best, most = family.shapes[0], 0.0
+        for laid in lay_family(two.data, family, arm):
+            after = replace(laid, table=np.where(two.later[laid.rows], laid.table, 0.0))
+            gains = gains_of(after, one, one.residual[None])[0][:, 0]
+            if (top := float(gains.max())) > most:
+                best, most = family.shapes[laid.first + int(gains.argmax())], top
+        if most > _ALONE * move.power:
+            yield best
 
 
-def _tried(effect: Effect, data: Data, later: Mask, beside: Array, weight: Array, arm: Arm,
-           powers: list[float]) -> Absorbed | None:
-    columns = np.where(later, lay_one(data, effect, arm), 0.0)
-    fit = fit_columns(data, np.concatenate([beside, columns]), weight=weight)
-    share = (powers[0] - float(fit.residual @ fit.residual)) / (powers[0] - powers[1])
-    amplitudes = fit.beta[len(beside):]
-    std = deviations(fit.table * fit.weights, fit.residual)[len(beside):]
-    if share < _EXPLAINS or abs(amplitudes[0]) < _SURE * std[0]:
+def _tried(effect: Effect, two: Sessions, arm: Arm, move: Move, least: float, numbers: int | None) -> Absorbed | None:
+    """One cause; the first so many of its `numbers` have to be sure, or any of them."""
+    columns = two.acting(effect, arm)
+    fit = two.fit(moved=False, more=columns)
+    power, left = move.power + move.whole, _power(fit)
+    share = 1.0 - (left - _power(two.fit(moved=True, more=columns))) / move.power
+    amplitudes = fit.beta[-len(columns):]
+    std = deviations(fit.table * fit.weights, fit.residual)[-len(columns):]
+    if share < least or not (np.abs(amplitudes) >= _SURE * std)[:numbers].any():
         return None
     values = effect.values(amplitudes)
     if not effect.possible(values):
         return None
     names = [q.name for q in effect.parameters if not q.shape]
-    return Absorbed(effect, values, _reported(effect, amplitudes, std), dict(zip(names, std.tolist(), strict=False)), share)
+    gain = (power - left) / move.power
+    return Absorbed(effect, values, _reported(effect, amplitudes, std), dict(zip(names, std.tolist(), strict=False)), share, gain)
+
+
+def chosen(found: Sequence[Absorbed], move: Move) -> Absorbed | None:
+    """Of those that explain nearly as much as the best, the one with fewest numbers; with rivals, where as good a one is elsewhere,
+    or has as few."""
+    if not found:
+        return None
+    best = max(one.gain for one in found)
+    margin = max(_PARSIMONY, _TELLS / max(move.variances, 1e-300))
+    near = sorted((one for one in found if one.gain >= best - margin), key=lambda one: (one.count, -one.gain))
+    first = near[0]
+    rivals = tuple(one.effect for one in near[1:] if one.effect.joint != first.effect.joint or one.count == first.count)
+    return replace(first, rivals=rivals)
 
 
 def _reported(effect: Effect, amplitudes: Array, std: Array) -> dict[str, Value]:

@@ -1,7 +1,8 @@
-"""A cause that the base parameters took in, a load at the tip, made a finding of its own: the arm before it, and the arm with it.
+"""A cause that the base parameters took in, a load at the tip say, made a finding: the arm before it, and the arm with it.
 
 The parameters fitted to the later logs hold the load. Less what the load adds to them, they are those of the bare arm, which is the
-model that the reference logs gave; held-out logs say how wrong that has become, and how right the bare arm with the load is.
+model that the reference logs gave; held-out logs say how wrong that has become, and how right the bare arm with the load is: a law
+that they imitate in the fitted motion, they need not imitate in another.
 """
 
 from __future__ import annotations
@@ -47,17 +48,19 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
         whole: the same as an arm, with the standing effects and all deviations.
     """
     effect, data, judge = moved.effect, done.data, prepared.judge
-    load = data.lay(lambda motion: effect.torque(motion, done.model.nominal, moved.values))
+    load = _torque(moved, done, data)
     rigid = rigid_rows(data, done.model.columns)
     shift = np.linalg.lstsq((rigid * done.weights).T, load * done.weights, rcond=None)[0]
     beta = done.model.beta.copy()
     beta[:len(shift)] -= shift
     bare = replace(done.model, beta=beta)
     before = replace(done, model=bare, left=data.y - bare.torque(data))
-    left = (before.left if judge is None else judge.y - bare.torque(judge)), held_out_left(done, judge, blocks)
     rows = data if judge is None else judge
+    bare_left = before.left if judge is None else judge.y - bare.torque(judge)
+    left = bare_left, held_out_left(done, None, blocks) if judge is None else bare_left - _torque(moved, done, judge)
     torque = torque_gain_of(rows, *left)
-    arms = [acted(model.arm, standing) for model in (bare, done.model)]
+    acting = Acting.of(effect, moved.values, moved.std, revolute=effect.joint is None or bare.arm.robot.revolute[effect.joint - 1])
+    arms = [acted(arm, standing) for arm in (bare.arm, bare.arm.extended(acting))]
     simulated = simulation_errors(arms, prepared.judging or prepared.motions)
     doubt = "" if (torque.ci95[:, 1] < 0.0).any() else "what moved in the base parameters does not show on held-out torque"
     doubt = doubt or worse_log(rows, *left) or farther(*simulated)
@@ -65,10 +68,14 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     finding = Finding(effect.name, effect.joint, effect.title, moved.parameters, moved.explained, 0.0, (), None,
                       gain_of(torque, *simulated), "base parameters", size, of_rated,
                       proof(before, done, joint + 1) if draw else None)
-    acting = Acting.of(effect, moved.values, moved.std)
     place = {i: k for k, i in enumerate(done.model.columns.kept)}
     base = tuple(replace(p, value=p.value - float(shift[place[i]])) if i in place else p for i, p in enumerate(whole.base))
     return Carried(finding, replace(whole, base=base, effects=(*whole.effects, acting)), arms[0], left[0], doubt)
+
+
+def _torque(moved: Absorbed, done: Refined, data: Data) -> Array:
+    """(rows,) [N m] that the cause adds to the torque of the arm."""
+    return data.lay(lambda motion: moved.effect.torque(motion, done.model.nominal, moved.values))
 
 
 def _size(load: Array, data: Data) -> tuple[float, int, float]:

@@ -176,10 +176,11 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     found = search(case, chosen.most)
     done = settled(found, rule(found, since.floor), case, now, since.floor)
     noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
-    moved = since.absorbed(done.found.final.of_effects)
+    moved = since.absorbed(done.found.final.of_effects, () if done.ruling.named else case.families)
     if moved is not None and done.ruling.verdict == "unknown":
         done = unnamed(done, _with_load(found, case, now, since.floor, noise, chosen.seed))
-    told = _told(first, case, done, _Floored(since.floor, "reference logs", None, given, noise), chosen, since.probed)
+    told = _told(first, case, done, _Floored(since.floor, "reference logs", None, given, noise), chosen, since.probed,
+                 moved is not None and not moved.unsure)
     if given is None:
         told = replace(told, calibration=Calibration(
             origin_of("reference logs", logs, None, chosen), conditions_of(now), since.chance.weight, since.floor,
@@ -190,6 +191,8 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     if told.verdict == "unknown" or told.extended is None:
         why = "the base parameters have moved as it moves them, beside something that has no name"
         return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
+    if why := moved.unsure:
+        return replace(told, verdict="unknown", reason=why, summary=_sentence(Ruling("unknown", (), why), ()))
     if (like := _alike(moved.effect, told.findings)) is not None:
         why = f"the base parameters have moved, but {like.title[:1].lower()}{like.title[1:]}, which was found, moves them too"
         return replace(told, rejected=(*told.rejected, Rejected(moved.effect.name, moved.effect.joint, why)))
@@ -221,8 +224,8 @@ def _strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings,
-          probed: Probed | None = None) -> Diagnosis:
-    done, responded, own = _held_against(first, case, done, floored, chosen)
+          probed: Probed | None = None, moved: bool = False) -> Diagnosis:
+    done, responded, own = _held_against(first, case, done, floored, chosen, moved)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
     plain = first.held.plain or nominal  # nothing taken out for what responses name
@@ -254,8 +257,8 @@ def _told(first: Responding, case: Case, done: Settled, floored: _Floored, chose
         acted(plain.model.arm, standing), acted(arm, responded.acting), made)
 
 
-def _held_against(first: Responding, case: Case, done: Settled, floored: _Floored,
-                  chosen: DiagnosisSettings) -> tuple[Settled, Judged, Array | None]:
+def _held_against(first: Responding, case: Case, done: Settled, floored: _Floored, chosen: DiagnosisSettings,
+                  moved: bool) -> tuple[Settled, Judged, Array | None]:
     """What is believed beside the floor of the held-out logs, what responses have named beside that, and this floor (joints,)
     [N m]; None where there is none."""
     held, prepared = replace(first.held, case=case), first.held.prepared
@@ -268,7 +271,7 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: _Floore
                        floored.rms, chosen.seed)
     if own is None:
         return done, responded, None
-    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own)
+    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, moved)
     return believed, responded if believed is done else judged(held, believed.found.final), own
 
 

@@ -110,8 +110,10 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
         if not why:
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
-    moved = ask(found.final.of_effects) if ask is not None and taken_in else None
-    moved = moved if moved is not None and any(_is(one, moved) for one in taken_in) else None
+    laws = () if left else every  # what the residual does not show may be in the base parameters
+    moved = ask(found.final.of_effects, laws) if ask is not None and (taken_in or laws) else None
+    moved = moved if moved is not None and any(_is(one, moved) for one in rest) else None
+    refused = {place: why for place, why in refused.items() if moved is None or place != (moved.effect.name, moved.effect.joint)}
     unmoved = [one for one in taken_in if moved is None or not _is(one, moved)]
     if unmoved and not every:
         _family(case, unmoved[0])  # alone it is a slip of who asked
@@ -134,7 +136,7 @@ def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisS
 
 
 def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory,
-          ) -> tuple[Case, Prepared, Callable[[Array], Absorbed | None] | None]:
+          ) -> tuple[Case, Prepared, Callable[[Array, Sequence[Family]], Absorbed | None] | None]:
     """The nominal model on these logs, beside what the reference logs show as well; and what says what base parameters took in
     since, less a torque (rows,)."""
     case, prepared = first.held.case, first.held.prepared

@@ -87,11 +87,11 @@ def unnamed(done: Settled, floor: Array) -> Settled:
     return replace(done, ruling=Ruling("nothing-wrong", (), "", done.ruling.doubts), simulated=())
 
 
-def unlike_held_out(done: Settled, rms: Array, floor: Array) -> Settled:
+def unlike_held_out(done: Settled, rms: Array, floor: Array, moved: bool = False) -> Settled:
     """"unknown" where the model leaves, (joints,) [N m], many times the `floor` of the very logs held out: what was found is
-    something else, or what is wrong does not show in the fitted logs."""
+    something else, or what is wrong does not show in the fitted logs; `moved`: there is a cause that the base parameters show."""
     verdict = done.ruling.verdict
-    high = held_out_high(rms, floor, _WRONG if verdict == "cause" else _STRANGE)
+    high = held_out_high(rms, floor, _WRONG if verdict == "cause" or moved else _STRANGE)
     if verdict == "unknown" or not high:
         return done
     model = "what explains the fitted logs" if verdict == "cause" else "the nominal model, which the fitted logs bear out,"

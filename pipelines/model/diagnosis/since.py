@@ -14,9 +14,9 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.absorbed import Absorbed, absorbed
+from pipelines.model.diagnosis.absorbed import Absorbed, Sessions, absorbed
 from pipelines.model.diagnosis.beside import less
-from pipelines.model.diagnosis.candidates import Arms, families, lay_one, whole_motion
+from pipelines.model.diagnosis.candidates import Arms, Family, families, lay_one, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
@@ -45,7 +45,7 @@ class Since:
     left: Array  # (rows,) [N m] of the reference logs, by the model that has the standing effects
     standing: tuple[Standing, ...]
     acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
-    absorbed: Callable[[Array], Absorbed | None]  # what base parameters show, less a torque (rows,) [N m] of the later logs
+    absorbed: Callable[[Array, Sequence[Family]], Absorbed | None]  # see `absorbed`: less a torque (rows,) [N m] of the later logs
     chance: Chance
     probed: Probed  # beside a final model: what limits are looked for with
 
@@ -91,9 +91,10 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
                 beside=(*before, *acting))
     kept = len(columns.kept)
 
-    def moved(torque: Array) -> Absorbed | None:
+    def moved(torque: Array, laws: Sequence[Family]) -> Absorbed | None:
         rows, _ = joined(reference, less(prepared.data, torque))
-        return absorbed(rows, later, base[:kept], nominal[kept:], common, whole.weight, arm, chosen.without)
+        two = Sessions(rows, later, base[:kept], nominal[kept:], common, whole.weight)
+        return absorbed(two, arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)
 
     pairs = list(zip(standing, sizes, strict=True))
     return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed)

@@ -178,6 +178,16 @@ class Chance:
         if new:
             self.known.update(zip(new, for_each(self.data, self._gained, new, self.fits, self.arm), strict=True))
 
+    def moved(self, kept: int) -> float:
+        """Share of the squared residual that the first `kept` columns of the nominal model, the rigid body's, take away by
+        coefficients of their own in any part."""
+        most = 0.0
+        for mask, fit in zip(self.masks, self.fits, strict=True):
+            beside = np.concatenate([apart(self.nominal[kept:], mask), self.common])
+            one = fit_columns(self.data, np.concatenate([self.nominal[:kept], beside]), self.data.y, self.weight)
+            most = max(most, float(one.residual @ one.residual) / max(float(fit.residual @ fit.residual), 1e-300) - 1.0)
+        return most
+
     @property
     def bounds(self) -> tuple[CauseBound, ...]:
         """All that was found, as it is stored."""

@@ -1,0 +1,97 @@
+"""What the base parameters take in since the reference logs, though no mass has changed, is told by their move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
+from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects import effect_names
+from pipelines.model.effects.base import Effect
+from pipelines.model.effects.payload import Payload
+from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.torque_gain import TorqueGain
+from pipelines.model.effects.torque_offset import TorqueOffset
+from sample_logs.make_closed_form import quantised, recorded, torque_step
+from tests.model.diagnosis.arms import arm
+from tests.model.estimation.experiments import Quick, motion_of
+
+TRIED = ("quadratic_drag", "torque_offset", "torque_gain", "asymmetric_friction", "payload")
+SETTINGS = DiagnosisSettings(without=tuple(name for name in effect_names() if name not in TRIED), evidence=False, limits=False)
+OFFSET = 30.0 / 2048  # [N m] one step of the converter of joint 2
+LITTLE = 0.2  # of the usual angles: over so few, weight hardly changes
+
+
+def turning_little(seed: int) -> Quick:
+    wide = motion_of(seed)
+    return Quick(wide.q0, LITTLE * wide.a, LITTLE * wide.b, wide.df)
+
+
+def pushed(seed: int, offset: float, role: str = "identify") -> ExperimentLog:
+    """A constant torque at joint 2."""
+    log = recorded(arm(), turning_little(seed), 8.0, np.random.default_rng([4, seed]), name=f"{role}-{seed}",
+                   experiment="excitation", role=role, period=10.0)
+    tau = log.tau + quantised(np.tile([0.0, offset, 0.0], (log.n_samples, 1)), torque_step(log.robot))
+    return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=tau)})
+
+
+@pytest.fixture(scope="module")
+def offset() -> Diagnosis:
+    return diagnose(Logs((pushed(1, OFFSET), pushed(2, OFFSET)), (pushed(3, OFFSET, "validate"),),
+                         (pushed(4, 0.0, "reference"), pushed(5, 0.0, "reference"))), SETTINGS)
+
+
+def test_a_constant_torque_that_passes_for_weight_is_named(offset: Diagnosis) -> None:
+    """The masses are those of the reference logs: an offset of the drive is the simpler story."""
+    assert [(one.cause, one.joint, one.origin) for one in offset.findings] == [("torque_offset", 2, "base parameters")]
+    found = offset.findings[0].parameters["offset"]
+    assert isinstance(found.value, float)
+    assert isinstance(found.std, float)
+    assert abs(found.value - OFFSET) < max(3.0 * found.std, 0.05 * OFFSET)
+
+
+def test_held_out_torque_bears_it_out_and_the_model_has_it_apart(offset: Diagnosis) -> None:
+    gain = offset.findings[0].gain.validate_torque_rms
+    assert gain.ci95[1, 1] < 0.0
+    assert gain.after[1] < 0.5 * gain.before[1]
+    assert offset.extended is not None
+    assert [one.place for one in offset.extended.effects] == ["torque_offset:2"]
+
+
+def test_without_a_change_the_base_parameters_have_not_moved() -> None:
+    found = diagnose(Logs((pushed(1, OFFSET), pushed(2, OFFSET)), (),
+                          (pushed(4, OFFSET, "reference"), pushed(5, OFFSET, "reference"))), SETTINGS)
+    assert found.verdict == "nothing-wrong"
+
+
+def story(effect: Effect, explained: float, numbers: int) -> Absorbed:
+    return Absorbed(effect, {}, {}, dict.fromkeys(map(str, range(numbers)), 1.0), explained, explained)
+
+
+@pytest.mark.parametrize(("variances", "rivals"), [(500.0, ["payload"]), (5e4, [])])
+def test_two_stories_are_told_apart_by_five_standard_deviations(variances: float, rivals: list[str]) -> None:
+    """A load leaves 2 %, a scale of one torque 5 % of a move of so many variances: 15 between them decide nothing, 1500 do."""
+    found = chosen([story(Payload(), 0.98, 10), story(TorqueGain(2), 0.95, 1)], Move(1.0, 1.0, variances))
+    assert found is not None
+    assert [one.name for one in found.rivals] == rivals
+    assert bool(found.unsure) == bool(rivals)
+
+
+def test_of_what_explains_the_same_at_a_joint_the_fewest_numbers_win() -> None:
+    """A spring has a constant torque in it."""
+    found = chosen([story(Spring(2), 0.996, 2), story(TorqueOffset(2), 0.995, 1)], Move(1.0, 1.0, 1e4))
+    assert found is not None
+    assert (found.effect.name, found.rivals) == ("torque_offset", ())
+
+
+def test_a_joint_of_its_own_is_another_place() -> None:
+    found = chosen([story(TorqueOffset(2), 0.99, 1), story(TorqueOffset(3), 0.985, 1)], Move(1.0, 1.0, 1e4))
+    assert found is not None
+    assert "torque_offset:2 or torque_offset:3" in found.unsure
