@@ -27,6 +27,7 @@ _REST = 0.35  # of a joint's residual that may be left beside a named cause, whe
 _REST_OF_GAP = 0.6  # the same beside a gap: where the link is in it hangs on lubricant and tooth, which no law has to the last
 
 _MISFIT = "beside a gap, whose law leaves more than the floor at some moments, nothing that happened once is told from it"
+_LITTLE = "it explains less than half of what stands above the floor, which is so little that it may be the floor"
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
              "testable without a floor: reference logs, or logs whose controller is known and a twin")
 
@@ -85,6 +86,8 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
     whole = excess(found.nominal.rms, floor)
     total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
     if (found.nominal.rms > _CLEAR * floor).any() and total < _HALF:
+        if not (found.nominal.rms > _ABOVE * floor).any():  # without that explanation nothing would be wrong
+            return Ruling("nothing-wrong", (), "", dict.fromkeys(range(len(accepted)), _LITTLE))
         return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:

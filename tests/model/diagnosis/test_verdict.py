@@ -49,6 +49,15 @@ def test_a_cause_that_explains_less_than_half_is_not() -> None:
     assert rule(found(left(0.01, 0.05, 0.01), left(0.01, 0.04, 0.01)), FLOOR).verdict == "unknown"
 
 
+def test_a_poor_explanation_of_what_would_be_no_alarm_without_it_is_none() -> None:
+    """1.25 times the floor without a cause is nothing wrong; so it is with one that takes a tenth of that away."""
+    nominal = left(0.0125, 0.01, 0.0107)
+    assert rule(found(nominal), FLOOR).verdict == "nothing-wrong"
+    ruling = rule(found(nominal, left(0.0125, 0.01, 0.0102)), FLOOR)
+    assert (ruling.verdict, ruling.named) == ("nothing-wrong", ())
+    assert 0 in ruling.doubts
+
+
 def test_what_may_be_the_floor_need_not_be_explained() -> None:
     """Ten replicas know the floor to about a tenth: joint 1 is no excess that the cause at joint 3 ought to take away."""
     assert rule(found(left(0.0115, 0.0097, 0.0105), left(0.0115, 0.0097, 0.0098)), FLOOR).named == (0,)
