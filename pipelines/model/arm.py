@@ -36,9 +36,10 @@ class Acting:
     @classmethod
     def of(cls, effect: Effect, values: Mapping[str, float], std: Mapping[str, float] | None = None,
            origin: Origin = "fitted", revolute: bool = True) -> Acting:
-        """`effect` with `values` of all its parameters, units and bounds its own; `revolute` tells its joint's kind."""
-        return cls(effect.at(values), tuple(
-            Parameter(q.name, values[q.name], (std or {}).get(q.name), q.unit_at(revolute), (q.low, q.high), origin)
+        """`effect` with `values` of its parameters, units and bounds its own; `revolute` tells its joint's kind."""
+        known = effect.complete(values)
+        return cls(effect.at(known), tuple(
+            Parameter(q.name, known[q.name], (std or {}).get(q.name), q.unit_at(revolute), (q.low, q.high), origin)
             for q in effect.parameters))
 
     @property

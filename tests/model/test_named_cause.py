@@ -13,9 +13,10 @@ REVOLUTE = (True, True, False)
 def test_a_cause_with_its_numbers() -> None:
     """Joint, amplitudes and non-linear numbers; what is not given keeps its default."""
     found = acting_cause("coulomb:2:level=1.5", REVOLUTE)
-    assert (found.effect.name, found.effect.joint, found.values) == ("coulomb", 2, {"level": 1.5, "sharpness": 100.0})
+    assert (found.effect.name, found.effect.joint) == ("coulomb", 2)
+    assert found.values == {"level": 1.5, "sharpness": 100.0, "roundness": 1.0}
     found = acting_cause("coulomb:1:level=1, sharpness=50", REVOLUTE)
-    assert found.values == {"level": 1.0, "sharpness": 50.0}
+    assert found.values == {"level": 1.0, "sharpness": 50.0, "roundness": 1.0}
     assert {q.origin for q in found.parameters} == {"assumed"}
 
 

@@ -160,8 +160,13 @@ class Effect(ABC):
 
     def at(self, values: Values) -> Self:
         """Itself with the non-linear numbers out of `values`."""
-        shape: dict[str, Any] = {q.name: values[q.name] for q in self.parameters if q.shape}
+        known = self.complete(values)
+        shape: dict[str, Any] = {q.name: known[q.name] for q in self.parameters if q.shape}
         return replace(self, **shape)
+
+    def complete(self, values: Values) -> dict[str, float]:
+        """`values`, and what holds of a number that they do not say, where the law was known before the number was."""
+        return {q.name: q.unsaid for q in self.parameters if q.unsaid is not None} | dict(values)
 
     def amplitudes(self, values: Values) -> Array:
         """The amplitudes that belong to `values`, in the order of the columns."""

@@ -1,0 +1,67 @@
+"""Nobody knows by which curve the dry friction of a real joint changes its sign: no cause is found in that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, loosened, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.search import search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects import effect_names
+from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import hidden
+from tests.model.estimation.experiments import COULOMB
+
+LAWS = ("stribeck", "concave_friction", "quadratic_drag")
+
+
+def case_with(curve: Callable[[Array], Array]) -> Case:
+    """Logs of an arm whose joints change the sign of their friction by `curve`, with laws of friction as the only causes."""
+    def instead(motion: Motion) -> Array:
+        return np.array(COULOMB) * (curve(100.0 * motion.dq) - np.tanh(100.0 * motion.dq))
+
+    logs = Logs((hidden(1, instead), hidden(2, instead)), (hidden(3, instead, "validate"),))
+    prepared = loosened(prepare(logs, DiagnosisSettings()))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    without = tuple(name for name in effect_names() if name not in LAWS)
+    return Case(prepared.data, prepared.judge, model, fit.weight,
+                families(columns.laws, whole_motion(prepared.data), model.arm, without), None)
+
+
+@pytest.mark.parametrize("curve", [
+    pytest.param(lambda x: x / np.sqrt(1.0 + x**2), id="root"),
+    pytest.param(lambda x: np.sign(x) * (1.0 - np.exp(-np.abs(x))), id="exponential")])
+def test_no_law_of_friction_is_found_in_another_change_of_sign(curve: Callable[[Array], Array]) -> None:
+    """v/√(v² + ε²) and an exponential: as steep as tanh at rest, and the same at speed."""
+    assert search(case_with(curve), 2).steps[0].best is None
+
+
+def test_concave_friction_is_still_found_beside_it() -> None:
+    """A fifth of the dry friction levels off over 0.3 rad/s, thirty times the speed over which the rest changes its sign."""
+    found = search(case_with(lambda x: 0.8 * x / np.sqrt(1.0 + x**2) + 0.2 * np.tanh(x / 30.0)), 1).steps[0].best
+    assert found is not None
+    assert found.effect.name == "concave_friction"
+    assert found.done.model.effects[0].values["speed"] == pytest.approx(0.3, rel=0.2)
+
+
+def test_the_root_is_met_by_its_sigmoids() -> None:
+    """Within an eighth of a per cent of the level at any speed."""
+    v = np.concatenate([np.linspace(0.0, 0.1, 2001), np.geomspace(0.1, 10.0, 2001)])
+    curve = Coulomb(1).speed_curve({"level": 1.0, "sharpness": 100.0, "roundness": 2.0})
+    np.testing.assert_allclose(curve.torque(v), 100.0 * v / np.sqrt(1.0 + (100.0 * v) ** 2), atol=1.25e-3)
+
+
+def test_where_slow_samples_are_left_out_the_curve_is_not_asked() -> None:
+    """The change of sign is not among the equations then."""
+    kept = loosened(prepare(Logs((hidden(1),)), DiagnosisSettings(min_speed=(0.05,)))).columns.laws
+    assert [law.free for law in kept if isinstance(law, Coulomb)] == [("sharpness",)] * 3
