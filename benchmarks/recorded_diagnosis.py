@@ -156,7 +156,7 @@ def nested_error(folds: Sequence[Judged]) -> tuple[float, float, Array]:
 
 
 def payoff(folds: Sequence[Judged]) -> dict[str, tuple[int, float]]:
-    """Of each cause: in how many searches it was named, and what it took off the squared error of the blocks held out there."""
+    """Of each cause: in how many searches it was found, and what it took off the squared error of the blocks held out there."""
     out: dict[str, tuple[int, float]] = {}
     for one in folds:
         for before, after in zip(one.steps, one.steps[1:], strict=False):
@@ -187,7 +187,8 @@ def _print_tx40(data: Path, count: int) -> None:
     print(f"  what diagnose keeps of it: {100 * kept:.2f} %;", "; ".join(", ".join(one.causes) for one in folds))
     print("  share of each joint:", ", ".join(f"{100 * x:.2f} %" for x in joints))
     for name, (times, taken) in sorted(payoff(folds).items(), key=lambda item: -item[1][1]):
-        print(f"  {name:28s} named in {times} of {count}, takes {100 * taken:6.2f} % off the squared error held out")
+        stays = f"found in {times} of {count}, kept in {sum(name in one.causes for one in folds)}"
+        print(f"  {name:28s} {stays}, takes {100 * taken:6.2f} % off the squared error held out")
     print(f"  {sum(one.seconds for one in folds):.0f} s of CPU")
 
 

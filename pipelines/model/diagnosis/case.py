@@ -40,6 +40,11 @@ class Case:
     again: bool = True  # a cause that may act more than once at its place may be found more than once
     beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
 
+    @property
+    def floored(self) -> bool:
+        """Whether thresholds say what an arm in order shows of a cause: of a twin, or of reference logs."""
+        return self.thresholds is not None or self.changed is not None
+
     def arms(self, model: Exact) -> Arms:
         """By whose columns causes are screened beside `model`: what just adds its torque by those of the start, which are laid
         already, as long as that arm has the same torque, and what was found does not change how any torque is recorded.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["Tried", "ledger"]
 
+_REFUSED = "time held out does not bear it out"
 _SHOWN = 12  # lines of a step, of causes that stay below their thresholds
 
 
@@ -37,8 +38,9 @@ class Tried:
 
 
 def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
-            best: Tried | None, now: Refined, number: int) -> tuple[Trial, ...]:
-    """The lines of step `number`, greatest gain first; `judged` holds the gains that `thresholds` are for."""
+            best: Tried | None, now: Refined, number: int, refused: Collection[int] = ()) -> tuple[Trial, ...]:
+    """The lines of step `number`, greatest gain first; `judged` holds the gains that `thresholds` are for, `refused` the ids of
+    those screened that time held out does not bear out."""
     exact = {id(one.screened): one for one in tried}
     rows: list[Trial] = []
     order = sorted(range(len(screened)), key=lambda k: -judged[k].gain[0])
@@ -50,9 +52,11 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
             continue
         reason = ("accepted" if accepted else "below its threshold" if gain <= thresholds.gain[k] else
                   "comes again at other moments" if not one.stands_out else
+                  _REFUSED if id(one) in refused and fitted is None else
                   "weaker than others" if fitted is None else
                   "impossible numbers" if not fitted.possible else
-                  "held-out error does not fall" if fitted.error >= 1.0 else "explains less than the one accepted")
+                  "held-out error does not fall" if fitted.error >= 1.0 else
+                  _REFUSED if id(one) in refused else "explains less than the one accepted")
         gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
         rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
                           float(one.visibility[0]), gained, accepted, reason))

@@ -56,7 +56,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     doubts = {k: at_odds(found, k, prepared, case) or farther(simulated[k], simulated[k + 1], late=late)
               for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
-    doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
+    if case.floored:  # the search has asked it where there is no floor
+        doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
     kept = _apart(found, [k for k in ruling.named if k not in doubts], case)
     doubts |= {k: _SHAPE for k in ruling.named if k not in (*kept, *doubts)}
     kept, final = _asked_again(found, kept, [k for k, why in doubts.items() if why == BY_CHANCE], case)

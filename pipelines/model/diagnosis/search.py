@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.borne_out import borne_out, not_borne_out
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole
 from pipelines.model.diagnosis.ledger import Tried, ledger
@@ -37,7 +38,6 @@ _WORTH = 0.05  # of the squared residual of its joint
 _MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
-_FALLS = 0.02  # of the held-out error, that a cause takes off at least where no floor says what is left to explain
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
 
@@ -58,6 +58,7 @@ class _Gate:
     judged: Sequence[Screened]  # with the gains that the thresholds are for
     thresholds: Thresholds
     passed: tuple[Screened, ...]
+    refused: frozenset[int]  # ids of those above their thresholds that other time does not bear out
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +105,10 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         same = number <= len(rough) and rough[number - 1].before is now
         screened = rough[number - 1].screened if same else _screened(case, now)
         gate = _gate(case, now, screened)
-        step = _step(case, rough[number - 1] if same else _explored(case, now, screened, gate.passed), gate, number, number <= most)
+        explored = rough[number - 1] if same else _explored(case, now, screened, gate.passed)
+        if same and not case.floored:
+            explored = _explored(case, now, screened, gate.passed, explored.tried)
+        step = _step(case, explored, gate, number, number <= most)
         steps.append(step)
         if step.best is None:
             break
@@ -135,17 +139,25 @@ def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
     return tuple(screen(case.data, now.fit, case.families, case.arms(now.model)))
 
 
-def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened]) -> Explored:
-    """The greatest causes fitted exactly, as far as they are wanted: what stays below its threshold need not be."""
+def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened],
+              there: Sequence[Tried] = ()) -> Explored:
+    """The greatest causes fitted exactly, as far as they are wanted: what stays below its threshold need not be.
+
+    Args:
+        there: those that are fitted already.
+    """
     taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
     able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
             or (case.again and one.shape[0].again(case.data.logs[0].motion))]
     order = sorted((one for one in able if one.gain[0] >= _LEAST * now.rss), key=lambda one: -one.gain[0])
     able = [one for one in order if one.family.shapes[0].evidence in case.nameable and one.stands_out]
     asked = {id(one) for one in wanted}
+    if not case.floored:  # what is not borne out, however great, is no rival of what is
+        able = [one for one in able if id(one) in asked]
     great = [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0] and id(one) in asked]
     error = held_out(now, case) if great else np.nan
-    tried = [fitted(case, now, one, error) for one in great]
+    done = {id(one.screened): one for one in there}
+    tried = [done.get(id(one)) or fitted(case, now, one, error) for one in great]
     best = _fewest(sorted(tried, key=lambda one: one.rank))
     tried = [best_form(case, now, one, error) if one is best else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
@@ -160,19 +172,22 @@ def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
         thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
     passed = tuple(one for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True)
                    if seen.gain[0] > bound and one.stands_out)
-    return _Gate(judged, thresholds, passed)
+    refused = frozenset() if case.floored else frozenset(id(passed[k]) for k in not_borne_out(case, now, passed))
+    return _Gate(judged, thresholds, tuple(one for one in passed if id(one) not in refused), refused)
 
 
 def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool) -> Step:
     now, screened, thresholds = explored.before, explored.screened, gate.thresholds
     passes = {id(one) for one in gate.passed}
     tried = [one for one in explored.tried if id(one.screened) in passes]
-    if case.thresholds is None and case.changed is None:
-        tried = [one for one in tried if one.error <= 1.0 - _FALLS]
+    refused = gate.refused
+    if not case.floored:
+        refused |= {id(one.screened) for one in tried if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
+        tried = [one for one in tried if id(one.screened) not in refused]
     best = _fewest(tried) if more else None
     other = _other(gate.passed, best, explored.tried, now, case.nameable)
     best = None if other is not None else best
-    trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number)
+    trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number, refused)
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
 
 
