@@ -26,7 +26,7 @@ from pipelines.model.diagnosis.verdict import Ruling, explained
 
 __all__ = ["BY_CHANCE", "agreement", "by_chance", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
 
-BY_CHANCE = "its gain on held-out torque is within what chance does"
+BY_CHANCE = "its gain on held-out torque is within what chance does, or too little to be told from an arm in order"
 
 _HALF = 0.5
 _NOTHING = 1e-9  # of the torque at the joint that an effect acts on most: what is smaller is rounding
@@ -108,18 +108,22 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
     return tuple(sorted(found, key=lambda rival: -rival.similarity))
 
 
-def by_chance(before: Refined, after: Refined, place: int, judge: Data | None, blocks: int) -> bool:
+def by_chance(before: Refined, after: Refined, place: int, judge: Data | None, blocks: int, least: float = 0.0) -> bool:
     """Whether, of all joints that effect number `place` of `after`, which `before` lacks, acts on, no held-out error falls by more
     than chance does.
 
     What falls elsewhere is due to other numbers, moved by the fit.
+
+    Args:
+        least: share of its root mean square that a held-out error has to fall by.
     """
     gain = torque_gain(before, after, judge, blocks)
     acts = after.data.rms(after.model.torque(after.data) - _without(after, place))
     own = acts > _NOTHING * acts.max()  # without it the whole torque may be worked out in another order
     # An event, torque that is clipped once say, is in one block of time only, and drawn blocks do not repeat it; but what was
     # fitted to other time does not take half of the power off by chance.
-    return not (gain.ci95[own, 1] < 0.0).any() and not (gain.after**2 < _HALF * gain.before**2)[own].any()
+    sure = (gain.ci95[:, 1] < 0.0) & (gain.after <= (1.0 - least) * gain.before)
+    return not (sure | (gain.after**2 < _HALF * gain.before**2))[own].any()
 
 
 def unlike(before: Refined, after: Refined, place: int, prepared: Prepared, blocks: int) -> str:

@@ -29,6 +29,9 @@ from pipelines.model.effects.base import Effect
 __all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unlike_motion", "unnamed", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
+# Of the held-out root mean square at some joint, that a cause takes away at least. Ten replicas know the floor to about a tenth,
+# and the best of a thousand shapes takes a fortieth off the logs of an arm in order, held-out ones too: its ripple is in all.
+_LITTLE = 0.05
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
 _ALIKE = 0.25  # of what a cause took away, that one for which it could be mistaken takes as well: weaker ones are no rivals
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
@@ -57,7 +60,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
               for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
-        doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
+        doubts |= {k: BY_CHANCE for k in ruling.named
+                   if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks, _LITTLE)}
     kept = _apart(found, [k for k in ruling.named if k not in doubts], case)
     doubts |= {k: _SHAPE for k in ruling.named if k not in (*kept, *doubts)}
     kept, final = _asked_again(found, kept, [k for k, why in doubts.items() if why == BY_CHANCE], case)
@@ -139,11 +143,11 @@ def _harm(found: Found, final: Refined, case: Case) -> str:
     return worse_log(case.data if case.judge is None else case.judge, *left)
 
 
-def _by_chance(step: Step, prepared: Prepared, blocks: int) -> bool:
+def _by_chance(step: Step, prepared: Prepared, blocks: int, least: float = 0.0) -> bool:
     best = step.best
     if best is None or best.log is not None:
         return False
-    return by_chance(step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, blocks)
+    return by_chance(step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, blocks, least)
 
 
 def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
@@ -177,7 +181,7 @@ def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) 
         for k in left:
             more = sorted((*kept, k))
             there = _without(found, more, case, final) if _apart(found, more, case) == more else None
-            if there is None or by_chance(final, there, more.index(k), case.judge, case.blocks):
+            if there is None or by_chance(final, there, more.index(k), case.judge, case.blocks, _LITTLE):
                 others.append(k)
             else:
                 kept, final = more, there

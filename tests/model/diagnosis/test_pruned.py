@@ -179,6 +179,17 @@ def test_what_falls_at_a_joint_that_a_cause_does_not_act_on_is_no_argument_for_i
     assert findings.by_chance(before, after, 0, None, 10) is chance  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(("rest", "chance"), [(0.097, True), (0.093, False)])
+def test_what_is_sure_and_little_is_no_name(rest: float, chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """3 % off the held-out error, beyond doubt: an arm in order has as much in its ripple. An extension is asked without that."""
+    model = SimpleNamespace(torque=lambda data: np.ones(1), without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(1)))
+    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs))
+    little = TorqueGain(np.array([0.1]), np.array([rest]), np.array([[-0.01, -0.001]]))
+    monkeypatch.setattr(findings, "torque_gain", lambda *_: little)
+    assert findings.by_chance(after, after, 0, None, 10, pruned._LITTLE) is chance
+    assert not findings.by_chance(after, after, 0, None, 10)
+
+
 @pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])
 def test_what_leaves_many_floors_of_the_held_out_logs_is_something_else(held_out: float, verdict: str) -> None:
     """A slow wave over half a turn passes for a spring there, and not beyond."""
