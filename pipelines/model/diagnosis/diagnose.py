@@ -23,6 +23,7 @@ from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.change_of_sign import loosened, wrong_law
 from pipelines.model.diagnosis.compliance import Compliance, untold
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import evidence, floors_of
@@ -70,7 +71,17 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
     prepared = memory.prepared(logs, chosen, arm)
-    if logs.frf:
+    found = _diagnosed(prepared, chosen, say, calibration, memory)
+    other = loosened(prepared) if calibration is None and wrong_law(found) else prepared
+    if other is prepared:
+        return found
+    say("fitting by which curve friction changes its sign")
+    return min(found, _diagnosed(other, chosen, say, None, Memory()), key=lambda one: len(one.findings))
+
+
+def _diagnosed(prepared: Prepared, chosen: DiagnosisSettings, say: Callable[[str], None], calibration: Calibration | None,
+               memory: Memory) -> Diagnosis:
+    if prepared.logs.frf:
         say("looking at the frequency responses")
     first = responding(_plain(prepared, chosen, calibration, memory), prepared, chosen.without)
     if first.held.prepared.reference is not None:

@@ -25,7 +25,7 @@ from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstruction
 
-__all__ = ["GAP_HZ", "Logs", "Prepared", "loosened", "narrowed", "prepare"]
+__all__ = ["GAP_HZ", "Logs", "Prepared", "narrowed", "prepare"]
 
 GAP_HZ = 10.0  # below it a gap's torque is that of the gap; above, that of the tooth on which the link rings
 Joints = npt.NDArray[np.bool_]
@@ -99,15 +99,6 @@ def narrowed(prepared: Prepared, cutoff_hz: float, min_speed: Sequence[float]) -
     speeds = tuple(np.maximum(np.broadcast_to(np.array(recipe.min_speed), len(min_speed)), min_speed).tolist())
     return _laid(prepared.logs, prepared.columns, replace(recipe, cutoff_hz=lower, min_speed=speeds), prepared.motions,
                  prepared.judging, prepared.referring)
-
-
-def loosened(prepared: Prepared) -> Prepared:
-    """The same, the laws that a nominal model has by default in their forms with most numbers: by which curve friction changes its
-    sign is fitted too. Where slow samples are left out it is not among the equations, and the laws stay as they are."""
-    if any(speed > 0.0 for speed in prepared.recipe.min_speed):
-        return prepared
-    laws = tuple(next(iter(law.forms()), law) if law.evidence == "none" else law for law in prepared.columns.laws)
-    return replace(prepared, columns=replace(prepared.columns, laws=laws))
 
 
 def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging: Motions, referring: Motions) -> Prepared:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pipelines.errors import Check
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.gates import examined
-from pipelines.model.diagnosis.inputs import Logs, Prepared, loosened, prepare
+from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Since, since_reference
 
@@ -38,11 +38,10 @@ class Memory:
         return made
 
     def prepared(self, logs: Logs, chosen: DiagnosisSettings, arm: Arm | None) -> Prepared:
-        """As `prepare`, with laws that follow the change of sign of friction closely."""
+        """As `prepare`."""
         parts = (logs.identify, logs.validate, logs.reference, logs.frf, logs.frf_before)
         settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed)
-        return self.of("rows", (arm, *(log for part in parts for log in part)), settings,
-                       lambda: loosened(prepare(logs, chosen, arm)))
+        return self.of("rows", (arm, *(log for part in parts for log in part)), settings, lambda: prepare(logs, chosen, arm))
 
     def examined(self, logs: Logs, allow_mismatch: bool) -> tuple[Check, ...]:
         """As `examined` of all that a diagnosis looks at."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
@@ -10,8 +12,9 @@ import pytest
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.change_of_sign import loosened, wrong_law
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, loosened, prepare
+from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.search import search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
@@ -20,6 +23,9 @@ from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
 from tests.model.estimation.experiments import COULOMB
+
+if TYPE_CHECKING:
+    from pipelines.model.diagnosis.result import Diagnosis
 
 LAWS = ("stribeck", "concave_friction", "quadratic_drag")
 
@@ -65,3 +71,13 @@ def test_where_slow_samples_are_left_out_the_curve_is_not_asked() -> None:
     """The change of sign is not among the equations then."""
     kept = loosened(prepare(Logs((hidden(1),)), DiagnosisSettings(min_speed=(0.05,)))).columns.laws
     assert [law.free for law in kept if isinstance(law, Coulomb)] == [("sharpness",)] * 3
+
+
+@pytest.mark.parametrize(("causes", "question", "asked"), [
+    (("concave_friction:1", "concave_friction:3", "cogging:2"), "what is wrong", True),
+    (("concave_friction:1", "stribeck:3", "cogging:2", "cogging:3"), "what is wrong", False),
+    (("concave_friction:1", "concave_friction:3"), "what has changed", False)])
+def test_one_law_at_several_joints_is_no_fault_of_several_joints(causes: tuple[str, ...], question: str, asked: bool) -> None:
+    """Bearings of one make rub by one law; two ripples are two faults, and what was there before is no news."""
+    findings = tuple(SimpleNamespace(cause=name) for name, _, _ in (one.partition(":") for one in causes))
+    assert wrong_law(cast("Diagnosis", SimpleNamespace(findings=findings, question=question))) is asked
