@@ -35,19 +35,16 @@ def scores(tmp_path_factory: pytest.TempPathFactory) -> list[Score]:
     return list(judge(out, out / "verdicts.jsonl", tasks(out), by_command))
 
 
-@pytest.mark.slow
 def test_no_cause_is_named_that_is_not_there(scores: list[Score]) -> None:
     assert [(one.truth, one.named) for one in scores if one.wrong] == []
 
 
-@pytest.mark.slow
 def test_single_causes_are_named_at_their_joint(scores: list[Score]) -> None:
     """Five of six: twelve seconds to fit are few."""
     single = [one for one in scores if one.family == "single"]
     assert sum(one.right for one in single) >= len(single) - 1, [(one.truth, one.verdict, one.named) for one in single]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("family", [name for name in DOZEN if name != "single"])
 def test_the_others_get_the_answer_that_is_due(family: str, scores: list[Score]) -> None:
     """Nothing wrong, unknown, not testable, or how heavy the payload is."""

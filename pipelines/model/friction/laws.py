@@ -50,11 +50,12 @@ class Law:
 
     @cached_property
     def places(self) -> tuple[Place, ...]:
-        """The numbers of θ. One that may be zero, such as a damping, stays at its default: it has no logarithm."""
+        """The numbers of θ. One that may be zero, such as a damping, stays at its default: it has no logarithm. So does one that a
+        model need not say, which only other forms of the law have."""
         found: dict[str, Place] = {}
         for k, effect in enumerate(self.effects):
             for quantity in effect.parameters:
-                if not quantity.shape or quantity.low <= 0.0:
+                if not quantity.shape or quantity.low <= 0.0 or quantity.unsaid is not None:
                     continue
                 key = quantity.name if quantity.name == _SHARED else f"{effect.name}.{quantity.name}"
                 before = found.get(key, Place(quantity.name, (), quantity))

@@ -33,7 +33,7 @@ def _by_hand(one: Problem, y: Array) -> tuple[Array, Array]:
     return np.array(betas), rss
 
 
-@pytest.mark.parametrize("size", [SAMPLES, 211])
+@pytest.mark.parametrize("size", [pytest.param(SAMPLES, marks=pytest.mark.slow), 211])
 @pytest.mark.parametrize("triangles", [False, True])
 def test_each_block_is_judged_by_the_rest_alone(triangles: bool, size: int) -> None:
     """Parameters and weights come from the rest beyond the guard, however the equations arrive."""

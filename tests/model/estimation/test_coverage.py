@@ -12,6 +12,7 @@ from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.tuned import Reconstruction
 from tests.model.estimation.experiments import arm, experiment, truth
 
+pytestmark = pytest.mark.slow
 SEEDS = range(100)
 
 
