@@ -30,9 +30,9 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["Absorbed", "Move", "Sessions", "absorbed", "chosen"]
 
-# Of the move. A load is a body: its ten numbers move the parameters as nothing else does, and true ones have been seen to explain
-# all but a hundred-thousandth; a longer link, which moves the same parameters, .98.
-_EXPLAINS = 0.99
+_EXPLAINS = 0.7  # of the move: a load, whose ten numbers move the parameters freely within what a body does
+# The same, that it has a name for: true loads have been seen to explain all but a hundred-thousandth, a longer link .98.
+_ALTOGETHER = 0.99
 _ALONE = 0.9  # the same of a law, which has to put all of them back by its few numbers
 _WORTH = 0.05  # of the squared residual, that separate parameters take away at least
 _SURE = 5.0  # standard deviations of a number
@@ -84,6 +84,8 @@ class Absorbed:
     def unsure(self) -> str:
         """Why it is not named; empty where nothing speaks against it."""
         places = [place_of(one.name, one.joint) for one in (self.effect, *self.rivals)]
+        if not self.rivals and self.effect.evidence == "base parameters" and self.explained < _ALTOGETHER:
+            return f"the base parameters have moved much as {places[0]} moves them, but not altogether"
         return f"the base parameters have moved as {' or '.join(places)} moves them" if self.rivals else ""
 
 
