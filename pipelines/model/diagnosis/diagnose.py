@@ -202,11 +202,13 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     if told.verdict == "unknown" or told.extended is None:
         why = "the base parameters have moved as it moves them, beside something that has no name"
         return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
-    if why := moved.unsure:
-        return replace(told, verdict="unknown", reason=why, summary=_sentence(Ruling("unknown", (), why), ()))
     if (like := _alike(moved.effect, told.findings)) is not None:
         why = f"the base parameters have moved, but {like.title[:1].lower()}{like.title[1:]}, which was found, moves them too"
         return replace(told, rejected=(*told.rejected, Rejected(moved.effect.name, moved.effect.joint, why)))
+    if why := moved.unsure:
+        if told.findings:
+            return replace(told, rejected=(*told.rejected, Rejected(moved.effect.name, moved.effect.joint, why)))
+        return replace(told, verdict="unknown", reason=why, summary=_sentence(Ruling("unknown", (), why), ()))
     one = carried(moved, done.found.final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
         return replace(told, rejected=(*told.rejected, Rejected(one.finding.cause, one.finding.joint, one.doubt)))
