@@ -1,0 +1,101 @@
+"""Diagnose arms that the bench did not draw, one after the other, and print how it fared.
+
+    python -m benchmarks.other_plants                          all
+    python -m benchmarks.other_plants gantry-cogging six-tanh  these
+    python -m benchmarks.other_plants --count 5 --keep FOLDER  the first five; logs stay in FOLDER, and are taken from there
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+import traceback
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from benchmarks.hidden_effects.judge import by_command
+from benchmarks.other_plants.cases import CASES, Case
+from pipelines.errors import RrridError
+from pipelines.log.files import write_log
+
+__all__ = ["asked", "judged", "main"]
+
+
+def main() -> None:
+    arguments = _parser().parse_args()
+    chosen = [case for case in CASES if not arguments.names or case.name in arguments.names][:arguments.count]
+    with tempfile.TemporaryDirectory() as place:
+        home = arguments.keep or Path(place)
+        outcomes = [_one(case, home / case.name) for case in chosen]
+    print("; ".join(f"{outcomes.count(one)} {one}" for one in sorted(set(outcomes))))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help="; ".join(case.name for case in CASES))
+    parser.add_argument("--count", type=int, help="no more than so many")
+    parser.add_argument("--keep", type=Path, help="where logs stay")
+    return parser
+
+
+def _one(case: Case, folder: Path) -> str:
+    made = time.perf_counter()
+    if not folder.exists():
+        for log in case.logs():
+            folder.mkdir(parents=True, exist_ok=True)
+            write_log(folder / f"{log.name}.h5", log)
+    begun = time.perf_counter()
+    answer = asked(folder)
+    outcome, said = judged(case, answer)
+    print(f"{case.name:36} {case.loop:16} {1e3 * case.sample_time:4g} ms  {outcome:8} {said}  made in {begun - made:.0f} s, "
+          f"{time.perf_counter() - begun:.0f} s", flush=True)
+    return outcome
+
+
+def asked(folder: Path) -> Mapping[str, Any]:
+    """The answer as `rrrid diagnose --json` prints it; {"verdict": "refused" | "crashed", "reason"} where there is none."""
+    try:
+        return by_command(folder, ())
+    except RrridError as refused:
+        return {"verdict": "refused", "reason": f"{refused.code}: {refused.message}"}
+    except Exception:  # the others are still to come
+        return {"verdict": "crashed", "reason": traceback.format_exc(limit=-3)}
+
+
+def judged(case: Case, answer: Mapping[str, Any]) -> tuple[str, str]:
+    """"right", "open", "wrong", "refused" or "crashed", and what was said.
+
+    A healthy arm is right with nothing wrong, and a cause with its name at its joint and no other name; an "unknown" is open where
+    something is wrong, and wrong where nothing is. Friction that the nominal model lacks may be named, or not, but not otherwise.
+    """
+    verdict = answer["verdict"]
+    if verdict in ("refused", "crashed"):
+        return verdict, answer["reason"]
+    names = [(one["cause"], one["joint"]) for one in answer["findings"]]
+    good = [cause in case.answers and (not case.fault or joint in (None, case.joint) or case.fault == "torque_delay")
+            for cause, joint in names]
+    if not all(good):
+        outcome = "wrong"
+    elif not case.fault:
+        outcome = "right" if verdict == "nothing-wrong" or case.answers else "wrong"
+    elif case.answers:
+        outcome = "right" if names else "open"
+    else:
+        outcome = "right" if verdict == "unknown" else "open"
+    found = ", ".join(cause if joint is None else f"{cause}:{joint}" for cause, joint in names)
+    return outcome, f"{verdict} {found or answer.get('reason', '')} {_errors(answer)}"
+
+
+def _errors(answer: Mapping[str, Any]) -> str:
+    """Floor, held-out error before, and after every finding, of each joint."""
+    rms = answer["residual_rms"]
+    after = min((one["gain"]["validate_torque_rms"]["after"] for one in answer["findings"]), key=lambda each: sum(map(float, each)),
+                default=rms["validate"])
+    return "; ".join(f"{a:.3g}>{b:.3g}/{f:.3g}" if None not in (a, b, f) else "-"
+                     for a, b, f in zip(rms["validate"], after, rms["floor"], strict=True))
+
+
+if __name__ == "__main__":
+    main()
