@@ -108,7 +108,8 @@ def _event(family: Family, fit: Fit, residuals: Array, arm: Arm, rows: Sequence[
                 table = np.zeros((*laid.table.shape[:2], fit.data.rows))
                 table[:, :, start + laid.rows] = laid.table
                 columns, seen, own = _sums(table, fit, residuals, rows)
-                parts.append(_best(WideCause(True, columns, seen, own * only), model, left))
+                best = _best(WideCause(True, columns, seen, own * only), model, left)
+                parts += [best] if best.columns.shape[1] else []  # none where the tip moves with no joint: an axis goes through it
     if not parts:
         return WideCause(True, *(np.zeros((len(rows), 1, 1, size)) for size in (1, model.shape[1], len(residuals))))
     return _best(WideCause(True, *(np.concatenate([getattr(one, name) for one in parts], axis=1)

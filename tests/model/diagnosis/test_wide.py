@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.experiment import Array
+from pipelines.log.experiment import Array, ExperimentLog, Signal
+from pipelines.log.robot import Joint, RobotDescription, format_robot
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, families, whole_motion
 from pipelines.model.diagnosis.exact import Exact
@@ -57,3 +58,21 @@ def test_longer_logs_give_chance_more_to_gain(there: tuple[Fit, Array, tuple[Fam
     wide = Wide.of_twin(*left(fit, noise, fit.weight), every, np.ones(3), np.ones(3), arm)
     for one, other in zip(wide.at(fit.weight), replace(wide, longer=2.0).at(fit.weight), strict=True):
         np.testing.assert_allclose(2.0 * one, other)
+
+
+def test_a_touch_at_a_tip_that_no_joint_moves_gains_nothing() -> None:
+    """A shaft that turns about its own tip: no force there has a torque, in any replica."""
+    t = np.arange(4000) * 1e-3
+    q, speed, rate = np.sin(6.0 * t), 6.0 * np.cos(6.0 * t), -36.0 * np.sin(6.0 * t)
+    tau = 0.2 * rate + 0.5 * np.tanh(speed / 0.05) + 0.1 * speed
+    robot = RobotDescription("shaft", (0.0, 0.0, -9.81), "dh", (Joint("axis 1", velocity=9.0, torque=20.0),))
+    signals = {"t": Signal(t, "s", "time stamp"), "q": Signal(q[:, None], "rad", "measured joint position"),
+               "tau": Signal(tau[:, None], "N m", "commanded joint torque")}
+    log = ExperimentLog("shaft", "excitation", "identify", "measured", "shaft", 1e-3, format_robot(robot), signals)
+    prepared = prepare(Logs((log,)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    arm = Exact.start(columns, fit).nominal
+    touch = tuple(one for one in families(columns.laws, whole_motion(prepared.data), arm) if one.cause == "contact")
+    noise = np.random.default_rng(4).standard_normal((2, prepared.data.rows))
+    assert touch
+    assert Wide.of_twin(*left(fit, noise, fit.weight), touch, np.zeros(1), np.zeros(1), arm).at(fit.weight)[1] == pytest.approx(0.0)
