@@ -15,7 +15,8 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["Cogging"]
 
 _WAVES = 1.5  # in the range travelled, at least: fewer are the curve of a spring (causes.md: a full turn tells them apart)
-_HIGHEST = 150.0  # order that is searched for
+_HIGHEST = 150.0  # order that is searched for; of a slide: of its whole travel
+_FINEST = 1000.0  # of a slide: a wave of 6 mm, as magnets and leads of screws have them
 _MOST = 200  # orders on the grid
 _PEAKS = 24
 _ROUNDED = 1e-11  # difference of orders that is rounding
@@ -91,8 +92,8 @@ class Cogging(Effect):
                 yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel * whole)
             return
         lowest = max(1.0, _WAVES * 2.0 * math.pi / travel)
-        step = max(math.pi / travel, (_HIGHEST - 1.0) / _MOST)
-        highest = max(_HIGHEST, 4.0 * lowest)
+        highest = max(self._highest(travel, arm), 4.0 * lowest)
+        step = max(math.pi / travel, (highest - 1.0) / _MOST)
         for order in np.arange(lowest, highest, step).tolist():
             yield replace(self, order=order, harmonics=1)
 
@@ -102,7 +103,7 @@ class Cogging(Effect):
         travel = float(np.ptp(q))
         if travel < 1e-3:
             return
-        width = math.pi / (4.0 * _HIGHEST) if travel > 0.1 else travel / 64.0
+        width = math.pi / (4.0 * self._highest(travel, arm)) if travel > 0.1 else travel / 64.0
         bins = ((q - q.min()) / width).astype(int)
         size = 1 << int(np.ceil(np.log2(4.0 * (bins.max() + 1))))
         power = np.abs(np.fft.rfft(np.bincount(bins, r, minlength=size), n=size))
@@ -112,6 +113,10 @@ class Cogging(Effect):
         peaks = np.flatnonzero(wanted)
         for peak in peaks[np.argsort(power[peaks])[::-1][:_PEAKS]]:
             yield replace(self, order=float(order[peak]), harmonics=1)
+
+    def _highest(self, travel: float, arm: ArmModel) -> float:
+        """Order that is searched for. A slide's wave is counted in 2π metres, and its travel is what a turn is to a joint's."""
+        return _HIGHEST if arm.robot.revolute[self._index] else float(np.clip(_HIGHEST * 2.0 * math.pi / travel, _HIGHEST, _FINEST))
 
     def again(self, motion: Motion) -> bool:
         """Magnets, teeth and poles each have their own order; a full turn tells them apart, on less any curve is a few waves."""
