@@ -11,14 +11,16 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Coulomb"]
 
-# v/√(v² + ε²) as sigmoids, within 0.0012 of it at every speed: widths as parts of 1/w, and heights.
+# x/√(1 + x²) and (2/π) arctan x as sigmoids, within 0.0012 of them at every x: sharpnesses, as parts of w, and heights.
+_TANH = ((1.0, 1.0),)
 _ROOT = ((1.307, 0.608), (0.563, 0.344), (0.1505, 0.048))
+_ARCTAN = ((1.1537, 0.3622), (0.4719, 0.4021), (0.1463, 0.1731), (0.0335, 0.052), (0.004, 0.0106))
 _BETWEEN = 1.5  # tanh and the root: a roundness that is fitted begins there
 
 
 @dataclass(frozen=True)
 class Coulomb(Effect):
-    """τ = Fc ((2 - r) tanh(w v) + (r - 1) w v/√(1 + w² v²)).
+    """τ = Fc ((2 - r) tanh(x) + (r - 1) x/√(1 + x²)), x = w v; from r = 2 on Fc ((3 - r) x/√(1 + x²) + (r - 2) (2/π) arctan x).
 
     tanh(w v) stands for sign(v) in fits and in simulation alike. In a fit, a reconstructed speed passes zero a little
     early or late, and a jump there leaves spikes that look like presliding. In a simulation, sign(v) chatters at every
@@ -26,10 +28,11 @@ class Coulomb(Effect):
     explains, the simulation shows. The width 1/w is itself fitted, over the grid of `shapes`; by default it is 0.01
     rad/s, far below the speeds at which Coulomb and viscous friction are told apart.
 
-    By which curve the friction of a real joint changes its sign nobody knows: tanh (r = 1), v/√(v² + ε²) (r = 2) and others
-    are in use (Pennestrì, Rossi, Salvini & Valentini 2016), and none is a fault. A diagnosis fits the roundness r beside the
-    width, so that no cause is found in the difference; where r is 1 it is held. The root is laid as sigmoids, which a simulation
-    takes at once.
+    By which curve the friction of a real joint changes its sign nobody knows: tanh (r = 1), v/√(v² + ε²) (r = 2), the arc tangent
+    (r = 3) and others are in use (Pennestrì, Rossi, Salvini & Valentini 2016), and none is a fault. They differ in how slowly the
+    torque comes to its level: what is missing falls with speed as an exponential, as 1/v², as 1/v. A diagnosis fits the
+    roundness r beside the width, so that no cause is found in the difference; where r is 1 it is held. Root and arc tangent are
+    laid as sigmoids, which a simulation takes at once.
     """
 
     sharpness: float = 100.0  # w [s/rad]
@@ -40,7 +43,7 @@ class Coulomb(Effect):
     parameters = (
         Quantity("level", "N m", 0.0, 50.0, "friction torque while moving"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
-        Quantity("roundness", "1", 0.4, 3.3, "how gradually it changes sign; 1: as tanh does", shape=True, unsaid=1.0),
+        Quantity("roundness", "1", 0.4, 3.5, "how gradually it changes sign; 1: as tanh, 3: as arctan", shape=True, unsaid=1.0),
     )
     signature = "A torque of constant size that changes sign with the direction of motion."
     explanation = "Dry friction in bearings, seals and gears: its size does not depend on speed."
@@ -59,8 +62,11 @@ class Coulomb(Effect):
         level, w, more = values["level"], values["sharpness"], values.get("roundness", 1.0) - 1.0
         if more == 0.0:
             return SpeedCurve(heights=(level,), sharpnesses=(w,))
-        return SpeedCurve(heights=((1.0 - more) * level, *(more * level * height for _, height in _ROOT)),
-                          sharpnesses=(w, *(w * part for part, _ in _ROOT)))
+        sharper, rounder = (_TANH, _ROOT) if more <= 1.0 else (_ROOT, _ARCTAN)
+        share = more if more <= 1.0 else more - 1.0
+        return SpeedCurve(heights=tuple(level * part * height for part, curve in ((1.0 - share, sharper), (share, rounder))
+                                        for _, height in curve),
+                          sharpnesses=tuple(w * part for part, _ in (*sharper, *rounder)))
 
     @property
     def free(self) -> tuple[str, ...]:
