@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.change_of_sign import loosened, wrong_law
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.result import Value
 from pipelines.model.diagnosis.search import search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import effect_names
@@ -83,5 +85,14 @@ def test_where_slow_samples_are_left_out_the_curve_is_not_asked() -> None:
     (("concave_friction:1", "concave_friction:3"), "what has changed", False)])
 def test_one_law_at_several_joints_is_no_fault_of_several_joints(causes: tuple[str, ...], question: str, asked: bool) -> None:
     """Bearings of one make rub by one law; two ripples are two faults, and what was there before is no news."""
-    findings = tuple(SimpleNamespace(cause=name) for name, _, _ in (one.partition(":") for one in causes))
-    assert wrong_law(cast("Diagnosis", SimpleNamespace(findings=findings, question=question))) is asked
+    findings = tuple(SimpleNamespace(cause=name, parameters={}) for name, _, _ in (one.partition(":") for one in causes))
+    assert wrong_law(cast("Diagnosis", SimpleNamespace(findings=findings, question=question, nominal=None))) is asked
+
+
+@pytest.mark.parametrize(("speed", "asked"), [(0.02, True), (0.3, False)])
+def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(speed: float, asked: bool) -> None:
+    """Two widths of tanh are the curve by which it does; thirty are another law."""
+    law = Acting.of(Coulomb(1), {"level": 1.0, "sharpness": 100.0})
+    finding = SimpleNamespace(cause="concave_friction", joint=1, parameters={"speed": Value(speed, 0.001, "rad/s")})
+    found = SimpleNamespace(findings=(finding,), question="what is wrong", nominal=SimpleNamespace(friction=(law,)))
+    assert wrong_law(cast("Diagnosis", found)) is asked
