@@ -109,8 +109,9 @@ class _State:
         self.h = sample_time / self.steps
         self.kind, self.joint, self.size, self.number = ("", 0, 0.0, 0.0) if fault is None else (
             fault.kind, fault.joint, fault.size, fault.number)
-        tilt = (0.0, 0.0) if self.kind != "gravity_tilt" else (self.size * np.cos(self.number), self.size * np.sin(self.number))
-        down = np.array(plant.arm.gravity) + 9.81 * np.array([*tilt, 0.0])
+        tilt = self.size if self.kind == "gravity_tilt" else 0.0  # [rad] towards `number` [rad] from the base's x axis
+        towards = np.array([np.cos(self.number), np.sin(self.number), 0.0])
+        down = np.cos(tilt) * np.array(plant.arm.gravity) + 9.81 * np.sin(tilt) * towards
         self.model = plant.arm.model(self.h, tuple(down.tolist()), payload=self.size if self.kind == "payload" else 0.0)
         self.data: Any = mujoco.MjData(self.model)
         self.z = np.zeros(shape[1])
