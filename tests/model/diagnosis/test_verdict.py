@@ -115,3 +115,11 @@ def test_thresholds_follow_the_weights() -> None:
     """A gain is squared weighted torque: twice the weight is four times the gain; of the whole arm the largest counts."""
     one = Thresholds(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 0.3]), "", np.array([1.0, 1.0]), (1, 2, None))
     np.testing.assert_allclose(one.at(np.array([2.0, 1.0])).gain, [4.0, 2.0, 12.0])
+
+
+def test_without_a_floor_a_trifle_beside_a_great_cause_has_no_name() -> None:
+    """A drift of 1 N m at joint 1 whose law leaves 0.02: what takes a tenth off that may mend the law; at joint 2 it is a cause."""
+    first, floor = left(0.02, 0.05, 0.01), 1e-3 * np.ones(3)
+    nominal = left(1.0, 0.05, 0.01)
+    assert rule(found(nominal, first, left(0.018, 0.05, 0.01)), floor, known=False).named == (0,)
+    assert rule(found(nominal, first, left(0.02, 0.04, 0.01)), floor, known=False).named == (0, 1)
