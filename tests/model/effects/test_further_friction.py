@@ -86,15 +86,24 @@ def test_presliding_simulates_as_it_fits(law: dict[str, float], time: float) -> 
     assert np.abs(np.array(loads) - Presliding(2).torque(motion, arm, values)[:, 1]).max() < 0.04
 
 
-def test_load_friction_of_the_simulation_is_that_of_the_log() -> None:
+@pytest.mark.parametrize("behind", [0.0, 0.6, 1.0])
+def test_load_friction_of_the_simulation_is_that_of_the_log(behind: float) -> None:
     """What the drive gives, less what friction takes, is the load: forward and inverse form are one."""
     motion, arm = swinging(), synthetic_arm()
-    values = {"mu": 0.2, "sharpness": 80.0}
+    values = {"mu": 0.2, "sharpness": 80.0, "behind": behind}
     logged = LoadFriction(2).apply(motion, arm, values)
     hooks = LoadFriction(2).simulate(arm, values)
     assert hooks.actuator is not None
     carried = hooks.actuator(logged, motion, np.zeros((len(motion.t), 0)))
     np.testing.assert_allclose(carried, arm.torque(motion), rtol=1e-12, atol=1e-12)
+
+
+def test_what_rubs_behind_a_gear_loads_it_too() -> None:
+    """A gear that loses a tenth of all that passes it: with friction f behind it the drive gives (τ_l + f)(1 ± 0.1)."""
+    motion, arm = swinging(), synthetic_arm()
+    found = LoadFriction(2).apply(motion, arm, {"mu": 0.1, "sharpness": 80.0, "behind": 1.0})[:, 1]
+    passed = arm.torque(motion)[:, 1]
+    np.testing.assert_allclose(found, passed * (1.0 + 0.1 * np.sign(passed) * np.tanh(80.0 * motion.dq[:, 1])), rtol=1e-12)
 
 
 def test_position_friction_is_a_wave_along_the_turn() -> None:
