@@ -38,6 +38,7 @@ _SOFT = 1.0  # [s] the same, where something moves beside the joints of an arm, 
 _WINDOW = 0.1  # [s]
 _FINE = 1e-3  # [s] between torques that drive a window: a faster log's are averaged, which moves an arm as far
 _EXACT = 1e-3  # of the position error, to which it is worked out
+_ROUGH = 1e-2  # the same, where something moves beside the joints: a hundredth is far less than what chance does to the error
 _LOGS = 2  # that are simulated
 _WORSE = 1.1  # times the error of a held-out log, that an extension must not exceed
 
@@ -136,7 +137,8 @@ def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simula
 
 def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
     square, away = [], []
-    pairs = _closed(arm, motions, _SOFT if soft else _LONGEST) if closed else [_windowed(arm, *one) for one in motions]
+    pairs = _closed(arm, motions, _SOFT if soft else _LONGEST) if closed else [
+        _windowed(arm, *one, _ROUGH if soft else _EXACT) for one in motions]
     for q, seen in pairs:
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
@@ -162,13 +164,13 @@ def _first(log: ExperimentLog, seconds: float) -> Experiment:
     return experiment.part(0, min(experiment.n_samples, round(seconds / log.sample_time)))
 
 
-def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed) -> tuple[Array, Array]:
+def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float) -> tuple[Array, Array]:
     usable = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
     tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
     motion, tau, usable, every = _coarser(found.motion, tau, usable, log.sample_time)
     length = max(3, round(_WINDOW / (every * log.sample_time)))
-    windows = simulate_windows(Plant.of(arm), motion, tau, every * log.sample_time, length, usable, _EXACT)
+    windows = simulate_windows(Plant.of(arm), motion, tau, every * log.sample_time, length, usable, exact)
     if not np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():  # left out, it would count as no error at all
         raise InputRejected("D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia")
     return windows.q, motion.q

@@ -6,6 +6,7 @@ to it then.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,8 +57,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    doubts = {k: at_odds(found, k, prepared, case) or farther(simulated[k], simulated[k + 1], late=late)
-              for k in ruling.named}
+    doubts = {k: at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
         doubts |= {k: BY_CHANCE for k in ruling.named
@@ -135,6 +135,20 @@ def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bo
 def _simulated(found: Found, case: Case, prepared: Prepared) -> tuple[Simulation, ...]:
     arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in found.steps if step.best is not None)]
     return tuple(simulation_errors([acted(arm, case.beside) for arm in arms], prepared.judging or prepared.motions))
+
+
+def _strays(found: Found, k: int, simulated: Sequence[Simulation], prepared: Prepared, case: Case, late: bool) -> str:
+    """Why the simulated arm is no nearer with step `k`, neither when it was found nor beside all the others; empty where it is.
+
+    Where every joint is late, one that is told so alone no longer fits the others, and the arm strays until they are told too.
+    """
+    accepted = [j for j, one in enumerate(found.steps) if one.best is not None]
+    why = farther(simulated[k], simulated[k + 1], late=late)
+    if not why or k == accepted[-1]:
+        return why
+    rest = _without(found, [j for j in accepted if j != k], case)
+    arms = [acted(one.model.arm, case.beside) for one in (rest, found.final)]
+    return farther(*simulation_errors(arms, prepared.judging or prepared.motions), late=late)
 
 
 def _harm(found: Found, final: Refined, case: Case) -> str:

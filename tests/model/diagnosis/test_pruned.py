@@ -233,3 +233,21 @@ def test_what_did_harm_in_a_log_when_it_was_found_is_asked_again_beside_what_was
     case = SimpleNamespace(blocks=10)
     assert bool(pruned.at_odds(found, 0, SimpleNamespace(), case)) is odd
     assert pruned.at_odds(found, 1, SimpleNamespace(), case) == "worse in free-1"  # nothing was found after it
+
+
+@pytest.mark.parametrize(("beside", "strays"), [("", False), ("farther", True)])
+def test_what_moved_the_simulated_arm_away_is_asked_again_beside_what_was_found_after_it(
+        beside: str, strays: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both joints are late: with the first alone told so, the arm strays; the last was found beside all the others already."""
+    found = searched(left(0.5, 0.5, 0.01), (effect("spring", 1), left(0.4, 0.5, 0.01)),
+                     (effect("spring", 2), left(0.01, 0.01, 0.01)))
+    rest = SimpleNamespace(model=SimpleNamespace(arm="rest"))
+    found.final.model.arm = "final"
+    monkeypatch.setattr(pruned, "_without", lambda *args: rest)
+    monkeypatch.setattr(pruned, "acted", lambda arm, effects: arm)
+    monkeypatch.setattr(pruned, "simulation_errors", lambda arms, motions: arms)
+    monkeypatch.setattr(pruned, "farther", lambda before, after, late: beside if before == "rest" else "farther")
+    case, prepared = SimpleNamespace(beside=()), SimpleNamespace(judging=(), motions=())
+    runs: Any = ("nominal", "first", "second")
+    assert bool(pruned._strays(found, 0, runs, prepared, case, False)) is strays
+    assert pruned._strays(found, 1, runs, prepared, case, False) == "farther"
