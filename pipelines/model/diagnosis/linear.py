@@ -11,7 +11,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 
-__all__ = ["covariance", "deviations", "solved", "visibility"]
+__all__ = ["covariance", "deviations", "solved", "superfluous"]
 
 _LAGS = 20  # rows next to each other that share the noise of the low-pass
 _ROUNDING = 1e-11  # of the largest eigenvalue
@@ -24,16 +24,31 @@ def solved(table: Array, y: Array, ridge: float = 0.0) -> Array:
     return np.asarray((vectors / (values + ridge)) @ (vectors.T @ (unit @ y)) / size)
 
 
-def visibility(table: Array, wanted: Sequence[int]) -> Array:
-    """(wanted,) part of each wanted column of `table` (k, rows) that no combination of the other columns is."""
+def superfluous(table: Array, wanted: Sequence[int], least: float) -> list[int]:
+    """Which of the `wanted` columns of `table` (k, rows) the others are as well, but for a part below `least` of their length.
+
+    The one that is seen least goes first, and no longer counts as one of the others: of two columns that are nearly the same one
+    stays (pivoting, as in Golub & Van Loan 2013, ch. 5.4).
+    """
     unit, _ = _unit(table)
-    gram, found = unit @ unit.T, []
-    for place in wanted:
-        others = np.arange(len(table)) != place
-        values, vectors = _seen(gram[np.ix_(others, others)])
-        along = vectors.T @ gram[others, place]
-        found.append(gram[place, place] - float(along @ (along / values)))
-    return np.asarray(np.sqrt(np.clip(found, 0.0, 1.0)))
+    gram, left = unit @ unit.T, list(wanted)
+    gone: list[int] = []
+    while left:
+        seen = [_apart(gram, place, gone) for place in left]
+        lowest = int(np.argmin(seen))
+        if seen[lowest] >= least:
+            break
+        gone.append(left.pop(lowest))
+    return gone
+
+
+def _apart(gram: Array, place: int, gone: Sequence[int]) -> float:
+    """Part of one unit column that no combination of the others is, but for those that are gone."""
+    others = np.ones(len(gram), dtype=bool)
+    others[[place, *gone]] = False
+    values, vectors = _seen(gram[np.ix_(others, others)])
+    along = vectors.T @ gram[others, place]
+    return float(np.sqrt(np.clip(gram[place, place] - float(along @ (along / values)), 0.0, 1.0)))
 
 
 def covariance(table: Array, residual: Array) -> Array:

@@ -15,7 +15,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.dissipation import dissipating, driving
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.linear import covariance, solved, visibility
+from pipelines.model.diagnosis.linear import covariance, solved, superfluous
 from pipelines.model.diagnosis.nominal import Fit, rigid_rows
 from pipelines.model.diagnosis.slopes import Which, slopes_of
 
@@ -115,8 +115,7 @@ def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: flo
     """The step for every number. The others do without one that would leave its range, and stays at its end; without friction that
     would drive its joint; and without one of an effect that the rest of the model does as well: rounding would move it anywhere."""
     first = len(model.beta)
-    own = [first + k for k, (kind, _, _) in enumerate(names) if kind == 1]
-    stuck = [k for k, eta in zip(own, visibility(table, own), strict=True) if eta < _INVISIBLE]
+    stuck = superfluous(table, [first + k for k, (kind, _, _) in enumerate(names) if kind == 1], _INVISIBLE)
     shift = _without(table, y, ridge, stuck)
     beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
     held = driving(model.beta, shift, model.columns.laws)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
-from pipelines.model.diagnosis.linear import covariance, deviations, solved, visibility
+from pipelines.model.diagnosis.linear import covariance, deviations, solved, superfluous
 
 
 def _table(rows: int = 400, seed: int = 3) -> np.ndarray:
@@ -16,19 +16,31 @@ def _table(rows: int = 400, seed: int = 3) -> np.ndarray:
     return table
 
 
-def test_visibility_is_what_the_projection_on_the_other_columns_leaves() -> None:
+def test_a_column_is_superfluous_where_the_projection_on_the_others_leaves_less() -> None:
     table = _table()
-    for place, eta in zip((0, 2, 3), visibility(table, (0, 2, 3)), strict=True):
+    for place in (0, 2, 3):
         others = scipy.linalg.orth(np.delete(table, place, axis=0).T)
         left = table[place] - others @ (others.T @ table[place])
-        assert np.isclose(eta, np.linalg.norm(left) / np.linalg.norm(table[place]), rtol=1e-6)
+        seen = float(np.linalg.norm(left) / np.linalg.norm(table[place]))
+        assert superfluous(table, (place,), 1.001 * seen) == [place]
+        assert superfluous(table, (place,), 0.999 * seen) == []
 
 
-def test_a_column_that_others_are_as_well_is_not_seen() -> None:
+def test_a_column_that_others_are_as_well_is_superfluous() -> None:
     table = _table()
     table[3] = table[0] + 1e-3 * table[1]
-    assert visibility(table, (3,))[0] < 1e-6
-    assert visibility(table, (2,))[0] > 0.9
+    assert superfluous(table, (3,), 1e-6) == [3]
+    assert superfluous(table, (2,), 0.9) == []
+
+
+def test_of_columns_that_are_the_same_together_one_goes() -> None:
+    """Powers of an angle far from zero: none is seen beside all the others, and without one of them the rest is."""
+    angle = np.linspace(1.9, 2.1, 500)
+    powers = np.stack([angle**power for power in range(4)])
+    assert superfluous(powers, (0, 1, 2, 3), 1e-4) != [0, 1, 2, 3]
+    kept = np.delete(powers, superfluous(powers, (0, 1, 2, 3), 1e-4), axis=0)
+    assert superfluous(kept, range(len(kept)), 1e-4) == []
+    assert np.linalg.matrix_rank(kept) == len(kept) >= 2
 
 
 def test_the_step_is_scipys_least_squares() -> None:
