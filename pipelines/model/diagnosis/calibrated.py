@@ -56,10 +56,11 @@ def thresholds_of(made: Calibration, families: Sequence[Family], prepared: Prepa
     if given and not _same_motion(made.conditions, conditions_of(prepared)):
         longer = _OTHER * longer
     scale = np.array([longer.max() if one.joint is None else longer[one.joint - 1] for one in families])
-    wide = made.wide and replace(made.wide, longer=float(longer.max()), causes=_wide_causes(made, families))
+    several, causes = _on_several(made, families)
+    wide = made.wide and replace(made.wide, longer=float(longer.max()), causes=causes)
     origin = f"{made.origin.replicas} replicas of the twin{', stored by an earlier diagnosis' if given else ''}"
     return Thresholds(scale * [one.gain for one in own], scale * [one.own for one in own], origin, made.weight,
-                      tuple(family.joint for family in families), wide)
+                      tuple(family.joint for family in families), wide, several)
 
 
 def following_of(made: Calibration, prepared: Prepared, given: bool) -> Array | None:
@@ -75,11 +76,16 @@ def following_of(made: Calibration, prepared: Prepared, given: bool) -> Array | 
     return np.asarray(other * shorter * made.following)
 
 
-def _wide_causes(made: Calibration, families: Sequence[Family]) -> tuple[WideCause, ...]:
-    """Of the causes of the whole arm that are among `families`, in their order: some may be left out since."""
-    assert made.wide is not None
+def _on_several(made: Calibration, families: Sequence[Family]) -> tuple[tuple[int, ...], tuple[WideCause, ...]]:
+    """Which of `families` act on several joints, and what is stored of them: some may be left out since."""
+    if made.wide is None:
+        return (), ()
     whole = [one.cause for one in made.causes if one.joint is None]
-    return tuple(made.wide.causes[whole.index(family.cause)] for family in families if family.joint is None)
+    stored = dict(zip(whole, made.wide.causes, strict=False))
+    stored |= {one.place: one for one in made.wide.causes if one.place}
+    here = {place: stored[name] for place, family in enumerate(families)
+            if (name := place_of(family.cause, family.joint)) in stored}
+    return tuple(here), tuple(here.values())
 
 
 def _same_motion(one: Conditions, other: Conditions) -> bool:

@@ -21,7 +21,7 @@ from pipelines.log.results import decode, encode, json_text, read_foreign_series
 from pipelines.log.stored_result import listed_outputs
 from pipelines.log.text import read_small_text
 from pipelines.model.diagnosis.calibration import FORMAT, FORMAT_VERSION, Calibration
-from pipelines.model.diagnosis.wide import Wide
+from pipelines.model.diagnosis.wide import Wide, WideCause
 
 __all__ = ["calibration_files", "calibration_schema", "read_calibration", "write_calibration"]
 
@@ -33,7 +33,7 @@ _AGAIN = "diagnose the logs of an arm in order again"
 def calibration_schema() -> dict[str, Any]:
     """The JSON Schema of calibration.json; what files lack that are older than it, they are read without."""
     schema = object_schema(Calibration, "calibration.json of rrrid diagnose")
-    for kind, told in ((Calibration, schema), (Wide, schema["$defs"][Wide.__name__])):
+    for kind, told in ((Calibration, schema), *((kind, schema["$defs"][kind.__name__]) for kind in (Wide, WideCause))):
         later = {one.name for one in fields(kind) if one.default is not MISSING and not one.kw_only}
         told["required"] = [name for name in told["required"] if name not in later]
     return schema
@@ -126,17 +126,19 @@ def _fault(made: Calibration) -> str:
 
 
 def _fault_of_sums(wide: Wide, joints: int, count: int) -> str:
-    """Of `count` causes of the whole arm."""
+    """Of `count` causes of the whole arm, and others that act on several joints."""
     rank, replicas = wide.model.shape[1], wide.left.shape[2]
-    fits = (len(wide.causes) == count and wide.model.shape == (joints, rank, rank) and wide.left.shape == (joints, rank, replicas)
+    whole = [one.joint is None for one in wide.causes]
+    fits = (whole == sorted(whole, reverse=True) and sum(whole) == count
+            and wide.model.shape == (joints, rank, rank) and wide.left.shape == (joints, rank, replicas)
             and wide.weight.shape == wide.usual.shape == wide.rest.shape == (joints,))
     for one in wide.causes:
         shapes, k = one.columns.shape[1:3]
         fits = fits and (one.columns.shape == (joints, shapes, k, k) and one.model.shape == (joints, shapes, k, rank)
-                         and one.left.shape == (joints, shapes, k, replicas))
+                         and one.left.shape == (joints, shapes, k, replicas) and one.joint in (None, *range(1, joints + 1)))
     if not fits:
-        return "sums of causes of the whole arm that do not go together"
+        return "sums of causes on several joints that do not go together"
     # Of a cause without numbers no gain exceeds its threshold: it would be found nowhere, and nobody told.
     sums = [wide.model, wide.left, wide.usual, wide.rest, *(x for one in wide.causes for x in (one.columns, one.model, one.left))]
     finite = all(np.isfinite(x).all() for x in sums) and bool((np.isfinite(wide.weight) & (wide.weight > 0.0)).all())
-    return "" if finite and 0.0 < wide.longer < np.inf else "sums of causes of the whole arm that are no numbers"
+    return "" if finite and 0.0 < wide.longer < np.inf else "sums of causes on several joints that are no numbers"

@@ -6,14 +6,15 @@ get, which keeps the luck of few replicas out; and a hundredth of what is left a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.candidates import Family, lay_family
+from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.diagnosis.wide import TIMES, USELESS, Wide, median
@@ -32,7 +33,8 @@ class Thresholds:
     origin: str
     weight: Array  # (joints,)
     joints: tuple[int | None, ...]  # of the families
-    wide: Wide | None = None  # what those of causes of the whole arm follow from, with other weights
+    wide: Wide | None = None  # what those of causes that act on several joints follow from, with other weights
+    several: tuple[int, ...] = ()  # which of the families these are, in the order of `wide`
 
     @classmethod
     def of_twin(cls, twin: Twin, families: Sequence[Family], arm: Arm, weight: Array) -> Thresholds:
@@ -46,18 +48,29 @@ class Thresholds:
         left = np.asarray(np.bincount(twin.data.joint, np.mean(residuals**2, axis=0), minlength=len(weight)), dtype=np.float64)
         place = np.array([(joint or 1) - 1 for joint in joints])
         gain = TIMES * np.max([own, np.where(once, 0.0, usual[place]), USELESS * left[place]], axis=0)
-        wide = Wide.of_twin(fit, residuals, [f for f in families if f.joint is None], usual, left, arm)
-        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, wide)
+        several = sorted(_on_several(twin.data, families, arm), key=lambda place: joints[place] is not None)
+        wide = Wide.of_twin(fit, residuals, [families[place] for place in several], usual, left, arm)
+        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, wide, tuple(several))
 
     def at(self, weight: Array) -> Thresholds:
-        """The same with other weights: a cause acts on its joint; one of the whole arm is looked for anew, or counts where most."""
+        """The same with other weights: a cause acts on its joint; one on several is looked for anew, or counts where most."""
         ratio = np.square(weight / self.weight)
         scale = np.array([ratio.max() if joint is None else ratio[joint - 1] for joint in self.joints])
         gain, own = scale * self.gain, scale * self.own
-        places = [place for place, joint in enumerate(self.joints) if joint is None]
-        if self.wide is not None and places:
-            gain[places], own[places] = self.wide.at(weight)
-        return Thresholds(gain, own, self.origin, weight, self.joints, self.wide)
+        if self.wide is not None and self.several:
+            gain[list(self.several)], own[list(self.several)] = self.wide.at(weight)
+        return replace(self, gain=gain, own=own, weight=weight)
+
+
+def _on_several(data: Data, families: Sequence[Family], arm: Arm) -> Iterator[int]:
+    """Which of the families act on more than one joint, or on the whole arm."""
+    for place, family in enumerate(families):
+        if family.joint is None:
+            yield place
+        elif not family.event:
+            laid = next(lay_family(data, family, arm))
+            if (data.joint[laid.rows] != family.joint - 1).any():
+                yield place
 
 
 def without_twin(found: Sequence[Screened], power: float, weight: Array) -> Thresholds:

@@ -1,10 +1,11 @@
-"""Thresholds of causes of the whole arm, whose gain with other weights is no multiple of what it was.
+"""Thresholds of causes that act on several joints, whose gain with other weights is no multiple of what it was.
 
-    wide = Wide.of_twin(fit, residuals, found, own, usual, arm)
+    wide = Wide.of_twin(fit, residuals, families, usual, rest, arm)
     gain, own = wide.at(weight)
 
-A cause of one joint gains with the square of that joint's weight. One of the whole arm acts on several, and how much of it the
-model imitates hangs on which joint counts. But all of it follows from sums over the rows of each joint, which are few numbers:
+A cause that acts on its joint alone gains with the square of that joint's weight. One of the whole arm acts on several, and so does
+an error of an angle, with which the loads of all joints change; how much of it the model imitates hangs on which joint counts. But
+all of it follows from sums over the rows of each joint, which are few numbers:
 with B an orthonormal basis of the model's columns at the reference weights, c a cause's columns, r a replica's residual and ρ_j the
 weight of joint j over its reference,
 
@@ -23,7 +24,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.candidates import Family, lay_family
+from pipelines.model.diagnosis.candidates import Family, lay_family, place_of
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.screen import Products
 
@@ -45,6 +46,8 @@ class WideCause:
     columns: Array  # (joints, shapes, k, k) cᵀc
     model: Array  # (joints, shapes, k, rank) cᵀB
     left: Array  # (joints, shapes, k, replicas) cᵀr; of an event only the replica that a shape was found in
+    place: str = ""  # "cause:joint"; empty of one of the whole arm
+    joint: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +59,13 @@ class Wide:
     left: Array  # (joints, rank, replicas) Bᵀr
     usual: Array  # (joints,) what half the causes of a joint get
     rest: Array  # (joints,) squared weighted residual of the replicas
-    causes: tuple[WideCause, ...]
+    causes: tuple[WideCause, ...]  # those of the whole arm first
     longer: float = 1.0  # times as many rows, which give chance more to gain
 
     @classmethod
     def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], usual: Array, rest: Array, arm: Arm) -> Wide:
-        """`families`: the causes of the whole arm; `residuals` (replicas, rows) weighted, that `fit` leaves."""
+        """`families`: those that act on several joints, of the whole arm first; `residuals` (replicas, rows) weighted, that `fit`
+        leaves."""
         rows = [np.flatnonzero(fit.data.joint == j) for j in range(len(fit.weight))]
         basis = fit.basis
         model = np.array([basis[:, own] @ basis[:, own].T for own in rows])
@@ -73,11 +77,15 @@ class Wide:
     def at(self, weight: Array) -> tuple[Array, Array]:
         """Gains (causes,) to exceed with joints weighted by `weight`, and the most that any replica gives."""
         ratio = np.square(weight / self.weight)
+        usual, rest = ratio * self.usual, ratio * self.rest
         own = np.array([_gains(one, self.model, self.left, ratio).max(initial=0.0) for one in self.causes])
         events = np.array([one.event for one in self.causes], dtype=bool)
-        common = max(median(own[~events]), float(np.median(ratio * self.usual)))
-        useless = np.full(len(own), USELESS * float((ratio * self.rest).mean()))
-        return self.longer * TIMES * np.max([own, np.where(events, 0.0, common), useless], axis=0), self.longer * own
+        whole = np.array([one.joint is None for one in self.causes], dtype=bool)
+        place = np.array([(one.joint or 1) - 1 for one in self.causes])
+        common = max(median(own[whole & ~events]), float(np.median(usual)))
+        others = np.where(whole, np.where(events, 0.0, common), usual[place])
+        useless = USELESS * np.where(whole, rest.mean(), rest[place])
+        return self.longer * TIMES * np.max([own, others, useless], axis=0), self.longer * own
 
 
 def median(values: Array) -> float:
@@ -90,7 +98,9 @@ def _cause(family: Family, fit: Fit, residuals: Array, arm: Arm, rows: Sequence[
         table = np.zeros((*laid.table.shape[:2], fit.data.rows))
         table[:, :, laid.rows] = laid.table
         parts.append(table)
-    return WideCause(False, *_sums(np.concatenate(parts), fit, residuals, rows))
+    columns, model, left = _sums(np.concatenate(parts), fit, residuals, rows)
+    place = "" if family.joint is None else place_of(family.cause, family.joint)
+    return WideCause(False, columns, model, left, place, family.joint)
 
 
 def _event(family: Family, fit: Fit, residuals: Array, arm: Arm, rows: Sequence[Indices], model: Array, left: Array) -> WideCause:
@@ -111,9 +121,10 @@ def _event(family: Family, fit: Fit, residuals: Array, arm: Arm, rows: Sequence[
                 best = _best(WideCause(True, columns, seen, own * only), model, left)
                 parts += [best] if best.columns.shape[1] else []  # none where the tip moves with no joint: an axis goes through it
     if not parts:
-        return WideCause(True, *(np.zeros((len(rows), 1, 1, size)) for size in (1, model.shape[1], len(residuals))))
-    return _best(WideCause(True, *(np.concatenate([getattr(one, name) for one in parts], axis=1)
-                                   for name in ("columns", "model", "left"))), model, left)
+        columns, seen, own = (np.zeros((len(rows), 1, 1, size)) for size in (1, model.shape[1], len(residuals)))
+        return WideCause(True, columns, seen, own)
+    columns, seen, own = (np.concatenate([getattr(one, name) for one in parts], axis=1) for name in ("columns", "model", "left"))
+    return _best(WideCause(True, columns, seen, own), model, left)
 
 
 def _best(one: WideCause, model: Array, left: Array) -> WideCause:
@@ -124,7 +135,7 @@ def _best(one: WideCause, model: Array, left: Array) -> WideCause:
         gains = _gains(one, model, left, ratio)
         kept |= {int(k) for k in np.argmax(gains, axis=0)[gains.max(axis=0, initial=0.0) > 0.0]}
     some = sorted(kept)
-    return WideCause(one.event, one.columns[:, some], one.model[:, some], one.left[:, some])
+    return replace(one, columns=one.columns[:, some], model=one.model[:, some], left=one.left[:, some])
 
 
 def _sums(table: Array, fit: Fit, residuals: Array, rows: Sequence[Indices]) -> tuple[Array, Array, Array]:

@@ -1,4 +1,4 @@
-"""Thresholds of causes of the whole arm: what sums over the rows of each joint say is what replicas fitted anew show."""
+"""Thresholds of causes that act on several joints: what sums over the rows of each joint say is what replicas fitted anew show."""
 
 from __future__ import annotations
 
@@ -16,15 +16,18 @@ from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
 from pipelines.model.diagnosis.screen import screen
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.diagnosis.wide import Wide
+from pipelines.model.effects import find_effect
 from tests.model.diagnosis.arms import hidden
 
-TRIED = ("gravity_tilt", "link_length", "base_resonance", "contact")
+TRIED = ("gravity_tilt", "link_length", "base_resonance", "contact", "encoder_eccentricity")
 
 
 @pytest.fixture(scope="module")
 def there() -> tuple[Fit, Array, tuple[Family, ...], Arm]:
-    """A nominal model, four replicas of noise on its rows [N m], and the causes of the whole arm."""
+    """A nominal model, four replicas of noise on its rows [N m], and causes that act on several joints."""
     prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     arm = Exact.start(columns, fit).nominal
@@ -51,6 +54,21 @@ def test_any_weights_give_what_fitting_anew_gives(there: tuple[Fit, Array, tuple
     found = wide.at(weight)[1]
     for family, one, other in zip(every, found, wanted, strict=True):
         assert one == pytest.approx(other, rel=0.3 if family.event else 1e-6)
+
+
+def test_what_an_error_of_an_angle_does_elsewhere_does_not_grow_with_its_joint(
+        there: tuple[Fit, Array, tuple[Family, ...], Arm]) -> None:
+    """Replicas whose third joint is quiet: what chance gives an eccentricity there stands in the rows of the joints before it, and
+    does not grow with the weight of the third; a spring's, which acts on its own joint alone, does."""
+    fit, noise, _, arm = there
+    quiet = noise * np.array([1.0, 1.0, 1e-3])[fit.data.joint]
+    fits = tuple(fit_columns(fit.data, fit.table, one, fit.weight) for one in quiet)
+    every = tuple(Family(name, 3, tuple(effect.shapes(whole_motion(fit.data), arm))) for name in ("encoder_eccentricity", "spring")
+                  for effect in find_effect(name).everywhere(3) if effect.joint == 3)
+    bounds = Thresholds.of_twin(Twin(fits, (0,), np.zeros(3)), every, arm, fit.weight)
+    grown = bounds.at(fit.weight * np.array([1.0, 1.0, 10.0])).own / bounds.own
+    assert grown[1] == pytest.approx(100.0)
+    assert grown[0] < 10.0
 
 
 def test_longer_logs_give_chance_more_to_gain(there: tuple[Fit, Array, tuple[Family, ...], Arm]) -> None:
