@@ -1,0 +1,70 @@
+"""The floor of logs without reference logs, where it comes from, and the thresholds that follow from it.
+
+    floored = floored_by(prepared, case, rough, chosen, given)
+    floored.rms, floored.origin, floored.thresholds
+
+By what an earlier diagnosis has stored; by a twin where the logs know a controller; else by the noise in what a model leaves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipelines.errors import InputRejected
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origin_of, refuse_unfit, thresholds_of
+from pipelines.model.diagnosis.calibration import Calibration
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.evidence import floors_of
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.own_motion import following
+from pipelines.model.diagnosis.search import Explored, clean
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.twin import drive_noise, make_twin, replayable, white
+
+__all__ = ["Floored", "floored_by"]
+
+
+@dataclass(frozen=True, eq=False)
+class Floored:
+    """The floor, where it comes from, and what follows from it."""
+
+    rms: Array  # (joints,) [N m]
+    origin: str
+    thresholds: Thresholds | None
+    calibration: Calibration | None
+    noise: Array | None  # (joints,) [N m] of the drives; None where nobody knows
+
+
+def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
+             given: Calibration | None) -> Floored:
+    """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
+    if given is not None:
+        refuse_unfit(given, prepared, case.families, "twin")
+    made = _calibrated(prepared, case, rough, chosen) if given is None else given
+    if made is None:
+        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
+    return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.noise)
+
+
+def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> Calibration | None:
+    """Thresholds by the twin; None where the logs do not know their controller, or the fitted arm cannot be simulated."""
+    places = replayable([log for log, _ in prepared.motions])
+    if not places or not chosen.replicas:
+        return None
+    left, last, weight = clean(rough[-1]), rough[-1].before, rough[0].before.weight
+    model = last.model
+    try:
+        noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
+        twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas, chosen.seed)
+    except InputRejected:  # such an arm cannot be simulated: D15, D17
+        return None
+    if twin is None:
+        return None
+    found = Thresholds.of_twin(twin, case.families, model.nominal, weight)
+    return Calibration(
+        origin_of("twin", [prepared.motions[place][0] for place in places], model.nominal, chosen), conditions_of(prepared), weight,
+        twin.rms, twin.noise, bounds_of(case.families, found.gain, found.own), found.wide,
+        floors_of(twin.data, twin.fits[0].left) if chosen.evidence else (),
+        following(*twin.weighted(weight)).max(axis=1))

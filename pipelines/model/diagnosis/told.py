@@ -1,0 +1,112 @@
+"""What is told of a search: findings and what they gain, what these logs cannot show, and the sentence for a technician.
+
+    told = diagnosis_of(first, case, done, floored, chosen)
+
+Before it is told, it is held against the logs that nothing was fitted to: they have a floor of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.beside import Judged, acted, judged
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.compliance import untold
+from pipelines.model.diagnosis.evidence import evidence
+from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
+from pipelines.model.diagnosis.floored import Floored
+from pipelines.model.diagnosis.held_out import held_out_left
+from pipelines.model.diagnosis.injection import Probe
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.limits import detectable, not_testable
+from pipelines.model.diagnosis.motion_floor import motion_floor
+from pipelines.model.diagnosis.pruned import Settled, unlike_held_out
+from pipelines.model.diagnosis.responding import Responding
+from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, ResidualRms, Threshold
+from pipelines.model.diagnosis.search import Step
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.since import Probed
+from pipelines.model.diagnosis.verdict import Ruling
+
+__all__ = ["diagnosis_of", "sentence", "strongest"]
+
+
+def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings,
+                 probed: Probed | None = None, moved: bool = False) -> Diagnosis:
+    done, responded, own = _held_against(first, case, done, floored, chosen, moved)
+    found, ruling, prepared = done.found, done.ruling, first.held.prepared
+    nominal, last = found.nominal, found.steps[-1]
+    plain = first.held.plain or nominal  # nothing taken out for what responses name
+    parts = responded.parts
+    held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
+    named = strongest((*held, *findings(found, ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks,
+                                         chosen.evidence, case.beside)))
+    if held:
+        ruling = replace(ruling, verdict="cause")
+    thresholds = last.thresholds
+    bounds = tuple(Threshold(f.cause, f.joint, float(g / last.before.rss), thresholds.origin)
+                   for f, g in zip(case.families, thresholds.gain, strict=True))
+    limits, beyond = _limits(last, case, prepared, probed) if chosen.limits else ((), ())
+    hidden = not_testable(prepared.data, nominal.fit, nominal.model.columns, found.steps[0].screened, nominal.model.arm,
+                          bool(prepared.referring), chosen.without)
+    judge = first.held.judge if parts else prepared.judge
+    rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
+           for one, rows in ((plain, judge), (responded.final, responded.judge))]
+    made = floored.calibration
+    pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()
+    arm = extended_arm(replace(found, final=responded.final), ruling)
+    standing = [one for one in case.beside if one not in first.held.acting]
+    return Diagnosis(
+        ruling.verdict, sentence(ruling, named), named, (), rejected(found, ruling), limits,
+        (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
+        "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
+        tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
+        0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise, own,
+        acted(plain.model.arm, standing), acted(arm, responded.acting), made)
+
+
+def _held_against(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings,
+                  moved: bool) -> tuple[Settled, Judged, Array | None]:
+    """What is believed beside the floor of the held-out logs, what responses have named beside that, and this floor (joints,)
+    [N m]; None where there is none."""
+    held, prepared = replace(first.held, case=case), first.held.prepared
+    responded = judged(held, done.found.final)
+    judge = first.held.judge if responded.parts else prepared.judge
+    if judge is None or responded.judge is None or floored.noise is None:
+        return done, responded, None
+    final = responded.final
+    own = motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
+                       floored.rms, chosen.seed)
+    if own is None:
+        return done, responded, None
+    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, moved)
+    return believed, responded if believed is done else judged(held, believed.found.final), own
+
+
+def _limits(last: Step, case: Case, prepared: Prepared, probed: Probed | None,
+            ) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
+    """By hiding causes in what the last model leaves; with reference logs beside these."""
+    arms = case.arms(last.before.model)
+    probe, bounds = ((Probe.of(last.before, case.judge, arms), last.thresholds) if probed is None else
+                     probed(last.before, case.judge, arms))
+    return detectable(last.screened, bounds, prepared.data.logs[0].log.robot.revolute, probe)
+
+
+def sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:
+    """What a technician is told."""
+    if ruling.verdict == "nothing-wrong":
+        caveat = f": {ruling.reason}" if ruling.reason else ""
+        return f"Nothing is wrong with this arm, as far as these logs can tell{caveat}."
+    if ruling.verdict == "unknown":
+        return f"Something is wrong that has no name here: {ruling.reason}."
+    first = named[0]
+    where = "" if first.joint is None else f" at joint {first.joint}"
+    more = f", and {len(named) - 1} more" if len(named) > 1 else ""
+    size = f": {first.torque_rms:.2g} N m of torque that the model does not have" if np.isfinite(first.torque_rms) else ""
+    return f"{first.title}{where}{size}{more}."
+def strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(sorted(findings, key=lambda finding: -finding.explained))
