@@ -166,6 +166,7 @@ def test_a_run_takes_it_as_diagnose_does(place: Path, tmp_path: Path) -> None:
         run_stage(run.STAGE, replace(request, out=home), settings)
 
 
+@pytest.mark.slow
 def test_a_run_takes_the_friction_laws_of_a_model(place: Path, tmp_path: Path) -> None:
     """--set diagnose.model leaves what diagnose --model leaves, which is not what Coulomb and viscous friction leave."""
     model = tmp_path / "model.json"

@@ -49,6 +49,7 @@ def only(found: Result) -> Beside:
     return beside
 
 
+@pytest.mark.slow
 def test_five_periods_are_worth_the_root_of_five() -> None:
     """Over four experiments standard deviations shrink by √5, and the estimates are as good as they say."""
     one, five = ([of_periods(seed, periods) for seed in range(4)] for periods in (1, 5))

@@ -18,7 +18,7 @@ def _blocks(rng: np.random.Generator, blocks: int, worse: float) -> tuple[Array,
 
 
 @pytest.mark.parametrize("blocks", [10, 20])
-@pytest.mark.parametrize("worse", [1.0, 2.0])
+@pytest.mark.parametrize("worse", [pytest.param(1.0, marks=pytest.mark.slow), 2.0])
 def test_the_interval_covers_the_true_difference(worse: float, blocks: int) -> None:
     """95 % of 400 draws, nine in ten at least where the blocks are few and uneven. E Σr² = 50 E s² (1 + 0.09 w²), E s² = 1.75."""
     rng = np.random.default_rng(blocks)

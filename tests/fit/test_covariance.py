@@ -39,11 +39,16 @@ def covered(z: Array) -> float:
 
 
 @pytest.mark.parametrize(("noise", "every", "size", "width"), [
-    (white, 0, None, 13), (autoregressive, 0, None, 13), (autoregressive, 0, 1000, 13), (autoregressive, 0, None, 40),
-    (NEARLY_INTEGRATED, 0, None, 13), (correlated, 0, None, 13), (white, 1, None, 13), (white, 5, None, 13),
-    (white, 10, None, 13), (autoregressive, 10, None, 13), (correlated, 10, None, 13), (white, 5, None, 40),
-], ids=["white", "ar", "ar, blocks", "ar, 40 parameters", "ar 0.99", "correlated channels", "low-passed", "decimated by 5",
-        "decimated by 10", "ar, decimated", "correlated, decimated", "decimated, 40 parameters"])
+    pytest.param(white, 0, None, 13, id="white"),
+    pytest.param(autoregressive, 0, None, 13, id="ar"),
+    pytest.param(NEARLY_INTEGRATED, 0, None, 13, id="ar 0.99"),
+    pytest.param(white, 5, None, 13, id="decimated by 5"),
+    pytest.param(correlated, 10, None, 13, id="correlated, decimated"),
+    *(pytest.param(*other, id=name, marks=pytest.mark.slow) for name, other in {
+        "ar, blocks": (autoregressive, 0, 1000, 13), "ar, 40 parameters": (autoregressive, 0, None, 40),
+        "correlated channels": (correlated, 0, None, 13), "low-passed": (white, 1, None, 13),
+        "decimated by 10": (white, 10, None, 13), "ar, decimated": (autoregressive, 10, None, 13),
+        "decimated, 40 parameters": (white, 5, None, 40)}.items())])
 def test_truth_lies_within_two_standard_deviations(noise: Noise, every: int, size: int | None, width: int) -> None:
     """In 92-98 % of all cases, no parameter biased by more than 0.3 std."""
     z, _ = scores(noise, every, size, width)

@@ -64,7 +64,7 @@ def named(number: int, cause: str, joint: int, part: float, without: tuple[str, 
     return (cause, joint) in [(one.cause, one.joint) for one in found.findings]
 
 
-@pytest.mark.parametrize(("cause", "joint"), [("cogging", 2), ("torque_offset", 3)])
+@pytest.mark.parametrize(("cause", "joint"), [pytest.param("cogging", 2, marks=pytest.mark.slow), ("torque_offset", 3)])
 def test_above_its_limit_a_cause_is_found(cause: str, joint: int) -> None:
     """With and against what the arm in order leaves."""
     assert limit(7, cause, joint, FEW).way == "injected"
