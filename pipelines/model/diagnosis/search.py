@@ -12,7 +12,7 @@ out. Rivals are ranked by the error they leave on held-out rows; of those that l
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,8 +100,11 @@ def provisional(case: Case) -> tuple[Explored, ...]:
 def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
     """Up to `most` causes; what `rough` explored already is not done again, as long as it leads the same way."""
     now = rough[0].before if rough else refine(case.model, case.data, case.weight)
-    nominal, steps = now, []
-    for number in range(1, most + 2):
+    nominal = now
+    steps: list[Step] = []
+    asked: list[tuple[Explored, _Gate]] = []
+    while True:
+        number = len(steps) + 1
         same = number <= len(rough) and rough[number - 1].before is now
         screened = rough[number - 1].screened if same else _screened(case, now)
         gate = _gate(case, now, screened)
@@ -110,11 +113,43 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
             explored = _explored(case, now, screened, gate.passed, explored.tried)
         step = _step(case, explored, gate, number, number <= most)
         steps.append(step)
+        asked.append((explored, gate))
         if step.best is None:
             break
+        alone = _one_for_two(case, steps)
+        if alone is not None:
+            place, best = alone
+            del steps[place:], asked[place + 1:]
+            steps.append(_step(case, *asked[place], place + 1, True, best))
+            now, rough = _reweighted(best.done), ()
+            continue
         follows = number < len(rough) and same and step.best is _fewest(rough[number - 1].tried)
         now = rough[number].before if follows else _reweighted(step.best.done)
     return Found(nominal, tuple(steps), now)
+
+
+def _one_for_two(case: Case, steps: Sequence[Step]) -> tuple[int, Tried] | None:
+    """The place of an earlier step, and what it should have found: where the same cause was found at two joints, the joint at which
+    it leaves as little alone.
+
+    Of the scales of all torques only their ratios show: one joint's is that of all the others the other way round.
+    """
+    last = steps[-1]
+    if last.best is None or last.best.effect.joint is None:
+        return None
+    name = last.best.effect.name
+    error = held_out(last.best.done, case)
+    for place, earlier in enumerate(steps[:-1]):
+        if earlier.best is None or earlier.best.effect.name != name:
+            continue
+        for rival in earlier.rivals:
+            if rival.effect.name != name or rival.effect.joint == earlier.best.effect.joint or rival.log is not None:
+                continue
+            effects = (*rival.done.model.effects, *last.before.model.effects[place + 1:])
+            alone = refine(replace(last.before.model, effects=effects), case.data, last.before.weight)
+            if max(held_out(alone, case) / error, alone.rss / last.best.done.rss) <= 1.0 + _PARSIMONY:
+                return place, rival
+    return None
 
 
 def gives_way(explored: Explored) -> bool:
@@ -176,7 +211,7 @@ def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
     return _Gate(judged, thresholds, tuple(one for one in passed if id(one) not in refused), refused)
 
 
-def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool) -> Step:
+def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, chosen: Tried | None = None) -> Step:
     now, screened, thresholds = explored.before, explored.screened, gate.thresholds
     passes = {id(one) for one in gate.passed}
     tried = [one for one in explored.tried if id(one.screened) in passes]
@@ -184,7 +219,7 @@ def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool) 
     if not case.floored:
         refused |= {id(one.screened) for one in tried if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
         tried = [one for one in tried if id(one.screened) not in refused]
-    best = _fewest(tried) if more else None
+    best = (chosen or _fewest(tried)) if more else None
     other = _other(gate.passed, best, explored.tried, now, case.nameable)
     best = None if other is not None else best
     trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number, refused)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis import search as search_module
 from pipelines.model.diagnosis.candidates import Family, families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
@@ -157,3 +161,34 @@ def test_eleven_waves_a_turn_could_have_passed_for_themselves_and_for_no_spring(
     assert there["cogging", 2] > 0.9
     assert there["spring", 2] < 0.25
     assert there["cogging", 1] < 0.25
+
+
+def test_two_scales_of_torque_that_are_one_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The drive of joint 3 gives a tenth less than its log tells, and a great wave at joint 1 hides what that does there. If the
+    search begins with the scale of joint 2, it needs that of joint 1 beside it; of scales only the ratios show."""
+    def rippling(motion: Motion) -> np.ndarray:
+        out = np.zeros_like(motion.q)
+        out[:, 0] = 5.0 * np.sin(11.0 * motion.q[:, 0])
+        return out
+
+    def short(seed: int, role: str = "identify") -> ExperimentLog:
+        log = hidden(seed, rippling, role)
+        return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=log.tau / [1.0, 1.0, 0.9])})
+
+    prepared = prepare(Logs((short(1), short(2)), (short(3, "validate"),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    every = tuple(one for one in families(columns.laws, whole_motion(prepared.data), model.arm)
+                  if one.cause == "torque_gain" or (one.cause, one.joint) == ("cogging", 1))
+    usual, asked = search_module._fewest, []
+
+    def misled(tried: Sequence[Tried]) -> Tried | None:
+        asked.append(tried)
+        second = [one for one in tried if (one.effect.name, one.effect.joint) == ("torque_gain", 2)]
+        return second[0] if len(asked) <= 2 and second else usual(tried)
+
+    monkeypatch.setattr(search_module, "_fewest", misled)
+    found = search(Case(prepared.data, prepared.judge, model, fit.weight, every, None), 4)
+    there = [one.effect for one in found.final.model.effects]
+    assert [(one.name, one.joint) for one in there] == [("torque_gain", 3), ("cogging", 1)]
+    assert found.final.model.effects[0].values["gain_error"] == pytest.approx(-0.1, rel=0.05)
