@@ -140,11 +140,11 @@ def _simulated(found: Found, case: Case, prepared: Prepared) -> tuple[Simulation
 def _strays(found: Found, k: int, simulated: Sequence[Simulation], prepared: Prepared, case: Case, late: bool) -> str:
     """Why the simulated arm is no nearer with step `k`, neither when it was found nor beside all the others; empty where it is.
 
-    Where every joint is late, one that is told so alone no longer fits the others, and the arm strays until they are told too.
+    Where every joint is late, one that is told so alone no longer fits the others, and their loops stray until they are told too.
     """
     accepted = [j for j, one in enumerate(found.steps) if one.best is not None]
     why = farther(simulated[k], simulated[k + 1], late=late)
-    if not why or k == accepted[-1]:
+    if not why or k == accepted[-1] or simulated[k].how != "closed-loop":
         return why
     rest = _without(found, [j for j in accepted if j != k], case)
     arms = [acted(one.model.arm, case.beside) for one in (rest, found.final)]

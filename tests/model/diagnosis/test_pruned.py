@@ -248,6 +248,6 @@ def test_what_moved_the_simulated_arm_away_is_asked_again_beside_what_was_found_
     monkeypatch.setattr(pruned, "simulation_errors", lambda arms, motions: arms)
     monkeypatch.setattr(pruned, "farther", lambda before, after, late: beside if before == "rest" else "farther")
     case, prepared = SimpleNamespace(beside=()), SimpleNamespace(judging=(), motions=())
-    runs: Any = ("nominal", "first", "second")
+    runs: Any = [SimpleNamespace(how="closed-loop")] * 3
     assert bool(pruned._strays(found, 0, runs, prepared, case, False)) is strays
     assert pruned._strays(found, 1, runs, prepared, case, False) == "farther"
