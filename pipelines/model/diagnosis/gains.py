@@ -137,8 +137,8 @@ def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simula
 
 def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
     square, away = [], []
-    pairs = _closed(arm, motions, _SOFT if soft else _LONGEST) if closed else [
-        _windowed(arm, *one, _ROUGH if soft else _EXACT) for one in motions]
+    pairs = (_closed(arm, motions, _SOFT if soft else _LONGEST) if closed else
+             _in_windows(arm, motions, _ROUGH if soft else _EXACT))
     for q, seen in pairs:
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
@@ -164,16 +164,25 @@ def _first(log: ExperimentLog, seconds: float) -> Experiment:
     return experiment.part(0, min(experiment.n_samples, round(seconds / log.sample_time)))
 
 
-def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float) -> tuple[Array, Array]:
+def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[tuple[Array, Array]]:
+    """The same, driven by the logged torque; the steps that suffice for a log suffice for the next."""
+    pairs, steps = [], dict[float, int]()
+    for log, found in motions:
+        q, seen, steps[log.sample_time] = _windowed(arm, log, found, exact, steps.get(log.sample_time))
+        pairs.append((q, seen))
+    return pairs
+
+
+def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float, steps: int | None) -> tuple[Array, Array, int]:
     usable = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
     tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
     motion, tau, usable, every = _coarser(found.motion, tau, usable, log.sample_time)
     length = max(3, round(_WINDOW / (every * log.sample_time)))
-    windows = simulate_windows(Plant.of(arm), motion, tau, every * log.sample_time, length, usable, exact)
+    windows = simulate_windows(Plant.of(arm), motion, tau, every * log.sample_time, length, usable, exact, steps)
     if not np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():  # left out, it would count as no error at all
         raise InputRejected("D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia")
-    return windows.q, motion.q
+    return windows.q, motion.q, windows.steps
 
 
 def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_], sample_time: float,

@@ -40,7 +40,7 @@ class Windows:
 
 
 def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: float, length: int,
-                     usable: Mask | None = None, share: float = 0.0) -> Windows:
+                     usable: Mask | None = None, share: float = 0.0, steps: int | None = None) -> Windows:
     """Follow `tau` (samples, joints) from the state that `motion` has at the start of every window of `length` samples.
 
     Args:
@@ -48,6 +48,7 @@ def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: floa
         usable: (samples,) where motion and torque are known without gaps; everywhere where left out.
         share: of the distance from `motion`, that a position may be wrong by (root mean square, joint by joint), where that is more
             than the usual 1e-7 rad.
+        steps: of the integrator, a sample; by default as few as this asks for.
 
     Raises:
         InputRejected: T08, no window fits; D15, the model's inertia matrix is singular or worse; D17, the step would be too small
@@ -62,7 +63,8 @@ def simulate_windows(plant: Plant, motion: Motion, tau: Array, sample_time: floa
         raise InputRejected("T08", f"no window of {length} samples is without a gap", remedy="ask for shorter windows")
     plant.refuse_unphysical(motion.q[first])
     tried = first[np.linspace(0, len(first) - 1, min(len(first), 32)).astype(int)]
-    steps = _steps(plant, motion, tau, sample_time, tried, length, share)
+    if steps is None:
+        steps = _steps(plant, motion, tau, sample_time, tried, length, share)
     q, dq = np.full(motion.q.shape, np.nan), np.full(motion.q.shape, np.nan)
     for begin in range(0, len(first), _AT_ONCE):
         some = first[begin:begin + _AT_ONCE]
