@@ -103,6 +103,7 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
     nominal = now
     steps: list[Step] = []
     asked: list[tuple[Explored, _Gate]] = []
+    joined: set[str] = set()
     while True:
         number = len(steps) + 1
         same = number <= len(rough) and rough[number - 1].before is now
@@ -116,11 +117,13 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         asked.append((explored, gate))
         if step.best is None:
             break
-        alone = _one_for_two(case, steps)
+        # Once a cause: what came in place of two might give way to another of them again, and so on without end.
+        alone = None if step.best.effect.name in joined else _one_for_two(case, steps, asked)
         if alone is not None:
-            place, best = alone
+            place, instead, best = alone
             del steps[place:], asked[place + 1:]
-            steps.append(_step(case, *asked[place], place + 1, True, best))
+            steps.append(instead)
+            joined.add(best.effect.name)
             now, rough = _reweighted(best.done), ()
             continue
         follows = number < len(rough) and same and step.best is _fewest(rough[number - 1].tried)
@@ -128,9 +131,9 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
     return Found(nominal, tuple(steps), now)
 
 
-def _one_for_two(case: Case, steps: Sequence[Step]) -> tuple[int, Tried] | None:
-    """The place of an earlier step, and what it should have found: where the same cause was found at two joints, the joint at which
-    it leaves as little alone.
+def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explored, _Gate]]) -> tuple[int, Step, Tried] | None:
+    """The place of an earlier step, that step as it should have been, and what it should have found: where the same cause was found
+    at two joints, the joint at which it leaves as little alone.
 
     Of the scales of all torques only their ratios show: one joint's is that of all the others the other way round.
     """
@@ -145,10 +148,15 @@ def _one_for_two(case: Case, steps: Sequence[Step]) -> tuple[int, Tried] | None:
         for rival in earlier.rivals:
             if rival.effect.name != name or rival.effect.joint == earlier.best.effect.joint or rival.log is not None:
                 continue
+            if rival.error >= 1.0 or not rival.possible:
+                continue
             effects = (*rival.done.model.effects, *last.before.model.effects[place + 1:])
             alone = refine(replace(last.before.model, effects=effects), case.data, last.before.weight)
-            if max(held_out(alone, case) / error, alone.rss / last.best.done.rss) <= 1.0 + _PARSIMONY:
-                return place, rival
+            if max(held_out(alone, case) / error, alone.rss / last.best.done.rss) > 1.0 + _PARSIMONY:
+                continue
+            instead = _step(case, *asked[place], place + 1, True, rival)
+            if instead.best is rival:
+                return place, instead, rival
     return None
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.screen import screen, screen_family
-from pipelines.model.diagnosis.search import search
+from pipelines.model.diagnosis.search import Step, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.rigid.body import Motion
@@ -192,3 +194,46 @@ def test_two_scales_of_torque_that_are_one_are_one(monkeypatch: pytest.MonkeyPat
     there = [one.effect for one in found.final.model.effects]
     assert [(one.name, one.joint) for one in there] == [("torque_gain", 3), ("cogging", 1)]
     assert found.final.model.effects[0].values["gain_error"] == pytest.approx(-0.1, rel=0.05)
+
+
+@pytest.mark.parametrize(("possible", "error", "gives_way", "taken"), [
+    (True, 0.5, False, True), (False, 0.5, False, False), (True, 1.1, False, False), (True, 0.5, True, False)])
+def test_one_for_two_is_what_could_have_been_accepted(possible: bool, error: float, gives_way: bool, taken: bool,
+                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drag that drives its joint, what held-out time speaks against, and what gives way to something that gives way, are none."""
+    def tried(joint: int, **more: Any) -> Any:
+        return SimpleNamespace(effect=SimpleNamespace(name="quadratic_drag", joint=joint), log=None,
+                               done=SimpleNamespace(model=SimpleNamespace(effects=()), rss=1.0), **more)
+
+    rival, plain = tried(3, possible=possible, error=error), Exact(cast("Any", None), np.zeros(1), ())
+    steps: Any = (SimpleNamespace(best=tried(2), rivals=(rival,)),
+                  SimpleNamespace(best=tried(1), before=SimpleNamespace(model=plain, weight=None)))
+    monkeypatch.setattr(search_module, "held_out", lambda *args: 1.0)
+    monkeypatch.setattr(search_module, "refine", lambda *args: SimpleNamespace(rss=1.0))
+    monkeypatch.setattr(search_module, "_step", lambda *args: SimpleNamespace(best=None if gives_way else args[-1]))
+    found = search_module._one_for_two(cast("Case", SimpleNamespace(data=None)), steps, cast("Any", ((None, None),)))
+    assert (found is not None and found[2] is rival) is taken
+
+
+def test_a_search_that_takes_one_for_two_comes_to_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two drives are off, and each is taken for both of them: neither rests until the other is there."""
+    def scaled(seed: int, role: str = "identify") -> ExperimentLog:
+        log = hidden(seed, role=role)
+        return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=log.tau / [1.0, 1.2, 0.85])})
+
+    prepared = prepare(Logs((scaled(1),), (scaled(3, "validate"),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    every = tuple(one for one in families(columns.laws, whole_motion(prepared.data), model.arm) if one.cause == "torque_gain")
+    step, taken = search_module._step, []
+
+    def counted(*args: Any) -> Step:
+        taken.append(args[3])
+        assert len(taken) < 20
+        return step(*args)
+
+    monkeypatch.setattr(search_module, "_PARSIMONY", 1e6)
+    monkeypatch.setattr(search_module, "_step", counted)
+    found = search(Case(prepared.data, prepared.judge, model, fit.weight, every, None), 4)
+    assert taken.count(1) == 2  # one was taken for two
+    assert [one.effect.name for one in found.final.model.effects] == ["torque_gain", "torque_gain"]
