@@ -58,10 +58,12 @@ class LoadFriction(Effect):
         return (replace(self, behind=_HALF),)
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
-        """Under the load that the joint carries at rest."""
-        still = np.zeros((1, arm.n_joints))
-        load = float(self.own(arm.torque(Motion(np.zeros(1), still, still, still)))[0])
-        return np.asarray(values["mu"] * abs(load) * np.tanh(values["sharpness"] * dq))
+        """Under the load that the joint carries at rest, and what rubs behind it."""
+        still = np.zeros((len(dq), arm.n_joints))
+        resting = Motion(np.zeros(len(dq)), still, still, still)
+        moving = replace(resting, dq=self.on_own_row(arm, dq)[..., 0])
+        load = self.own(arm.torque(resting)) + values.get("behind", 0.0) * self.own(arm.friction_torque(moving))
+        return np.asarray(values["mu"] * np.abs(load) * np.tanh(values["sharpness"] * dq))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The load is the torque of everything inside it, friction before it apart and other effects included."""

@@ -106,6 +106,19 @@ def test_what_rubs_behind_a_gear_loads_it_too() -> None:
     np.testing.assert_allclose(found, passed * (1.0 + 0.1 * np.sign(passed) * np.tanh(80.0 * motion.dq[:, 1])), rtol=1e-12)
 
 
+@pytest.mark.parametrize("behind", [0.0, 1.0])
+def test_the_curve_of_load_friction_has_what_rubs_behind_the_gear(behind: float) -> None:
+    """µ |τ_g + s f(v)| at steady speed; what goes up a weight rubs more than what comes down where s is 1."""
+    arm, v = synthetic_arm(), np.array([-1.0, 1.0])
+    still = np.zeros((2, arm.n_joints))
+    resting = Motion(np.zeros(2), still, still, still)
+    moving = replace(resting, dq=np.outer(v, np.arange(arm.n_joints) == 1))
+    weight, rubs = arm.torque(resting)[:, 1], arm.friction_torque(moving)[:, 1]
+    assert np.abs(weight).min() > np.abs(rubs).max() > 0.0
+    found = LoadFriction(2).curve(v, arm, {"mu": 0.1, "sharpness": 500.0, "behind": behind})
+    np.testing.assert_allclose(found, 0.1 * (np.abs(weight) + behind * rubs * np.sign(weight)) * np.sign(v), rtol=1e-9)
+
+
 def test_position_friction_is_a_wave_along_the_turn() -> None:
     """Amplitude, order and phase mean A sin(k q + φ) against the direction of motion, and likewise of its harmonics."""
     motion, arm = swinging(), synthetic_arm()
