@@ -102,8 +102,10 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
 
 
 def _most_taken(step: Step, found: Found, floor: Array) -> float:
-    """Largest share that a step takes of what the nominal model leaves of any joint above the noise: of its power."""
-    whole = np.maximum(np.square(found.nominal.rms) - np.square(floor), 1e-300)
+    """Largest share that a step takes of what the nominal model leaves of any joint above the noise: of its power. Of a joint that
+    stands in the noise there is no more to take than noise."""
+    noise = np.square(floor)
+    whole = np.maximum(np.maximum(np.square(found.nominal.rms) - noise, noise), 1e-300)
     after = step.before if step.best is None else step.best.done
     return float(np.max((np.square(step.before.rms) - np.square(after.rms)) / whole))
 

@@ -123,3 +123,10 @@ def test_without_a_floor_a_trifle_beside_a_great_cause_has_no_name() -> None:
     nominal = left(1.0, 0.05, 0.01)
     assert rule(found(nominal, first, left(0.018, 0.05, 0.01)), floor, known=False).named == (0,)
     assert rule(found(nominal, first, left(0.02, 0.04, 0.01)), floor, known=False).named == (0, 1)
+
+
+def test_without_a_floor_a_joint_that_stands_in_the_noise_makes_no_cause_of_a_trifle() -> None:
+    """Joint 3 has its noise and nothing else: a millionth of it taken away says nothing of a cause at joint 1."""
+    first, floor = left(0.02, 0.05, 1e-3), 1e-3 * np.ones(3)
+    nominal = left(1.0, 0.05, 1e-3 + 1e-12)
+    assert rule(found(nominal, first, left(0.018, 0.05, 1e-3 - 1e-12)), floor, known=False).named == (0,)
