@@ -56,7 +56,9 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
                   "weaker than others" if fitted is None else
                   "impossible numbers" if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else
-                  _REFUSED if id(one) in refused else "explains less than the one accepted")
+                  _REFUSED if id(one) in refused else
+                  "takes more numbers, or a second of its kind" if best is not None and fitted.rank < best.rank else
+                  "explains less than the one accepted")
         gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
         rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
                           float(one.visibility[0]), gained, accepted, reason))

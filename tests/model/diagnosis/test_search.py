@@ -236,4 +236,5 @@ def test_a_search_that_takes_one_for_two_comes_to_an_end(monkeypatch: pytest.Mon
     monkeypatch.setattr(search_module, "_step", counted)
     found = search(Case(prepared.data, prepared.judge, model, fit.weight, every, None), 4)
     assert taken.count(1) == 2  # one was taken for two
+    assert "takes more numbers, or a second of its kind" in {trial.reason for trial in found.steps[0].trials}
     assert [one.effect.name for one in found.final.model.effects] == ["torque_gain", "torque_gain"]
