@@ -1,7 +1,7 @@
 """Motions that an arm follows, and the loops that make it follow them; none of them is the bench's.
 
     q, dq, ddq = motion("fourier", arm, t, rng)        (samples, joints) each
-    loop = Loop.of("cascade", arm, sample_time, speed)
+    loop = Loop("cascade", arm, sample_time, inertia, bandwidth_hz, counts)
     command = loop(q_ref, dq_ref, ddq_ref, q)          (joints,) at each sample
 """
 
@@ -15,10 +15,9 @@ import numpy as np
 from benchmarks.other_plants.arms import Arm
 from pipelines.log.experiment import Array, Controller
 
-__all__ = ["LOOPS", "Loop", "motion"]
+__all__ = ["Loop", "motion"]
 
 Path = tuple[Array, Array, Array]
-LOOPS = ("pd", "pid", "pd+gravity", "cascade", "computed torque")  # the first two a log can tell
 _DAMPING = 0.8
 _FILTER_HZ = 60.0  # of the cascade's speed
 
@@ -68,7 +67,8 @@ def _ramps(t: Array, reach: Array, speed: Array, rng: np.random.Generator) -> Pa
 
 
 class Loop:
-    """A controller with its memory. Its own model, where it has one, is a tenth too heavy."""
+    """A controller with its memory: "pd", "pid", "pd+gravity", "cascade" or "computed torque". Of the first two a log can tell. Its
+    own model, where it has one, is a tenth too heavy."""
 
     def __init__(self, kind: str, arm: Arm, sample_time: float, inertia: Array, bandwidth_hz: float, counts: Array) -> None:
         w = 2.0 * np.pi * bandwidth_hz

@@ -81,7 +81,7 @@ def _on_several(made: Calibration, families: Sequence[Family]) -> tuple[tuple[in
     if made.wide is None:
         return (), ()
     whole = [one.cause for one in made.causes if one.joint is None]
-    stored = dict(zip(whole, made.wide.causes, strict=False))
+    stored = dict(zip(whole, (one for one in made.wide.causes if one.joint is None), strict=True))
     stored |= {one.place: one for one in made.wide.causes if one.place}
     here = {place: stored[name] for place, family in enumerate(families)
             if (name := place_of(family.cause, family.joint)) in stored}

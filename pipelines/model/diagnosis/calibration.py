@@ -74,7 +74,7 @@ class Calibration:
     floor: Array  # (joints,) [N m] what is left of an arm in order
     noise: Array  # (joints,) [N m] of the drives; NaN without a twin
     causes: tuple[CauseBound, ...]
-    wide: Wide | None  # of causes of the whole arm
+    wide: Wide | None  # of causes that act on several joints
     floors: tuple[Floors, ...]  # spectra
     following: Array | None = None  # (joints,) the most that any replica's residual follows the joint's own motion; None: not known
     format: Literal["rrrid-calibration"] = field(default=FORMAT, kw_only=True)

@@ -38,7 +38,7 @@ class Floored:
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
-             given: Calibration | None) -> Floored:
+               given: Calibration | None) -> Floored:
     """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
     if given is not None:
         refuse_unfit(given, prepared, case.families, "twin")

@@ -37,6 +37,12 @@ __all__ = ["diagnosis_of", "sentence", "strongest"]
 
 def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings,
                  probed: Probed | None = None, moved: bool = False) -> Diagnosis:
+    """What was found, as a result tells it.
+
+    Args:
+        probed: how limits are looked for beside reference logs.
+        moved: whether there is a cause that the base parameters show.
+    """
     done, responded, own = _held_against(first, case, done, floored, chosen, moved)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
@@ -108,5 +114,8 @@ def sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:
     more = f", and {len(named) - 1} more" if len(named) > 1 else ""
     size = f": {first.torque_rms:.2g} N m of torque that the model does not have" if np.isfinite(first.torque_rms) else ""
     return f"{first.title}{where}{size}{more}."
+
+
 def strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """What explains most first."""
     return tuple(sorted(findings, key=lambda finding: -finding.explained))

@@ -52,7 +52,7 @@ class WideCause:
 
 @dataclass(frozen=True, eq=False)
 class Wide:
-    """What thresholds of causes of the whole arm follow from, with any weights."""
+    """What thresholds of causes that act on several joints follow from, with any weights."""
 
     weight: Array  # (joints,) the reference
     model: Array  # (joints, rank, rank) BᵀB
