@@ -26,7 +26,7 @@ from rrrid_cli.settings import make_settings
 from tests.diagnose.sessions import but, healthy_again, session, written
 
 STAGES = tuple(module.replace("_", "-") for module in run.STEPS)
-FEW = but("cogging", "torque_offset", "gravity_tilt")
+FEW = but("cogging", "torque_offset", "gravity_tilt", "encoder_eccentricity")  # the last two act on several joints
 
 
 def asked(folder: Path, out: Path, **settings: object) -> Outcome[diagnose.Result]:
@@ -88,7 +88,7 @@ def test_the_file_says_where_thresholds_come_from(place: Path) -> None:
     assert [len(log["sha256"]) for log in origin["logs"]] == [64]
     assert len(origin["model"]) == 64
     assert {"version", "numpy", "without"} <= set(origin)
-    assert {one["cause"] for one in stored["causes"]} == {"cogging", "torque_offset", "gravity_tilt"}
+    assert {one["cause"] for one in stored["causes"]} == {"cogging", "torque_offset", "gravity_tilt", "encoder_eccentricity"}
     provenance = json.loads((place / "first/provenance.json").read_text())
     assert provenance["outputs"]["calibration.json"] == hash_file(place / "first/calibration.json")
 
@@ -98,7 +98,25 @@ def test_reading_gives_back_what_was_written(place: Path, tmp_path: Path) -> Non
     write_calibration(tmp_path, made)
     assert (tmp_path / "calibration.json").read_bytes() == (place / "first/calibration.json").read_bytes()
     assert made.wide is not None
-    assert [one.joint for one in made.causes].count(None) == [one.joint for one in made.wide.causes].count(None)
+    own = [(f"encoder_eccentricity:{joint}", joint) for joint in (1, 2, 3)]
+    assert [(one.place, one.joint) for one in made.wide.causes] == [("", None), *own]
+
+
+def test_one_of_an_older_version_knows_causes_of_the_whole_arm_alone(place: Path, tmp_path: Path) -> None:
+    """It is read, and the others are held against what grows with the weight of their joint, as they were then."""
+    stored = json.loads((place / "first/calibration.json").read_text())
+    of_arm = [one for one in stored["wide"]["causes"] if one["joint"] is None]
+    causes = [{name: item for name, item in one.items() if name not in ("place", "joint")} for one in of_arm]
+    older = stored | {"wide": stored["wide"] | {"causes": causes}}
+    jsonschema.validate(older, calibration_schema())
+    (tmp_path / "older").mkdir()
+    (tmp_path / "older/calibration.json").write_text(json.dumps(older))
+    shutil.copy(place / "first/calibration.h5", tmp_path / "older")
+    found = asked(place / "logs", tmp_path / "out", calibration=str(tmp_path / "older")).result
+    now = asked(place / "logs", tmp_path / "now", calibration=str(place / "first")).result
+    assert [(one.cause, one.joint) for one in found.findings] == [("cogging", 2)]
+    same = {(one.cause, one.joint): one.gain == other.gain for one, other in zip(found.thresholds, now.thresholds, strict=True)}
+    assert {name for (name, _), alike in same.items() if not alike} == {"encoder_eccentricity"}
 
 
 def test_other_logs_of_the_arm_need_no_twin(place: Path, tmp_path: Path) -> None:
