@@ -154,6 +154,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
 def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared, case: Case,
                 chosen: DiagnosisSettings) -> Diagnosis:
     """With what the base parameters say has changed, where nothing that was found says it already."""
+    turning = now.data.logs[0].log.robot.revolute
     if told.verdict == "unknown" or told.extended is None:
         why = "the base parameters have moved as it moves them, beside something that has no name"
         return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
@@ -163,13 +164,13 @@ def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared,
     if why := moved.unsure:
         if told.findings:
             return _not_accepted(told, moved.effect.name, moved.effect.joint, why)
-        return replace(told, verdict="unknown", reason=why, summary=sentence(Ruling("unknown", (), why), ()))
+        return replace(told, verdict="unknown", reason=why, summary=sentence(Ruling("unknown", (), why), (), turning))
     one = carried(moved, final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
         return _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)
     findings = strongest((one.finding, *told.findings))
     return replace(told, verdict="cause", findings=findings, reason="", extended=one.arm,
-                   summary=sentence(Ruling("cause", (), ""), findings))
+                   summary=sentence(Ruling("cause", (), ""), findings, turning))
 
 
 def _not_accepted(told: Diagnosis, cause: str, joint: int | None, why: str) -> Diagnosis:

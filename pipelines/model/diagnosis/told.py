@@ -7,7 +7,7 @@ Before it is told, it is held against the logs that nothing was fitted to: they 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -67,7 +67,7 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
     arm = extended_arm(replace(found, final=responded.final), ruling)
     standing = [one for one in case.beside if one not in first.held.acting]
     return Diagnosis(
-        ruling.verdict, sentence(ruling, named), named, (), rejected(found, ruling), limits,
+        ruling.verdict, sentence(ruling, named, arm.robot.revolute), named, (), rejected(found, ruling), limits,
         (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
@@ -102,8 +102,8 @@ def _limits(last: Step, case: Case, prepared: Prepared, probed: Probed | None,
     return detectable(last.screened, bounds, prepared.data.logs[0].log.robot.revolute, probe)
 
 
-def sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:
-    """What a technician is told."""
+def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool]) -> str:
+    """What a technician is told; `revolute` (joints,): which of them turn."""
     if ruling.verdict == "nothing-wrong":
         caveat = f": {ruling.reason}" if ruling.reason else ""
         return f"Nothing is wrong with this arm, as far as these logs can tell{caveat}."
@@ -112,7 +112,9 @@ def sentence(ruling: Ruling, named: tuple[Finding, ...]) -> str:
     first = named[0]
     where = "" if first.joint is None else f" at joint {first.joint}"
     more = f", and {len(named) - 1} more" if len(named) > 1 else ""
-    size = f": {first.torque_rms:.2g} N m of torque that the model does not have" if np.isfinite(first.torque_rms) else ""
+    turns = revolute if first.joint is None else revolute[first.joint - 1:first.joint]
+    what = " or ".join(dict.fromkeys("N m of torque" if one else "N of force" for one in turns))
+    size = f": {first.torque_rms:.2g} {what} that the model does not have" if np.isfinite(first.torque_rms) else ""
     return f"{first.title}{where}{size}{more}."
 
 
