@@ -67,11 +67,11 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     memory = memory or Memory()
     prepared = memory.prepared(logs, chosen, arm)
     found = _diagnosed(prepared, chosen, say, calibration, memory)
-    other = loosened(prepared) if calibration is None and wrong_law(found) else prepared
+    other = loosened(prepared) if wrong_law(found) else prepared
     if other is prepared:
         return found
     say("fitting by which curve friction changes its sign")
-    return min(found, _diagnosed(other, chosen, say, None, Memory()), key=lambda one: len(one.findings))
+    return min(found, _diagnosed(other, chosen, say, calibration, Memory()), key=lambda one: len(one.findings))
 
 
 def _diagnosed(prepared: Prepared, chosen: DiagnosisSettings, say: Callable[[str], None], calibration: Calibration | None,

@@ -11,6 +11,7 @@ import pytest
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
+from pipelines.model.diagnosis import diagnose as diagnose_module
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.change_of_sign import loosened, wrong_law
@@ -27,6 +28,8 @@ from tests.model.diagnosis.arms import hidden
 from tests.model.estimation.experiments import COULOMB
 
 if TYPE_CHECKING:
+    from pipelines.model.diagnosis.calibration import Calibration
+    from pipelines.model.diagnosis.inputs import Prepared
     from pipelines.model.diagnosis.result import Diagnosis
 
 LAWS = ("stribeck", "concave_friction", "quadratic_drag")
@@ -96,3 +99,20 @@ def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(spe
     finding = SimpleNamespace(cause="concave_friction", joint=1, parameters={"speed": Value(speed, 0.001, "rad/s")})
     found = SimpleNamespace(findings=(finding,), question="what is wrong", nominal=SimpleNamespace(friction=(law,)))
     assert wrong_law(cast("Diagnosis", found)) is asked
+
+
+@pytest.mark.parametrize("stored", [None, cast("Calibration", SimpleNamespace())])
+def test_stored_thresholds_are_for_the_other_curve_as_well(stored: Calibration | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An arm in order whose friction changes its sign by an arc tangent is in order with and without --calibration."""
+    asked = []
+
+    def diagnosed(prepared: Prepared, chosen: object, say: object, calibration: object, memory: object) -> SimpleNamespace:
+        free = {law.free for law in prepared.columns.laws if isinstance(law, Coulomb)}
+        asked.append((free, calibration))
+        laws = () if ("sharpness", "roundness") in free else ("concave_friction:1", "concave_friction:2")
+        return SimpleNamespace(findings=tuple(SimpleNamespace(cause=name[:-2], parameters={}) for name in laws),
+                               question="what is wrong", nominal=None)
+
+    monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
+    assert diagnose_module.diagnose(Logs((hidden(1),)), calibration=stored).findings == ()
+    assert [calibration for _, calibration in asked] == [stored, stored]
