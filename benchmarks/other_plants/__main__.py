@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import tempfile
 import time
 import traceback
@@ -43,9 +44,12 @@ def _parser() -> argparse.ArgumentParser:
 def _one(case: Case, folder: Path) -> str:
     made = time.perf_counter()
     if not folder.exists():
+        draft = folder.with_suffix(".draft")
+        shutil.rmtree(draft, ignore_errors=True)
+        draft.mkdir(parents=True)
         for log in case.logs():
-            folder.mkdir(parents=True, exist_ok=True)
-            write_log(folder / f"{log.name}.h5", log)
+            write_log(draft / f"{log.name}.h5", log)
+        draft.rename(folder)
     begun = time.perf_counter()
     answer = asked(folder)
     outcome, said = judged(case, answer)
@@ -79,7 +83,7 @@ def judged(case: Case, answer: Mapping[str, Any]) -> tuple[str, str]:
     if not all(good):
         outcome = "wrong"
     elif not case.fault:
-        outcome = "right" if verdict == "nothing-wrong" or case.answers else "wrong"
+        outcome = "right" if verdict == "nothing-wrong" or names else "open" if case.answers else "wrong"
     elif case.answers:
         outcome = "right" if names else "open"
     else:

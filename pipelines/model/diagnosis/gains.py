@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.result import BeforeAfter, Gain, TipError, Torque
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Plant, choose_step, simulate_together, simulate_windows
+from pipelines.model.simulation import Experiment, Plant, Windows, choose_step, simulate_together, simulate_windows
 
 __all__ = ["Simulation", "farther", "gain_of", "simulation_errors", "torque_gain", "torque_gain_of", "worse_log"]
 
@@ -179,10 +179,17 @@ def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float, 
     tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
     motion, tau, usable, every = _coarser(found.motion, tau, usable, log.sample_time)
     length = max(3, round(_WINDOW / (every * log.sample_time)))
-    windows = simulate_windows(Plant.of(arm), motion, tau, every * log.sample_time, length, usable, exact, steps)
-    if not np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():  # left out, it would count as no error at all
+    driven = partial(simulate_windows, Plant.of(arm), motion, tau, every * log.sample_time, length, usable, exact)
+    windows = driven(steps)
+    if steps is not None and not _whole(windows, length):  # livelier than the log they were chosen for
+        windows = driven(None)
+    if not _whole(windows, length):  # left out, it would count as no error at all
         raise InputRejected("D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia")
     return windows.q, motion.q, windows.steps
+
+
+def _whole(windows: Windows, length: int) -> bool:
+    return bool(np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all())
 
 
 def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_], sample_time: float,

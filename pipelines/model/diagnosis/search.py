@@ -38,6 +38,7 @@ _WORTH = 0.05  # of the squared residual of its joint
 _MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
+_MISSED = 0.1  # of what the second of two takes away: one in their place may miss so much
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
 
@@ -152,7 +153,8 @@ def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explor
                 continue
             effects = (*rival.done.model.effects, *last.before.model.effects[place + 1:])
             alone = refine(replace(last.before.model, effects=effects), case.data, last.before.weight)
-            if max(held_out(alone, case) / error, alone.rss / last.best.done.rss) > 1.0 + _PARSIMONY:
+            missed = (alone.rss - last.best.done.rss) / max(last.before.rss - last.best.done.rss, 1e-300)
+            if held_out(alone, case) > (1.0 + _PARSIMONY) * error or missed > _MISSED:
                 continue
             instead = _step(case, *asked[place], place + 1, True, rival)
             if instead.best is rival:

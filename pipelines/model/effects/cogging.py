@@ -16,9 +16,8 @@ __all__ = ["Cogging"]
 
 _WAVES = 1.5  # in the range travelled, at least: fewer are the curve of a spring (causes.md: a full turn tells them apart)
 _HIGHEST = 150.0  # order that is searched for; of a slide: of its whole travel
-_FINEST = 1000.0  # of a slide: a wave of 6 mm, as magnets and leads of screws have them
+_FINEST = 1000.0  # of a slide: a wave of 6 mm, as leads of screws have them; on more than a metre of travel the waves are longer
 _MOST = 200  # orders on the grid
-_PEAKS = 24
 _ROUNDED = 1e-11  # difference of orders that is rounding
 _APART = 0.25  # of what the range tells apart: nearer to a whole order it is 45 degrees off that at either end at most
 
@@ -96,23 +95,6 @@ class Cogging(Effect):
         step = max(math.pi / travel, (highest - 1.0) / _MOST)
         for order in np.arange(lowest, highest, step).tolist():
             yield replace(self, order=order, harmonics=1)
-
-    def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
-        """The highest peaks of the residual's spectrum over angle: Σ r exp(-i k q), by bins and a Fourier transform."""
-        q, r = self.own(motion.q), self.own(residual)
-        travel = float(np.ptp(q))
-        if travel < 1e-3:
-            return
-        width = math.pi / (4.0 * self._highest(travel, arm)) if travel > 0.1 else travel / 64.0
-        bins = ((q - q.min()) / width).astype(int)
-        size = 1 << int(np.ceil(np.log2(4.0 * (bins.max() + 1))))
-        power = np.abs(np.fft.rfft(np.bincount(bins, r, minlength=size), n=size))
-        order = 2.0 * math.pi / (size * width) * np.arange(len(power))
-        wanted = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1))
-        wanted &= (order >= max(0.25, _WAVES * 2.0 * math.pi / travel)) & (order < 0.5 * math.pi / width)
-        peaks = np.flatnonzero(wanted)
-        for peak in peaks[np.argsort(power[peaks])[::-1][:_PEAKS]]:
-            yield replace(self, order=float(order[peak]), harmonics=1)
 
     def _highest(self, travel: float, arm: ArmModel) -> float:
         """Order that is searched for. A slide's wave is counted in 2π metres, and its travel is what a turn is to a joint's."""

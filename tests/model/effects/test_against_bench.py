@@ -15,7 +15,6 @@ from pipelines.bench.session import as_log
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
-from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.contact import Contact
 from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.link_length import LinkLength
@@ -158,17 +157,6 @@ def test_the_length_that_fits_best_is_the_true_one() -> None:
     assert left[2] < min(left) + 1e-15
     assert left[2] < 0.5 * min(left[1], left[3]) + floor()
     assert isinstance(effect, LinkLength)
-
-
-def test_a_spectrum_over_angle_points_to_the_cogging() -> None:
-    """Among the shapes that the residual speaks for is one of the sealed order, within what the travel can tell apart."""
-    motion, tau = motion_and_torque(faulty("cogging", 2))
-    promising = list(Cogging(2).promising(motion, arm(), tau - arm().torque(motion)))
-    order = fault("cogging", 2).parameters()["order"]
-    apart = 2.0 * np.pi / np.ptp(motion.q[:, 1])
-    assert len(promising) <= 24
-    assert min(abs(one.order - order) for one in promising) < 0.25 * apart  # type: ignore[operator]
-    assert all(one.harmonics == 1 for one in promising)
 
 
 def test_a_touch_is_looked_for_where_it_was() -> None:
