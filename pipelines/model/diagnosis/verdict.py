@@ -6,7 +6,7 @@ half of what stands above it, nothing is: the name would be wrong more often tha
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -86,7 +86,8 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
             return Ruling("unknown", (), f"the residual of {high} stands above the floor, and no cause explains it")
         return Ruling("nothing-wrong", (), _NO_FLOOR if len(joints) else "")
     if not known:
-        doubts = {k: _TRIFLE for k, step in enumerate(accepted) if _most_taken(step, found, floor) < _SHAPE}
+        doubts = {k: _TRIFLE for k, step in enumerate(accepted)
+                  if _most_taken(step, found, floor) < _SHAPE and not _one_more(step, accepted[:k])}
         return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
     whole = excess(found.nominal.rms, floor)
     total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
@@ -99,6 +100,13 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
         return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")
     doubts = {k: _MISFIT for k, step in enumerate(accepted) if _happened(step)} if gap and len(joints) else {}
     return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
+
+
+def _one_more(step: Step, before: Sequence[Step]) -> bool:
+    """Whether the same cause was found at the joint already: a further wave, of another order, mends no wave's shape."""
+    own = None if step.best is None else step.best.effect
+    return any(one.best is not None and own is not None and (one.best.effect.name, one.best.effect.joint) == (own.name, own.joint)
+               for one in before)
 
 
 def _most_taken(step: Step, found: Found, floor: Array) -> float:

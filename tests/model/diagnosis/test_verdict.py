@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import zip_longest
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,8 +13,11 @@ import pytest
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.verdict import excess, explained, rule
 from pipelines.model.effects.backlash import Backlash
+from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.contact import Contact
+from pipelines.model.effects.stribeck import Stribeck
+from pipelines.model.effects.viscous_drift import ViscousDrift
 
 FLOOR = np.array([0.01, 0.01, 0.01])
 
@@ -21,11 +26,11 @@ def left(*rms: float) -> Any:
     return SimpleNamespace(rms=np.array(rms))
 
 
-def found(nominal: Any, *after: Any, other: Any = None) -> Any:
-    """A search that accepted one cause after the other, with what each left."""
+def found(nominal: Any, *after: Any, other: Any = None, effects: Sequence[Effect] = ()) -> Any:
+    """A search that accepted one cause after the other, with what each left; cogging at joint 2 where nothing else is given."""
     before, steps = nominal, []
-    for one in after:
-        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=one, effect=Cogging(2)), other=None))
+    for one, effect in zip_longest(after, effects, fillvalue=Cogging(2)):
+        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=one, effect=effect), other=None))
         before = one
     steps.append(SimpleNamespace(before=before, best=None, other=other))
     return SimpleNamespace(nominal=nominal, steps=steps, final=before)
@@ -121,12 +126,21 @@ def test_without_a_floor_a_trifle_beside_a_great_cause_has_no_name() -> None:
     """A drift of 1 N m at joint 1 whose law leaves 0.02: what takes a tenth off that may mend the law; at joint 2 it is a cause."""
     first, floor = left(0.02, 0.05, 0.01), 1e-3 * np.ones(3)
     nominal = left(1.0, 0.05, 0.01)
-    assert rule(found(nominal, first, left(0.018, 0.05, 0.01)), floor, known=False).named == (0,)
-    assert rule(found(nominal, first, left(0.02, 0.04, 0.01)), floor, known=False).named == (0, 1)
+    other = (ViscousDrift(1), Stribeck(1))
+    assert rule(found(nominal, first, left(0.018, 0.05, 0.01), effects=other), floor, known=False).named == (0,)
+    assert rule(found(nominal, first, left(0.02, 0.04, 0.01), effects=other), floor, known=False).named == (0, 1)
+
+
+def test_without_a_floor_a_further_wave_has_a_name_however_small() -> None:
+    """Magnets, teeth and poles have orders of their own, and one wave is no part of another."""
+    first, floor = left(0.02, 0.05, 0.01), 1e-3 * np.ones(3)
+    waves = (Cogging(1), Cogging(1))
+    assert rule(found(left(1.0, 0.05, 0.01), first, left(0.018, 0.05, 0.01), effects=waves), floor, known=False).named == (0, 1)
 
 
 def test_without_a_floor_a_joint_that_stands_in_the_noise_makes_no_cause_of_a_trifle() -> None:
     """Joint 3 has its noise and nothing else: a millionth of it taken away says nothing of a cause at joint 1."""
     first, floor = left(0.02, 0.05, 1e-3), 1e-3 * np.ones(3)
     nominal = left(1.0, 0.05, 1e-3 + 1e-12)
-    assert rule(found(nominal, first, left(0.018, 0.05, 1e-3 - 1e-12)), floor, known=False).named == (0,)
+    other = (ViscousDrift(1), Stribeck(1))
+    assert rule(found(nominal, first, left(0.018, 0.05, 1e-3 - 1e-12), effects=other), floor, known=False).named == (0,)
