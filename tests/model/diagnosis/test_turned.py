@@ -1,0 +1,72 @@
+"""Of two causes at a joint that could be mistaken for each other, the one that leaves less beside all others is believed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis import search as search_module
+from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.ledger import Tried
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.pruned import _apart, _turned
+from pipelines.model.diagnosis.search import Found, search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import hidden
+
+SHARP = 100.0  # [s/rad] of the friction of these arms
+
+
+def one_sided(motion: Motion, drag: float, difference: float) -> np.ndarray:
+    """Joint 1: drag [N m s²/rad²] v|v|, and `difference` [N m] more friction forwards than backwards."""
+    v = motion.dq[:, 0]
+    out = np.zeros_like(motion.q)
+    out[:, 0] = drag * v * np.abs(v) + 0.5 * difference * np.abs(np.tanh(SHARP * v))
+    return out
+
+
+def misled(difference: float, monkeypatch: pytest.MonkeyPatch) -> tuple[Found, Case]:
+    """A search that begins with an offset, of an arm with a drag and that difference (or an offset instead of it, where zero)."""
+    def load(motion: Motion) -> np.ndarray:
+        return one_sided(motion, 0.3, difference) + (0.0 if difference else np.array([0.15, 0.0, 0.0]))
+
+    prepared = prepare(Logs((hidden(1, load), hidden(2, load)), (hidden(3, load, "validate"),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    every = tuple(one for one in families(columns.laws, whole_motion(prepared.data), model.arm)
+                  if one.cause in ("torque_offset", "asymmetric_friction", "quadratic_drag") and one.joint == 1)
+    usual, asked = search_module._fewest, []
+
+    def offset_first(tried: Sequence[Tried]) -> Tried | None:
+        asked.append(tried)
+        offset = [one for one in tried if one.effect.name == "torque_offset"]
+        return offset[0] if len(asked) <= 2 and offset else usual(tried)
+
+    monkeypatch.setattr(search_module, "_fewest", offset_first)
+    case = Case(prepared.data, prepared.judge, model, fit.weight, every, None)
+    return search(case, 3), case
+
+
+def test_an_offset_gives_way_to_the_friction_that_it_stood_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, case = misled(0.3, monkeypatch)
+    names = [step.best.effect.name for step in found.steps if step.best is not None]
+    assert sorted(names) == ["asymmetric_friction", "quadratic_drag", "torque_offset"]
+    every = [0, 1, 2]
+    others = [k for k in every if names[k] != "asymmetric_friction"]
+    kept = _turned(found, others, every, case)
+    assert [names[k] for k in kept] == [name for name in names if name != "torque_offset"]
+
+
+def test_an_offset_that_is_one_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, case = misled(0.0, monkeypatch)
+    names = [step.best.effect.name for step in found.steps if step.best is not None]
+    assert "torque_offset" in names
+    every = list(range(len(names)))
+    kept = _turned(found, _apart(found, every, case), every, case)
+    assert "torque_offset" in [names[k] for k in kept]
