@@ -166,28 +166,35 @@ def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkey
     assert (kept, final) == ([1], (1,))
 
 
-@pytest.mark.parametrize(("joint", "chance"), [(1, False), (3, True)])
-def test_what_falls_at_a_joint_that_a_cause_does_not_act_on_is_no_argument_for_it(
-        joint: int, chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Held-out time shows less at joint 1 alone: a gain of joint 3 has no part in that, whatever the fit made of other numbers."""
+def seen_at(*share: float) -> Any:
+    """A model that leaves so much of an effect at each joint when it has imitated what it can."""
+    return SimpleNamespace(fit=SimpleNamespace(project=lambda torque: np.sqrt(share)))
+
+
+@pytest.mark.parametrize(("joint", "seen", "chance"), [
+    (1, (1.0, 0.0, 0.0), False), (3, (0.0, 0.0, 1.0), True), (3, (0.4, 0.0, 0.6), True), (3, (0.9, 0.0, 0.1), False)])
+def test_what_falls_where_a_cause_neither_acts_nor_is_seen_is_no_argument_for_it(
+        joint: int, seen: tuple[float, ...], chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held-out time shows less at joint 1 alone: a cause at joint 3 has no part in that, whatever the fit made of other numbers;
+    but where the model can imitate it at joint 3, and not what that does to joint 1, it is seen there."""
     acts = np.where(np.arange(1, 4) == joint, 1.0, 1e-15)  # rounding elsewhere: without it the torque is worked out otherwise
     model = SimpleNamespace(torque=lambda data: acts,
                             without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(3)))
-    before, after = SimpleNamespace(), SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs))
+    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(3)))
     less = TorqueGain(np.array([0.5, 0.1, 0.1]), np.array([0.2, 0.1, 0.1]), np.array([[-0.4, -0.2], [-0.1, 0.1], [-0.1, 0.1]]))
     monkeypatch.setattr(findings, "torque_gain", lambda *_: less)
-    assert findings.by_chance(before, after, 0, None, 10) is chance  # type: ignore[arg-type]
+    assert findings.by_chance(seen_at(*seen), after, 0, None, 10) is chance
 
 
 @pytest.mark.parametrize(("rest", "chance"), [(0.097, True), (0.093, False)])
 def test_what_is_sure_and_little_is_no_name(rest: float, chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """3 % off the held-out error, beyond doubt: an arm in order has as much in its ripple. An extension is asked without that."""
     model = SimpleNamespace(torque=lambda data: np.ones(1), without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(1)))
-    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs))
+    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(1)))
     little = TorqueGain(np.array([0.1]), np.array([rest]), np.array([[-0.01, -0.001]]))
     monkeypatch.setattr(findings, "torque_gain", lambda *_: little)
-    assert findings.by_chance(after, after, 0, None, 10, pruned._LITTLE) is chance
-    assert not findings.by_chance(after, after, 0, None, 10)
+    assert findings.by_chance(seen_at(1.0), after, 0, None, 10, pruned._LITTLE) is chance
+    assert not findings.by_chance(seen_at(1.0), after, 0, None, 10)
 
 
 @pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])
