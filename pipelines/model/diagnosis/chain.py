@@ -17,7 +17,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Gain
 from pipelines.model.diagnosis.search import Found
 
-__all__ = ["gains"]
+__all__ = ["gains", "with_some"]
 
 
 def gains(found: Found, named: Sequence[int], order: Sequence[int], simulated: Sequence[Simulation], prepared: Prepared,
@@ -35,13 +35,13 @@ def gains(found: Found, named: Sequence[int], order: Sequence[int], simulated: S
         models = [found.nominal, *(found.steps[k + 1].before for k in as_found[:-1]), found.final]
         runs = list(simulated)
     else:
-        models = [found.nominal, *(_with(found, order[:count]) for count in range(1, len(order))), found.final]
+        models = [found.nominal, *(with_some(found, order[:count]) for count in range(1, len(order))), found.final]
         runs = simulation_errors([acted(one.model.arm, beside) for one in models], prepared.judging or prepared.motions)
     torques = [torque_gain(before, after, prepared.judge, blocks) for before, after in pairwise(models)]
     return [gain_of(torque, before, after) for torque, (before, after) in zip(torques, pairwise(runs), strict=True)]
 
 
-def _with(found: Found, places: Sequence[int]) -> Refined:
+def with_some(found: Found, places: Sequence[int]) -> Refined:
     """The final model with some of its effects only, in the order in which they act, fitted anew."""
     final = found.final
     model = replace(final.model, effects=tuple(final.model.effects[place] for place in sorted(places)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.beside import Part
-from pipelines.model.diagnosis.chain import gains
+from pipelines.model.diagnosis.chain import gains, with_some
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.gains import Simulation, torque_gain, worse_log
@@ -48,11 +49,20 @@ def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prep
     """
     covariance = found.final.covariance()
     steps = [found.steps[k] for k in ruling.named]
-    taken = [explained(step.before.rms, step.best.done.rms, nominal, floor) if step.best else 0.0 for step in steps]
+    models = _in_steps(found, ruling.named, steps)
+    taken = [explained(before.rms, after.rms, nominal, floor) for before, after in models]
     order = sorted(range(len(steps)), key=lambda place: -taken[place])
     worth = gains(found, ruling.named, order, simulated, prepared, beside, blocks) if order else []
-    return once_each(_finding(found, steps[place], best, place, covariance, nominal, floor, gain, draw)
+    return once_each(_finding(found, steps[place], best, place, models[place], covariance, taken[place], floor, gain, draw)
                      for place, gain in zip(order, worth, strict=True) if (best := steps[place].best) is not None)
+
+
+def _in_steps(found: Found, named: Sequence[int], steps: Sequence[Step]) -> list[tuple[Refined, Refined]]:
+    """The models before and after each named cause: as it was found, or, where one before it was dropped since, fitted anew with
+    those that stay."""
+    if list(named) == list(range(len(named))):
+        return [(step.before, step.before if step.best is None else step.best.done) for step in steps]
+    return list(pairwise([found.nominal, *(with_some(found, range(count)) for count in range(1, len(steps))), found.final]))
 
 
 def held_finding(part: Part, nominal: Array, floor: Array, draw: bool) -> Finding:
@@ -79,17 +89,17 @@ def _size(torque: Array, data: Data, joint: int | None, floor: Array) -> tuple[f
     return float(own[where]), where, float(own[where] / rated) if np.isfinite(rated) and rated > 0.0 else np.nan
 
 
-def _finding(found: Found, step: Step, best: Tried, place: int, covariance: Array, nominal: Array, floor: Array, gain: Gain,
-             draw: bool) -> Finding:
+def _finding(found: Found, step: Step, best: Tried, place: int, models: tuple[Refined, Refined], covariance: Array, taken: float,
+             floor: Array, gain: Gain, draw: bool) -> Finding:
     effect, data = best.effect, step.before.data
     rivals = _rivals(step, best)
     torque = data.y - found.final.left - _without(found.final, place)
     size, _, of_rated = _size(torque, data, effect.joint, floor)
     numbers = parameters(found.final, place, covariance)
     origin: Literal["residual", "reversals"] = "reversals" if effect.evidence == "reversals" else "residual"
-    return Finding(effect.name, effect.joint, effect.title, numbers, explained(step.before.rms, best.done.rms, nominal, floor),
-                   best.visibility, rivals, effect.experiment if rivals else None, gain, origin, size, of_rated,
-                   proof(step.before, best.done, effect.joint) if draw else None)
+    return Finding(effect.name, effect.joint, effect.title, numbers, taken, best.visibility, rivals,
+                   effect.experiment if rivals else None, gain, origin, size, of_rated,
+                   proof(*models, effect.joint) if draw else None)
 
 
 def _without(done: Refined, place: int) -> Array:

@@ -28,7 +28,7 @@ def simulated_anew(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(chain, "acted", lambda arm, beside: arm)
     monkeypatch.setattr(chain, "torque_gain", lambda before, after, judge, blocks: None)
     monkeypatch.setattr(chain, "gain_of", lambda torque, before, after: (before, after))
-    monkeypatch.setattr(chain, "_with", lambda found, places: left(f"with {places}"))
+    monkeypatch.setattr(chain, "with_some", lambda found, places: left(f"with {places}"))
     return asked
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,14 @@ from pipelines.model.diagnosis import search as search_module
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.findings import _in_steps
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import _apart, _turned
+from pipelines.model.diagnosis.pruned import _apart, _turned, _without
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.verdict import Ruling, explained
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
 
@@ -61,6 +64,10 @@ def test_an_offset_gives_way_to_the_friction_that_it_stood_for(monkeypatch: pyte
     others = [k for k in every if names[k] != "asymmetric_friction"]
     kept = _turned(found, others, every, case)
     assert [names[k] for k in kept] == [name for name in names if name != "torque_offset"]
+    ruling, all_left = Ruling("cause", tuple(kept), ""), _without(found, kept, case)
+    models = _in_steps(replace(found, final=all_left), ruling.named, [found.steps[k] for k in kept])
+    shares = [explained(before.rms, after.rms, found.nominal.rms, all_left.rms) for before, after in models]
+    assert sum(shares) == pytest.approx(1.0, abs=0.01), "what they explain is told beside each other, and not beside the offset"
 
 
 def test_an_offset_that_is_one_stays(monkeypatch: pytest.MonkeyPatch) -> None:
