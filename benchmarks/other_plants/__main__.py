@@ -25,12 +25,17 @@ __all__ = ["asked", "judged", "main"]
 
 
 def main() -> None:
-    arguments = _parser().parse_args()
+    parser = _parser()
+    arguments = parser.parse_args()
+    if unknown := sorted(set(arguments.names) - {case.name for case in CASES}):
+        parser.error(f"no such case: {', '.join(unknown)}")
     chosen = [case for case in CASES if not arguments.names or case.name in arguments.names][:arguments.count]
     with tempfile.TemporaryDirectory() as place:
         home = arguments.keep or Path(place)
         outcomes = [_one(case, home / case.name) for case in chosen]
     print("; ".join(f"{outcomes.count(one)} {one}" for one in sorted(set(outcomes))))
+    if "crashed" in outcomes:
+        raise SystemExit(1)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -64,7 +69,7 @@ def asked(folder: Path) -> Mapping[str, Any]:
         return by_command(folder, ())
     except RrridError as refused:
         return {"verdict": "refused", "reason": f"{refused.code}: {refused.message}"}
-    except Exception:  # the others are still to come
+    except Exception:  # the others are still to come; the run ends with exit code 1
         return {"verdict": "crashed", "reason": traceback.format_exc(limit=-3)}
 
 
