@@ -26,7 +26,7 @@ from pipelines.log.results import encode
 from pipelines.model.effects import all_effects
 from pipelines.stage import Request, run_stage
 
-__all__ = ["Diagnose", "by_command", "engine_named", "judge", "scores_in", "tasks"]
+__all__ = ["Diagnose", "asked", "by_command", "engine_named", "judge", "scores_in", "tasks"]
 
 Diagnose = Callable[[Path, tuple[str, ...]], Any]
 Task = tuple[Sealed, tuple[str, ...]]
@@ -66,7 +66,7 @@ def judge(out: Path, kept: Path, chosen: Iterable[Task], diagnose: Diagnose) -> 
     for sealed, without in chosen:
         if (sealed.key, without) in known:
             continue
-        line = {"key": sealed.key, "without": list(without), **_asked(out / "logs" / sealed.key, without, diagnose)}
+        line = {"key": sealed.key, "without": list(without), **asked(out / "logs" / sealed.key, without, diagnose)}
         with kept.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
         yield _scored(sealed, line)
@@ -78,7 +78,8 @@ def scores_in(out: Path, kept: Path) -> list[Score]:
     return [_scored(sealed[line["key"]], line) for line in _lines(kept) if line["key"] in sealed]
 
 
-def _asked(folder: Path, without: tuple[str, ...], diagnose: Diagnose) -> dict[str, Any]:
+def asked(folder: Path, without: tuple[str, ...] = (), diagnose: Diagnose = by_command) -> dict[str, Any]:
+    """{"seconds", "cpu", "answer" | "refused" | "crashed"} of one diagnosis."""
     begun, spent = time.perf_counter(), time.process_time()
     said: dict[str, Any]
     try:
@@ -87,7 +88,7 @@ def _asked(folder: Path, without: tuple[str, ...], diagnose: Diagnose) -> dict[s
         said = {"answer": {name: whole[name] for name in _KEPT if name in whole}}
     except RrridError as refused:
         said = {"refused": f"{refused.code}: {refused.message}"}
-    except Exception:  # a campaign of hours goes on, and the table says how often it happened
+    except Exception:  # a campaign of hours goes on, and says how often it happened
         said = {"crashed": traceback.format_exc(limit=-3)}
     return {"seconds": time.perf_counter() - begun, "cpu": time.process_time() - spent, **said}
 

@@ -11,17 +11,15 @@ import argparse
 import shutil
 import tempfile
 import time
-import traceback
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hidden_effects.judge import by_command
+from benchmarks.hidden_effects.judge import asked
 from benchmarks.other_plants.cases import CASES, Case
-from pipelines.errors import RrridError
 from pipelines.log.files import write_log
 
-__all__ = ["asked", "judged", "main"]
+__all__ = ["judged", "main"]
 
 
 def main() -> None:
@@ -56,32 +54,27 @@ def _one(case: Case, folder: Path) -> str:
             write_log(draft / f"{log.name}.h5", log)
         draft.rename(folder)
     begun = time.perf_counter()
-    answer = asked(folder)
-    outcome, said = judged(case, answer)
+    line = asked(folder)
+    outcome, said = judged(case, line)
     print(f"{case.name:36} {case.loop:16} {1e3 * case.sample_time:4g} ms  {outcome:8} {said}  made in {begun - made:.0f} s, "
-          f"{time.perf_counter() - begun:.0f} s", flush=True)
+          f"{line['seconds']:.0f} s, {line['cpu']:.0f} s of CPU", flush=True)
     return outcome
 
 
-def asked(folder: Path) -> Mapping[str, Any]:
-    """The answer as `rrrid diagnose --json` prints it; {"verdict": "refused" | "crashed", "reason"} where there is none."""
-    try:
-        return by_command(folder, ())
-    except RrridError as refused:
-        return {"verdict": "refused", "reason": f"{refused.code}: {refused.message}"}
-    except Exception:  # the others are still to come; the run ends with exit code 1
-        return {"verdict": "crashed", "reason": traceback.format_exc(limit=-3)}
-
-
-def judged(case: Case, answer: Mapping[str, Any]) -> tuple[str, str]:
+def judged(case: Case, line: Mapping[str, Any]) -> tuple[str, str]:
     """"right", "open", "wrong", "refused" or "crashed", and what was said.
+
+    Args:
+        line: as `asked` answers.
 
     A healthy arm is right with nothing wrong, and a cause with its name at its joint and no other name; an "unknown" is open where
     something is wrong, and wrong where nothing is. Friction that the nominal model lacks may be named, or not, but not otherwise.
     """
+    for none in ("refused", "crashed"):
+        if none in line:
+            return none, line[none]
+    answer = line["answer"]
     verdict = answer["verdict"]
-    if verdict in ("refused", "crashed"):
-        return verdict, answer["reason"]
     names = [(one["cause"], one["joint"]) for one in answer["findings"]]
     good = [cause in case.answers and (not case.fault or joint in (None, case.joint) or case.fault == "torque_delay")
             for cause, joint in names]
