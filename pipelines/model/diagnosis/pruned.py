@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.own_motion import following, standing_out
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
-from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
+from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, too_little, without_steps
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unlike_motion", "unnamed", "vague"]
@@ -41,6 +41,7 @@ _LEAST = 0.002  # of the squared residual, where nothing else says what a cause 
 _WRONG, _STRANGE = 8.0, 2.5
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
 _SHAPE = "it only mends the shape of what was found before it at the joint"
+_BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
 _STOOD = "what was found after it at the joint leaves less without it"
 
 
@@ -80,6 +81,9 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     while kept and (why := _harm(found, final, case)):
         doubts[kept.pop()] = why
         final = _without(found, kept, case, final)
+    if known and len(kept) < len(ruling.named) and too_little(found.nominal.rms, final.rms, floor):
+        doubts |= dict.fromkeys(kept, _BESIDE)
+        kept = []
     if kept:
         return Settled(replace(found, final=final), replace(ruling, named=tuple(kept), doubts=doubts), simulated)
     alone = without_steps(found, floor, known)

@@ -16,7 +16,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["Ruling", "at_floor", "excess", "explained", "held_out_high", "rule", "without_steps"]
+__all__ = ["Ruling", "at_floor", "excess", "explained", "held_out_high", "rule", "too_little", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -57,6 +57,11 @@ def explained(before: Array, after: Array, nominal: Array, floor: Array) -> floa
     return float(np.clip((excess(before, floor) - excess(after, floor)) / max(whole, 1e-12), 0.0, 1.0))
 
 
+def too_little(nominal: Array, final: Array, floor: Array) -> bool:
+    """Whether a model leaves more than half of what the nominal one leaves above the floor; each (joints,) [N m] rms."""
+    return bool((nominal > _CLEAR * floor).any()) and explained(nominal, final, nominal, floor) < _HALF
+
+
 def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
     """Which causes are named.
 
@@ -89,9 +94,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
         doubts = {k: _TRIFLE for k, step in enumerate(accepted)
                   if _most_taken(step, found, floor) < _SHAPE and not _one_more(step, accepted[:k])}
         return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
-    whole = excess(found.nominal.rms, floor)
-    total = 1.0 - excess(found.final.rms, floor) / max(whole, 1e-12)
-    if (found.nominal.rms > _CLEAR * floor).any() and total < _HALF:
+    if too_little(found.nominal.rms, found.final.rms, floor):
         if not (found.nominal.rms > _ABOVE * floor).any():  # without that explanation nothing would be wrong
             return Ruling("nothing-wrong", (), "", dict.fromkeys(range(len(accepted)), _LITTLE))
         return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")

@@ -24,6 +24,7 @@ _NEAR = 0.03  # two joints show the same base within such a share of its frequen
 _UNFITTED = 10.0  # misfit beyond which no mode of the fit is believed
 _LEFT = 0.02  # of the response, what it may leave all the same: encoder steps that repeat are in no variance
 _TRACE = 1.3  # rise of a pair that may be only a trace of what another joint, or the base, does
+_LOCKED = 0.1  # of the frequency at which a link swings against its locked motor: where it takes the motion of other joints away
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Finding:
     parameters: Mapping[str, Known]  # as findings report them, SI
     seen_at: tuple[int, ...]  # joints
     faint: bool = False  # its pairs are so small that they may be a trace of what another joint does
+    stands: tuple[Known, ...] = ()  # [Hz] of a base: the antiresonance in each posture
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,7 @@ def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int) ->
     damping = _mean([p.resonance.damping for p in near])
     return Finding("base", None, words, "base_resonance", measured, damping,
                    {"frequency": measured, "damping_ratio": damping, "inertia": inertia}, (joint,),
-                   max(p.rise for p in near) < _TRACE)
+                   max(p.rise for p in near) < _TRACE, tuple(p.antiresonance.frequency for p in near))
 
 
 def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list[float], words: str) -> Finding:
@@ -242,8 +244,9 @@ def _many(values: Sequence[Known]) -> str:
 def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
     """Where the base is known, what other joints show at its frequency is the base as well.
 
-    A base turns under the first joint before any other. What shows at one further joint alone, faintly, while another bends on a
-    spring, may be that spring: its link swings against a motor that its own controller holds.
+    A base turns under the first joint before any other. What shows at one further joint alone, while another bends on a spring, may
+    be that spring, where it is faint or stands still where that spring would make it: its link swings against a motor that its own
+    controller, or friction, holds, and takes the motion away (a tuned absorber: Den Hartog 1934, chapter III).
     """
     rest = [one for one in sure if one.kind != "base"]
     bent = [one for one in rest if one.kind == "joint"]
@@ -257,9 +260,11 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
             both = merged[same]
             merged[same] = replace(both, seen_at=(*both.seen_at, *one.seen_at), faint=both.faint and one.faint)
     left = []
-    for faint in [one for one in merged if one.faint and bent and len(one.seen_at) == 1 and one.seen_at != (1,)]:
-        merged.remove(faint)
-        left.append(_trace(faint, bent[0]))
+    for one in [one for one in merged if len(one.seen_at) == 1 and one.seen_at != (1,)]:
+        spring = next((other for other in bent if one.faint or _absorbed(one, other)), None)
+        if spring is not None:
+            merged.remove(one)
+            left.append(_trace(one, spring))
     for question in unsure:
         place = next((k for k, m in enumerate(merged) if "base_resonance" in question.candidates
                       and _same(m.frequency, question.frequency)), None)
@@ -270,11 +275,18 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
     return (*merged, *rest), tuple(left)
 
 
+def _absorbed(base: Finding, spring: Finding) -> bool:
+    """Whether all that stands still for the base does so where the link behind a spring would swing."""
+    own = spring.frequency
+    return own is not None and bool(base.stands) and all(abs(one.value - own.value) < _LOCKED * own.value for one in base.stands)
+
+
 def _trace(base: Finding, spring: Finding) -> Open:
     joint = base.seen_at[0]
     return Open(joint, base.frequency, ("base_resonance", "joint_elasticity"),
-                f"{base.evidence} But the pair is small, the first joint does not show it, and it may be a trace of joint "
-                f"{spring.joint}, which bends.", f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again")
+                f"{base.evidence} But {'the pair is small, ' if base.faint else ''}the first joint does not show it, and it may be "
+                f"a trace of joint {spring.joint}, which bends.",
+                f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again")
 
 
 def _same(a: Known | None, b: Known | None) -> bool:

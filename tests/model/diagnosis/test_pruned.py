@@ -227,6 +227,28 @@ def test_a_joint_without_rows_is_no_number_in_the_sentence() -> None:
     assert "joint 2 in those held out, 5 times" in believed.ruling.reason
 
 
+@pytest.mark.parametrize(("rest", "verdict"), [(0.04, "cause"), (0.09, "unknown")])
+def test_what_stays_has_to_explain_half_without_what_was_dropped(rest: float, verdict: str,
+                                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two explain everything, and held-out logs do not bear out the first: what the second leaves then decides."""
+    made = searched(left(0.1, 0.01, 0.01), (effect("cogging", 1), left(0.02, 0.01, 0.01)),
+                    (effect("spring", 1), left(0.01, 0.01, 0.01)))
+    for step in made.steps:
+        step.best.effect, step.best.log = SimpleNamespace(last=False), None
+        step.other = None
+    monkeypatch.setattr(pruned, "_simulated", lambda *args: ())
+    monkeypatch.setattr(pruned, "at_odds", lambda found, k, *args: "logs do not agree" if k == 0 else "")
+    monkeypatch.setattr(pruned, "_strays", lambda *args: "")
+    monkeypatch.setattr(pruned, "_by_chance", lambda *args: False)
+    monkeypatch.setattr(pruned, "_harm", lambda *args: "")
+    monkeypatch.setattr(pruned, "_without", lambda *args: left(rest, 0.01, 0.01))
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None)
+    done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
+    assert done.ruling.verdict == verdict
+    assert done.ruling.named == ((1,) if verdict == "cause" else ())
+    assert 0 in done.ruling.doubts
+
+
 @pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])
 def test_what_did_harm_in_a_log_when_it_was_found_is_asked_again_beside_what_was_found_after_it(
         beside: str, odd: bool, monkeypatch: pytest.MonkeyPatch) -> None:
