@@ -24,8 +24,9 @@ from pipelines.model.diagnosis.beside import Held, acted, judged
 from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.chance import BY_CHANCE
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import BY_CHANCE, extended_arm, findings, held_finding
+from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed

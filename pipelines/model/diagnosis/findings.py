@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.beside import Part
 from pipelines.model.diagnosis.chain import gains, with_some
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
-from pipelines.model.diagnosis.gains import Simulation, torque_gain, worse_log
+from pipelines.model.diagnosis.gains import Simulation, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.joined import once_each
@@ -25,13 +25,8 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Val
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
-__all__ = ["BY_CHANCE", "agreement", "by_chance", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
+__all__ = ["agreement", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
 
-BY_CHANCE = "its gain on held-out torque is within what chance does, or too little to be told from an arm in order"
-
-_MOST = 0.5  # of what is seen of an effect
-_HALF = 0.5
-_NOTHING = 1e-9  # of the torque at the joint that an effect acts on most: what is smaller is rounding
 _ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
 _BLOCKS = 10  # of one log, that must agree as logs do
@@ -117,29 +112,6 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
         if one is not best and alike > _ALIKE and one.error < 1.0 and one.possible:
             found.append(Rival(one.screened.cause, one.screened.joint, alike))
     return tuple(sorted(found, key=lambda rival: -rival.similarity))
-
-
-def by_chance(before: Refined, after: Refined, place: int, judge: Data | None, blocks: int, least: float = 0.0) -> bool:
-    """Whether, of all joints that effect number `place` of `after`, which `before` lacks, acts on, or is seen at, no held-out error
-    falls by more than chance does.
-
-    What falls elsewhere is due to other numbers, moved by the fit. An effect is seen at the joint where most of it is left when the
-    model has imitated what it can: a drive of joint 3 that gives too little looks there like a lighter arm, which joint 2 does not
-    have to move.
-
-    Args:
-        least: share of its root mean square that a held-out error has to fall by.
-    """
-    gain = torque_gain(before, after, judge, blocks)
-    torque = after.model.torque(after.data) - _without(after, place)
-    acts = after.data.rms(torque)
-    seen = np.bincount(after.data.joint, before.fit.project(torque) ** 2, minlength=len(acts))
-    # without it the whole torque may be worked out in another order
-    own = (acts > _NOTHING * acts.max()) | (seen > _MOST * seen.sum())
-    # An event, torque that is clipped once say, is in one block of time only, and drawn blocks do not repeat it; but what was
-    # fitted to other time does not take half of the power off by chance.
-    sure = (gain.ci95[:, 1] < 0.0) & (gain.after <= (1.0 - least) * gain.before)
-    return not (sure | (gain.after**2 < _HALF * gain.before**2))[own].any()
 
 
 def unlike(before: Refined, after: Refined, place: int, prepared: Prepared, blocks: int) -> str:

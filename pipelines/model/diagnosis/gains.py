@@ -29,7 +29,8 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Plant, Windows, choose_step, simulate_together, simulate_windows
 
-__all__ = ["Simulation", "farther", "gain_of", "simulation_errors", "torque_gain", "torque_gain_of", "worse_log"]
+__all__ = ["Simulation", "farther", "gain_of", "in_loop", "simulation_errors", "surely_less", "torque_gain", "torque_gain_of",
+           "worse_log"]
 
 _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
@@ -85,6 +86,18 @@ def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
     return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
 
 
+def surely_less(before: Refined, after: Refined, judge: Data | None, blocks: int) -> bool:
+    """Whether the held-out torque error of all joints together falls beyond chance, each in units of what `before` leaves of it."""
+    data = after.data if judge is None else judge
+    left = [held_out_left(x, judge, blocks) for x in (before, after)]
+    scale = np.maximum(data.rms(left[0]), 1e-12)[data.joint]
+    place = data.blocks(_BLOCKS)
+    sums = [np.asarray(np.bincount(place, np.where(data.counts, x, 0.0), minlength=int(place.max()) + 1), dtype=np.float64)
+            for x in (np.square(left[0] / scale), np.square(left[1] / scale), np.ones(len(scale)))]
+    _, high = apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED))
+    return high < 0.0
+
+
 def worse_log(data: Data, before: Array, after: Array) -> str:
     """In which held-out log the torque error grows by more than a tenth, of all joints together; empty where in none."""
     for place, one in enumerate(data.logs):
@@ -122,10 +135,21 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]
     logs = motions[:_LOGS]
     soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
     for closed in (True, False):
+        if closed and not all(in_loop(arms[0], log) for log, _ in logs):
+            continue
         found = shared_out(partial(_if_possible, motions=logs, closed=closed, soft=soft), arms)
         if found[0].how != "none":
             return found
     return [Simulation.none(arm.n_joints) for arm in arms]
+
+
+def in_loop(arm: Arm, log: ExperimentLog) -> bool:
+    """Whether the log's controller is known, and the arm, where the log begins, has an inertia that can be moved."""
+    try:
+        Plant.of(arm).refuse_unphysical(Experiment.of_log(log).q_ref[:1])
+    except InputRejected:
+        return False
+    return True
 
 
 def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:

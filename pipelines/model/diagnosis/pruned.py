@@ -15,8 +15,9 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.case import Case, held_out
+from pipelines.model.diagnosis.chance import BY_CHANCE, no_gain, no_name
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import BY_CHANCE, by_chance, unlike
+from pipelines.model.diagnosis.findings import unlike
 from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
@@ -30,9 +31,6 @@ from pipelines.model.effects.base import Effect
 __all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unlike_motion", "unnamed", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
-# Of the held-out root mean square at some joint, that a cause takes away at least. Ten replicas know the floor to about a tenth,
-# and the best of a thousand shapes takes a fortieth off the logs of an arm in order, held-out ones too: its ripple is in all.
-_LITTLE = 0.05
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
 _ALIKE = 0.25  # of what a cause took away, that one for which it could be mistaken takes as well: weaker ones are no rivals
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
@@ -64,7 +62,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
         doubts |= {k: BY_CHANCE for k in ruling.named
-                   if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks, _LITTLE)}
+                   if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
     believed = [k for k in ruling.named if k not in doubts]
     apart = _apart(found, believed, case)
     kept = _turned(found, apart, believed, case)
@@ -165,19 +163,22 @@ def _harm(found: Found, final: Refined, case: Case) -> str:
     return worse_log(case.data if case.judge is None else case.judge, *left)
 
 
-def _by_chance(step: Step, prepared: Prepared, blocks: int, least: float = 0.0) -> bool:
+def _by_chance(step: Step, prepared: Prepared, blocks: int) -> bool:
     best = step.best
     if best is None or best.log is not None:
         return False
-    return by_chance(step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, blocks, least)
+    return no_name(step, step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, blocks)
 
 
 def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
     """Whether step `k` gained no more than chance when it was found, nor does beside all the others."""
-    if not _by_chance(found.steps[k], prepared, case.blocks):
+    step, others = found.steps[k], [j for j, one in enumerate(found.steps) if one.best is not None and j != k]
+    if step.best is None or step.best.log is not None:
         return False
-    others = [j for j, step in enumerate(found.steps) if step.best is not None and j != k]
-    return not others or by_chance(_without(found, others, case), found.final, k, case.judge, case.blocks)
+    done = step.best.done
+    if not no_gain(step.before, done, len(done.model.effects) - 1, prepared.judge, case.blocks):
+        return False
+    return not others or no_gain(_without(found, others, case), found.final, k, case.judge, case.blocks)
 
 
 def at_odds(found: Found, k: int, prepared: Prepared, case: Case) -> str:
@@ -203,7 +204,7 @@ def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) 
         for k in left:
             more = sorted((*kept, k))
             there = _without(found, more, case, final) if _apart(found, more, case) == more else None
-            if there is None or by_chance(final, there, more.index(k), case.judge, case.blocks, _LITTLE):
+            if there is None or no_name(found.steps[k], final, there, more.index(k), case.judge, case.blocks):
                 others.append(k)
             else:
                 kept, final = more, there

@@ -12,6 +12,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.gains import in_loop
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.simulation import Experiment, simulate
 
@@ -19,14 +20,15 @@ __all__ = ["with_simulation"]
 
 _SECONDS = 3.0  # of the log that are shown
 _POINTS = 1500
+_TRIED = 2  # logs: an arm that runs away in both does so in others
 
 
 def with_simulation(found: Diagnosis, logs: Sequence[ExperimentLog]) -> Diagnosis:
-    """`found` with the position error of both models in the first log whose controller is known; as it is where there is none."""
+    """`found` with the position error of both models in the first log in which neither runs away; as it is where there is none."""
     if not found.evidence or found.nominal is None:
         return found
     arms = (found.nominal, *(() if found.extended is None or not found.findings else (found.extended,)))
-    for log in logs:
+    for log in [log for log in logs if in_loop(found.nominal, log)][:_TRIED]:
         error, *more = shared_out(partial(_error, log=log), arms)
         if error is None or any(other is None for other in more):
             continue

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import findings, pruned
+from pipelines.model.diagnosis import chance, pruned
 from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
@@ -139,7 +139,7 @@ def test_what_gained_no_more_than_chance_is_asked_again_beside_what_was_found_af
     found = searched(left(0.5, 0.5, 0.5), (effect("cogging", 1), left(0.4, 0.5, 0.5)), (effect("cogging", 2), left(0.4, 0.4, 0.5)),
                      (effect("cogging", 3), left(0.4, 0.4, 0.1)))
     monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last=None: tuple(kept))
-    monkeypatch.setattr(pruned, "by_chance", lambda before, after, place, *_: (before, after, place) != ((2,), (0, 2), 0))
+    monkeypatch.setattr(pruned, "no_name", lambda step, before, after, place, *_: (before, after, place) != ((2,), (0, 2), 0))
     assert pruned._asked_again(found, [2], [0, 1], among()) == ([0, 2], (0, 2))
     assert pruned._asked_again(found, [], [0, 1], among()) == ([], ())
 
@@ -159,7 +159,7 @@ def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkey
     one, other = twins()
     found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.05, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
     monkeypatch.setattr(pruned, "imitated", lambda step, family, case: 0.5)
-    monkeypatch.setattr(pruned, "by_chance", lambda *_: False)
+    monkeypatch.setattr(pruned, "no_name", lambda *_: False)
     monkeypatch.setattr(pruned, "_without", lambda found, kept, case, final=None: tuple(kept))
     case = among(effect(one, 1), effect(other, 1))
     kept, final = pruned._asked_again(found, [1], [0], case)
@@ -171,10 +171,10 @@ def seen_at(*share: float) -> Any:
     return SimpleNamespace(fit=SimpleNamespace(project=lambda torque: np.sqrt(share)))
 
 
-@pytest.mark.parametrize(("joint", "seen", "chance"), [
+@pytest.mark.parametrize(("joint", "seen", "lucky"), [
     (1, (1.0, 0.0, 0.0), False), (3, (0.0, 0.0, 1.0), True), (3, (0.4, 0.0, 0.6), True), (3, (0.9, 0.0, 0.1), False)])
 def test_what_falls_where_a_cause_neither_acts_nor_is_seen_is_no_argument_for_it(
-        joint: int, seen: tuple[float, ...], chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        joint: int, seen: tuple[float, ...], lucky: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Held-out time shows less at joint 1 alone: a cause at joint 3 has no part in that, whatever the fit made of other numbers;
     but where the model can imitate it at joint 3, and not what that does to joint 1, it is seen there."""
     acts = np.where(np.arange(1, 4) == joint, 1.0, 1e-15)  # rounding elsewhere: without it the torque is worked out otherwise
@@ -182,19 +182,24 @@ def test_what_falls_where_a_cause_neither_acts_nor_is_seen_is_no_argument_for_it
                             without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(3)))
     after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(3)))
     less = TorqueGain(np.array([0.5, 0.1, 0.1]), np.array([0.2, 0.1, 0.1]), np.array([[-0.4, -0.2], [-0.1, 0.1], [-0.1, 0.1]]))
-    monkeypatch.setattr(findings, "torque_gain", lambda *_: less)
-    assert findings.by_chance(seen_at(*seen), after, 0, None, 10) is chance
+    monkeypatch.setattr(chance, "torque_gain", lambda *_: less)
+    assert chance.by_chance(seen_at(*seen), after, 0, None, 10) is lucky
 
 
-@pytest.mark.parametrize(("rest", "chance"), [(0.097, True), (0.093, False)])
-def test_what_is_sure_and_little_is_no_name(rest: float, chance: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """3 % off the held-out error, beyond doubt: an arm in order has as much in its ripple. An extension is asked without that."""
+@pytest.mark.parametrize(("rest", "gain", "whole", "lucky"), [
+    (0.097, 2.0, True, True), (0.093, 2.0, False, False), (0.097, 4.0, True, False), (0.097, 4.0, False, True)])
+def test_what_is_sure_and_little_is_no_name(rest: float, gain: float, whole: bool, lucky: bool,
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    """3 % off the held-out error, beyond doubt: an arm in order has as much in its ripple, unless the cause gained far more than
+    any replica of such an arm shows, and all joints together bear it out. An extension is asked without that."""
     model = SimpleNamespace(torque=lambda data: np.ones(1), without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(1)))
     after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(1)))
     little = TorqueGain(np.array([0.1]), np.array([rest]), np.array([[-0.01, -0.001]]))
-    monkeypatch.setattr(findings, "torque_gain", lambda *_: little)
-    assert findings.by_chance(seen_at(1.0), after, 0, None, 10, pruned._LITTLE) is chance
-    assert not findings.by_chance(seen_at(1.0), after, 0, None, 10)
+    monkeypatch.setattr(chance, "torque_gain", lambda *_: little)
+    monkeypatch.setattr(chance, "surely_less", lambda *_: whole)
+    step: Any = SimpleNamespace(trials=(SimpleNamespace(accepted=True, gain=gain, threshold=1.0),))
+    assert chance.no_name(step, seen_at(1.0), after, 0, None, 10) is lucky
+    assert not chance.by_chance(seen_at(1.0), after, 0, None, 10)
 
 
 @pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])
