@@ -2,7 +2,7 @@
 
     by_chance(before, after, place, judge, blocks)      at no joint that it acts on, or is seen at, does the error fall surely
     no_gain(before, after, place, judge, blocks)        nor does that of all joints together
-    no_name(step, before, after, place, judge, blocks)  or by so little that an arm in order shows as much
+    no_name(step, before, after, place, judge, blocks)  or it does by so little that an arm in order shows as much
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NOTHING = 1e-9  # of the torque at the joint that an effect acts on most: what 
 # Of the held-out root mean square at some joint, that a cause takes away at least. Ten replicas know the floor to about a tenth,
 # and the best of a thousand shapes takes a fortieth off the logs of an arm in order, held-out ones too: its ripple is in all.
 _LITTLE = 0.05
-_FAR = 3.0  # times its threshold, that a cause gains where no ripple of the twin comes near
+_FAR = 2.0  # times its threshold, that a cause gains where no ripple of the twin comes near
 
 
 def no_gain(before: Refined, after: Refined, place: int, judge: Data | None, blocks: int) -> bool:
@@ -37,12 +37,11 @@ def no_name(step: Step, before: Refined, after: Refined, place: int, judge: Data
     """Whether effect number `place` of `after`, which `before` lacks and `step` has found, takes no more off the held-out error
     than chance does, or so little that it is not told from an arm in order.
 
-    What gained many times what the twin shows of it is told, however little it takes, where the error of all joints together surely
-    falls.
+    What gained many times what the twin shows of it is told, however little it takes.
     """
     if not by_chance(before, after, place, judge, blocks, _LITTLE):
         return False
-    return not (_stands_out(step) and surely_less(before, after, judge, blocks))
+    return not _stands_out(step) or no_gain(before, after, place, judge, blocks)
 
 
 def _stands_out(step: Step) -> bool:
