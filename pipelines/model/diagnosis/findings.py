@@ -143,7 +143,8 @@ def agreement(done: Refined, place: int, prepared: Prepared) -> list[float]:
             own = parts == part
             s, r = share[own] * weights[own], left[own] * weights[own]
             power = float(s @ s)
-            if power > _TELLS * float(r @ r) / max(len(r), 1) * 10.0:
+            rows = max(int(np.count_nonzero(data.counts[own])), 1)  # those of joints that are held are none
+            if power > _TELLS * float(r @ r) / rows * 10.0:
                 scales.append(1.0 + float(s @ r) / power)
     return scales
 

@@ -30,7 +30,7 @@ _REST_OF_GAP = 0.6  # the same beside a gap: where the link is in it hangs on lu
 # hundredths of its torque, and what it leaves looks like other causes.
 _SHAPE = 1e-3
 _TRIFLE = "it takes away less than what the law of a cause found before it may leave"
-_MISFIT = "beside a gap, whose law leaves more than the floor at some moments, nothing that happened once is told from it"
+_MISFIT = "beside a gap, of which nobody knows where in it the link lay, nothing that happened once is told from it"
 _LITTLE = "it explains less than half of what stands above the floor, which is so little that it may be the floor"
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
              "testable without a floor: reference logs, or logs whose controller is known and a twin")
@@ -101,7 +101,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")
-    doubts = {k: _MISFIT for k, step in enumerate(accepted) if _happened(step)} if gap and len(joints) else {}
+    doubts = {k: _MISFIT for k, step in enumerate(accepted) if _happened(step)} if gap else {}
     return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
 
 

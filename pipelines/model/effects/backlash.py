@@ -21,7 +21,7 @@ _FLANK_HZ = 80.0  # of the link on a closed flank, the motor locked: stiff besid
 _LINK = 0.1  # of the inertia that the joint feels: what stays with the link at least
 _TIGHT = 1e-5  # [rad] what no gear is tighter than
 _NOTHING = 1e-6  # [N m] that leave the link in the middle of the gap at first
-_CROSSING = 3e-3  # [s] that the joint's usual torque needs to carry the link through the gap's lubricant
+_CROSSINGS = (3e-3, 1e-2, 3e-2)  # [s] that the joint's usual torque needs to carry the link through the gap's lubricant
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,14 @@ class Backlash(Effect):
         return np.asarray(more[..., None])
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Gaps a good third apart, for too small a gap explains nothing; a motor of a tenth of what the joint feels."""
+        """Gaps a good third apart, for too small a gap explains nothing; lubricants a factor of three apart, for where one far too
+        thin is looked for, the gap's torque comes and goes by chance; a motor of a tenth of what the joint feels."""
         motor = 0.1 * float(np.mean(_felt(arm, motion.q, self._index)))
         usual = float(np.median(np.abs(self.own(_rigid(arm, motion))))) or 1.0
         for gap in np.geomspace(3e-4, 6.6e-3, 10).tolist():
-            yield replace(self, gap=gap, film=float(np.clip(_CROSSING * usual / gap, 0.0, 1e3)), motor_inertia=min(motor, 10.0))
+            for crossing in _CROSSINGS:
+                film = float(np.clip(crossing * usual / gap, 0.0, 1e3))
+                yield replace(self, gap=gap, film=film, motor_inertia=min(motor, 10.0))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm is the links; angle and speed of the motor are two states, and friction acts on the motor."""

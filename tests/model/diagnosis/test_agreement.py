@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,3 +47,23 @@ def test_parts_of_one_log_are_asked_where_there_is_no_other(share: float, agree:
         assert (scales < 0.2).any()
         assert (scales > 1.5).any()
         assert "parts of the log do not agree" in said or "larger" in said
+
+
+@pytest.mark.parametrize(("held", "asked"), [(0, True), (100, True), (400, False)])
+def test_a_log_that_hardly_shows_a_cause_is_not_asked_for_its_size(held: int, asked: bool) -> None:
+    """Its power is 260 in 100 rows, in units of their noise; asked is from 90 on, and where noise is twice as loud from 360 on.
+    Rows of joints that are held make it no quieter."""
+    rows = np.r_[np.ones(100), np.zeros(held)]
+    share, left = 1.7 * np.sqrt(90.0 / 100.0) * rows, rows * np.tile([1.0, -1.0], (100 + held) // 2)
+
+    def model(torque: Any) -> Any:
+        return SimpleNamespace(torque=lambda data: torque)
+
+    def data(quiet: float) -> Any:
+        return SimpleNamespace(y=share + quiet * left, joint=(rows < 1.0).astype(int), counts=rows > 0.0,
+                               log_of=np.zeros(len(rows), dtype=int))
+
+    whole: Any = SimpleNamespace(torque=lambda data: share, without=lambda place: model(np.zeros(len(rows))))
+    done: Any = SimpleNamespace(model=whole, weight=np.ones(2))
+    prepared: Any = SimpleNamespace(data=data(1.0 if asked else 2.0), judge=data(1e-3))
+    assert len(agreement(done, 0, prepared)) == (2 if asked else 1)
