@@ -54,13 +54,18 @@ class Twin:
 
     @property
     def rms(self) -> Array:
-        """(joints,) [N m] over all replicas: the floor."""
-        return np.asarray(np.sqrt(np.mean(np.square([one.rms for one in self.fits]), axis=0)))
+        """(joints,) [N m] over all replicas: the floor. Of copies, which keep no basis."""
+        return np.asarray(np.sqrt(np.mean(np.square([replace(one).rms for one in self.fits]), axis=0)))
 
     def weighted(self, weight: Array) -> tuple[Fit, Array]:
         """The fit of the first replica and the residuals (replicas, rows) of all, weighted, joints weighted like this."""
-        fits = [fit_columns(one.data, one.table, one.y, weight) for one in self.fits]
-        return fits[0], np.array([one.residual for one in fits])
+        first = self._weighted(0, weight)
+        return first, np.array([first.residual, *(self._weighted(k, weight).residual for k in range(1, len(self.fits)))])
+
+    def _weighted(self, k: int, weight: Array) -> Fit:
+        """Made anew when it is asked for: each would keep a basis as large as its table, and there are many replicas."""
+        one = self.fits[k]
+        return fit_columns(one.data, one.table, one.y, weight)
 
 
 def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
