@@ -276,9 +276,11 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
 
 
 def _absorbed(base: Finding, spring: Finding) -> bool:
-    """Whether all that stands still for the base does so where the link behind a spring would swing."""
+    """Whether all that stands still for the base does so where the link behind the spring of another joint would swing."""
     own = spring.frequency
-    return own is not None and bool(base.stands) and all(abs(one.value - own.value) < _LOCKED * own.value for one in base.stands)
+    if own is None or spring.joint in base.seen_at:  # at its own joint the spring has a pair of its own, which the base's is not
+        return False
+    return bool(base.stands) and all(abs(one.value - own.value) < _LOCKED * own.value for one in base.stands)
 
 
 def _trace(base: Finding, spring: Finding) -> Open:

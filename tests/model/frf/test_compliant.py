@@ -150,10 +150,11 @@ def test_the_base_is_known_again_at_other_joints() -> None:
 
 @pytest.mark.parametrize(("stands", "seen_at", "named"), [
     ((47.0, 48.5), (2,), ["joint"]), ((47.0, 52.0), (2,), ["base", "joint"]), ((47.0, 48.5), (2, 3), ["base", "joint"]),
-    ((), (2,), ["base", "joint"])])
+    ((47.0, 48.5), (3,), ["base", "joint"]), ((), (2,), ["base", "joint"])])
 def test_a_base_that_stands_where_a_spring_swings_is_left_open(stands: tuple[float, ...], seen_at: tuple[int, ...],
                                                                named: list[str]) -> None:
-    """The link behind a spring, its motor held, absorbs what moves below it at its own frequency; a base would by chance."""
+    """The link behind a spring, its motor held, absorbs what moves below it at its own frequency; a base would by chance.
+    Beside a spring at its own joint both have a pair, and both are told."""
     base = Finding("base", None, "", "base_resonance", Known(58.0, 2.0), Known(0.3, 0.01), {}, seen_at,
                    stands=tuple(Known(one, 0.1) for one in stands))
     joint = Finding("joint", 3, "", "joint_elasticity", Known(46.0, 0.1), Known(0.03, 1e-3), {}, (3,))
