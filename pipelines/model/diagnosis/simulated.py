@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -24,11 +25,12 @@ _TRIED = 2  # logs: an arm that runs away in both does so in others
 
 
 def with_simulation(found: Diagnosis, logs: Sequence[ExperimentLog]) -> Diagnosis:
-    """`found` with the position error of both models in the first log in which neither runs away; as it is where there is none."""
+    """`found` with the position error of both models in the first log in which neither runs away; as it is where that is neither of
+    the first two that can be simulated."""
     if not found.evidence or found.nominal is None:
         return found
     arms = (found.nominal, *(() if found.extended is None or not found.findings else (found.extended,)))
-    for log in [log for log in logs if in_loop(found.nominal, log)][:_TRIED]:
+    for log in islice(filter(partial(in_loop, found.nominal), logs), _TRIED):
         error, *more = shared_out(partial(_error, log=log), arms)
         if error is None or any(other is None for other in more):
             continue

@@ -1,0 +1,54 @@
+"""Which log shows measured over simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis import simulated
+
+
+@dataclass(frozen=True)
+class Evidence:
+    simulated_t: Any = None
+    simulated_position_error: Any = None
+    simulated_log: str = ""
+    extended_position_error: Any = None
+
+
+@dataclass(frozen=True)
+class Told:
+    evidence: tuple[Evidence, ...]
+    nominal: str = "nominal"
+    extended: str = "extended"
+    findings: tuple[str, ...] = ("one",)
+
+
+@pytest.mark.parametrize(("in_loop", "away", "shown", "looked_at"), [
+    ("abc", "", "a", "a"), ("bc", "b", "c", "abc"), ("abcd", "ab", "", "ab"), ("d", "", "d", "abcd"), ("", "", "", "abcd")])
+def test_the_first_log_in_which_no_model_runs_away_is_shown(in_loop: str, away: str, shown: str, looked_at: str,
+                                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two that can be simulated; no log behind these is looked at. That the extended model runs away is enough."""
+    seen: list[str] = []
+
+    def known(arm: str, log: Any) -> bool:
+        seen.append(log.name)
+        return log.name in in_loop
+
+    def error(arm: str, log: Any) -> Any:
+        return None if arm == "extended" and log.name in away else np.full((3, 1), float(len(arm)))
+
+    monkeypatch.setattr(simulated, "in_loop", known)
+    monkeypatch.setattr(simulated, "_error", error)
+    monkeypatch.setattr(simulated, "shared_out", lambda work, arms: [work(arm) for arm in arms])
+    logs: Any = [SimpleNamespace(name=name, t=np.arange(3.0) + 5.0) for name in "abcd"]
+    told: Any = Told((Evidence(), Evidence()))
+    first, second = simulated.with_simulation(told, logs).evidence
+    assert (first.simulated_log, "".join(seen), second) == (shown, looked_at, Evidence())
+    if shown:
+        assert first.simulated_t.tolist() == [0.0, 1.0, 2.0]
+        assert (first.simulated_position_error[0], first.extended_position_error[0]) == (7.0, 8.0)
