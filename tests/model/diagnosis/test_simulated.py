@@ -47,7 +47,8 @@ def test_the_first_log_in_which_no_model_runs_away_is_shown(in_loop: str, away: 
     monkeypatch.setattr(simulated, "shared_out", lambda work, arms: [work(arm) for arm in arms])
     logs: Any = [SimpleNamespace(name=name, t=np.arange(3.0) + 5.0) for name in "abcd"]
     told: Any = Told((Evidence(), Evidence()))
-    first, second = simulated.with_simulation(told, logs).evidence
+    found: Any = simulated.with_simulation(told, logs)
+    first, second = found.evidence
     assert (first.simulated_log, "".join(seen), second) == (shown, looked_at, Evidence())
     if shown:
         assert first.simulated_t.tolist() == [0.0, 1.0, 2.0]
