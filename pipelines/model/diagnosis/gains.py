@@ -1,6 +1,7 @@
 """What a finding is worth on what was held out: torque residual, simulated position, tip.
 
     torque_gain(before, after, case)        with its bootstrap interval
+    surely_less(before, after, own, ...)    of all joints together
     simulation_errors(arms, logs)           position error of each arm, in closed loop or over short windows
     farther(before, after)                  whether the second is worse than chance does
 """
@@ -32,6 +33,8 @@ from pipelines.model.simulation import Experiment, Plant, Windows, choose_step, 
 __all__ = ["Simulation", "farther", "gain_of", "in_loop", "simulation_errors", "surely_less", "torque_gain", "torque_gain_of",
            "worse_log"]
 
+Mask = npt.NDArray[np.bool_]
+
 _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
 _LONGEST = 5.0  # [s] of a log that is simulated
@@ -41,6 +44,7 @@ _FINE = 1e-3  # [s] between torques that drive a window: a faster log's are aver
 _EXACT = 1e-3  # of the position error, to which it is worked out
 _ROUGH = 1e-2  # the same, where something moves beside the joints: a hundredth is far less than what chance does to the error
 _LOGS = 2  # that are simulated
+_THERE = 0.5  # of the share that all joints together fall by, by which those have to where a cause acts or is seen
 _WORSE = 1.1  # times the error of a held-out log, that an extension must not exceed
 
 
@@ -86,16 +90,19 @@ def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
     return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
 
 
-def surely_less(before: Refined, after: Refined, judge: Data | None, blocks: int) -> bool:
-    """Whether the held-out torque error of all joints together falls beyond chance, each in units of what `before` leaves of it."""
+def surely_less(before: Refined, after: Refined, own: Mask, judge: Data | None, blocks: int) -> bool:
+    """Whether the held-out torque error of all joints together falls beyond chance, each in units of what `before` leaves of it,
+    and at the joints `own` (joints,) together by half of that share at least."""
     data = after.data if judge is None else judge
     left = [held_out_left(x, judge, blocks) for x in (before, after)]
     scale = np.maximum(data.rms(left[0]), 1e-12)[data.joint]
     place = data.blocks(_BLOCKS)
-    sums = [np.asarray(np.bincount(place, np.where(data.counts, x, 0.0), minlength=int(place.max()) + 1), dtype=np.float64)
-            for x in (np.square(left[0] / scale), np.square(left[1] / scale), np.ones(len(scale)))]
-    _, high = apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED))
-    return high < 0.0
+    ours, theirs, rows = (np.asarray(np.bincount(place, np.where(data.counts, x, 0.0), minlength=int(place.max()) + 1), dtype=float)
+                          for x in (np.square(left[0] / scale), np.square(left[1] / scale), np.ones(len(scale))))
+    _, high = apart(ours, theirs, rows, np.random.default_rng(_SEED))
+    here = data.counts & own[data.joint]
+    there = float(np.sum(np.square(left[1] / scale)[here]) / max(np.sum(np.square(left[0] / scale)[here]), 1e-300))
+    return high < 0.0 and 1.0 - there >= _THERE * (1.0 - float(theirs.sum() / max(ours.sum(), 1e-300)))
 
 
 def worse_log(data: Data, before: Array, after: Array) -> str:

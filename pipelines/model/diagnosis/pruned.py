@@ -62,7 +62,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
         doubts |= {k: BY_CHANCE for k in ruling.named
-                   if k not in doubts and _by_chance(found.steps[k], prepared, case.blocks)}
+                   if k not in doubts and _not_told(found.steps[k], prepared, case.blocks)}
     believed = [k for k in ruling.named if k not in doubts]
     apart = _apart(found, believed, case)
     kept = _turned(found, apart, believed, case)
@@ -79,7 +79,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     while kept and (why := _harm(found, final, case)):
         doubts[kept.pop()] = why
         final = _without(found, kept, case, final)
-    if known and len(kept) < len(ruling.named) and too_little(found.nominal.rms, final.rms, floor):
+    if known and len(kept) < len(found.final.model.effects) and too_little(found.nominal.rms, final.rms, floor):
         doubts |= dict.fromkeys(kept, _BESIDE)
         kept = []
     if kept:
@@ -163,7 +163,7 @@ def _harm(found: Found, final: Refined, case: Case) -> str:
     return worse_log(case.data if case.judge is None else case.judge, *left)
 
 
-def _by_chance(step: Step, prepared: Prepared, blocks: int) -> bool:
+def _not_told(step: Step, prepared: Prepared, blocks: int) -> bool:
     best = step.best
     if best is None or best.log is not None:
         return False

@@ -21,7 +21,7 @@ __all__ = ["with_simulation"]
 
 _SECONDS = 3.0  # of the log that are shown
 _POINTS = 1500
-_TRIED = 2  # logs: an arm that runs away in both does so in others
+_TRIED = 2  # logs: where an arm runs away in both, others are hardly worth the time
 
 
 def with_simulation(found: Diagnosis, logs: Sequence[ExperimentLog]) -> Diagnosis:

@@ -30,7 +30,7 @@ _REST_OF_GAP = 0.6  # the same beside a gap: where the link is in it hangs on lu
 # hundredths of its torque, and what it leaves looks like other causes.
 _SHAPE = 1e-3
 _TRIFLE = "it takes away less than what the law of a cause found before it may leave"
-_MISFIT = "beside a gap, of which nobody knows where in it the link lay, nothing that happened once is told from it"
+_MISFIT = "beside a gap, where nobody knows how the link lay in it at first, nothing that happened once is told from it"
 _LITTLE = "it explains less than half of what stands above the floor, which is so little that it may be the floor"
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
              "testable without a floor: reference logs, or logs whose controller is known and a twin")
@@ -58,7 +58,8 @@ def explained(before: Array, after: Array, nominal: Array, floor: Array) -> floa
 
 
 def too_little(nominal: Array, final: Array, floor: Array) -> bool:
-    """Whether a model leaves more than half of what the nominal one leaves above the floor; each (joints,) [N m] rms."""
+    """Whether a model leaves more than half of what the nominal one leaves above the floor, where that surely stands above it; each
+    (joints,) [N m] rms."""
     return bool((nominal > _CLEAR * floor).any()) and explained(nominal, final, nominal, floor) < _HALF
 
 
@@ -90,8 +91,9 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
         if len(joints) and known:
             return Ruling("unknown", (), f"the residual of {high} stands above the floor, and no cause explains it")
         return Ruling("nothing-wrong", (), _NO_FLOOR if len(joints) else "")
+    once = {k: _MISFIT for k, step in enumerate(accepted) if gap and _happened(step)}
     if not known:
-        doubts = {k: _TRIFLE for k, step in enumerate(accepted)
+        doubts = once | {k: _TRIFLE for k, step in enumerate(accepted)
                   if _most_taken(step, found, floor) < _SHAPE and not _one_more(step, accepted[:k])}
         return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
     if too_little(found.nominal.rms, found.final.rms, floor):
@@ -101,8 +103,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")
-    doubts = {k: _MISFIT for k, step in enumerate(accepted) if _happened(step)} if gap else {}
-    return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
+    return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in once), "", once)
 
 
 def _one_more(step: Step, before: Sequence[Step]) -> bool:

@@ -21,6 +21,7 @@ _FLANK_HZ = 80.0  # of the link on a closed flank, the motor locked: stiff besid
 _LINK = 0.1  # of the inertia that the joint feels: what stays with the link at least
 _TIGHT = 1e-5  # [rad] what no gear is tighter than
 _NOTHING = 1e-6  # [N m] that leave the link in the middle of the gap at first
+_THICKEST = 1e6  # [N m s/rad], or [N s/m]
 _CROSSINGS = (3e-3, 1e-2, 3e-2)  # [s] that the joint's usual torque needs to carry the link through the gap's lubricant
 
 
@@ -43,7 +44,7 @@ class Backlash(Effect):
     title = "Backlash"
     parameters = (
         Quantity("gap", "rad", 0.0, 0.1, "free play, from flank to flank", shape=True),
-        Quantity("film", "N m s/rad", 0.0, 1e3, "drag of the lubricant in the open gap", shape=True),
+        Quantity("film", "N m s/rad", 0.0, _THICKEST, "drag of the lubricant in the open gap", shape=True),
         Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
         Quantity("coefficient", "1", 0.0, 2.0, "share of its torque: 1 where the model of the gap is right"),
     )
@@ -92,7 +93,7 @@ class Backlash(Effect):
         usual = float(np.median(np.abs(self.own(_rigid(arm, motion))))) or 1.0
         for gap in np.geomspace(3e-4, 6.6e-3, 10).tolist():
             for crossing in _CROSSINGS:
-                film = float(np.clip(crossing * usual / gap, 0.0, 1e3))
+                film = min(crossing * usual / gap, _THICKEST)
                 yield replace(self, gap=gap, film=film, motor_inertia=min(motor, 10.0))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:

@@ -261,10 +261,11 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
             merged[same] = replace(both, seen_at=(*both.seen_at, *one.seen_at), faint=both.faint and one.faint)
     left = []
     for one in [one for one in merged if len(one.seen_at) == 1 and one.seen_at != (1,)]:
-        spring = next((other for other in bent if one.faint or _absorbed(one, other)), None)
-        if spring is not None:
+        others = [other for other in bent if other.joint != one.seen_at[0]]  # at its own joint a spring has a pair of its own
+        springs = [*(other for other in others if _absorbed(one, other)), *(others if one.faint else ())]
+        if springs:
             merged.remove(one)
-            left.append(_trace(one, spring))
+            left.append(_trace(one, springs[0]))
     for question in unsure:
         place = next((k for k, m in enumerate(merged) if "base_resonance" in question.candidates
                       and _same(m.frequency, question.frequency)), None)
@@ -276,18 +277,16 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
 
 
 def _absorbed(base: Finding, spring: Finding) -> bool:
-    """Whether all that stands still for the base does so where the link behind the spring of another joint would swing."""
+    """Whether all that stands still for the base does so where the link behind the spring would swing."""
     own = spring.frequency
-    if own is None or spring.joint in base.seen_at:  # at its own joint the spring has a pair of its own, which the base's is not
-        return False
-    return bool(base.stands) and all(abs(one.value - own.value) < _LOCKED * own.value for one in base.stands)
+    return own is not None and bool(base.stands) and all(abs(one.value - own.value) < _LOCKED * own.value for one in base.stands)
 
 
 def _trace(base: Finding, spring: Finding) -> Open:
     joint = base.seen_at[0]
     return Open(joint, base.frequency, ("base_resonance", "joint_elasticity"),
-                f"{base.evidence} But {'the pair is small, ' if base.faint else ''}the first joint does not show it, and it may be "
-                f"a trace of joint {spring.joint}, which bends.",
+                f"{base.evidence} But {'the pair is small, ' if base.faint else ''}it is sure at this joint alone, and it may be a "
+                f"trace of joint {spring.joint}, which bends.",
                 f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again")
 
 

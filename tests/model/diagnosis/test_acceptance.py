@@ -114,16 +114,19 @@ def test_all_joints_together_tell_what_no_single_one_does(monkeypatch: pytest.Mo
         rms=lambda x: np.sqrt(np.bincount(joint, x**2) / rows), blocks=lambda count: np.tile(np.arange(rows) * count // rows, 3))
     monkeypatch.setattr(gains, "held_out_left", lambda done, judge, count: done)
     loud = np.array([10.0, 1.0, 1.0])[joint]
-    told, alone, false = 0, 0, 0
+    told, alone, false, elsewhere = 0, 0, 0, 0
+    own = np.array([True, False, False])
     for _ in range(100):
         cause, moved = (0.12 * loud * rng.standard_normal(3 * rows) for _ in range(2))
         noise = loud * rng.standard_normal(3 * rows)
-        told += gains.surely_less(noise + cause, noise, data, blocks)
+        told += gains.surely_less(noise + cause, noise, own | True, data, blocks)
+        elsewhere += gains.surely_less(noise + 3.0 * cause, np.where(joint == 0, noise + 3.0 * cause, noise), own, data, blocks)
         alone += bool(gains.torque_gain_of(data, noise + cause, noise).ci95[0, 1] < 0.0)
-        false += gains.surely_less(noise + cause, noise + moved, data, blocks)
+        false += gains.surely_less(noise + cause, noise + moved, own, data, blocks)
     assert told > 50
     assert alone < told / 2
     assert false <= 5
+    assert not elsewhere  # a cause at joint 1 has no part in what falls at the others
 
 
 def test_rows_of_a_joint_that_is_held_do_not_count() -> None:

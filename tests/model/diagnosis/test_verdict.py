@@ -93,15 +93,15 @@ def test_two_causes_share_what_stands_above_the_floor() -> None:
     assert rule(case, FLOOR).named == (0, 1)
 
 
-@pytest.mark.parametrize("rest", [0.03, 0.011])
-def test_beside_a_gap_no_event_is_named(rest: float) -> None:
+@pytest.mark.parametrize(("rest", "known"), [(0.03, True), (0.011, True), (0.03, False)])
+def test_beside_a_gap_no_event_is_named(rest: float, known: bool) -> None:
     """Where the link is in a gap, at the start of a log above all, no law has to the last: at some moments more is left, as after a
     touch. That is so where all else is explained, too."""
     case = found(left(0.01, 0.3, 0.01), left(0.01, 0.05, 0.01), left(0.01, rest, 0.01))
     for step, (effect, happened) in zip(case.steps, ((Backlash(2), False), (Contact(), True)), strict=False):
         step.best.effect = effect
         step.best.screened = SimpleNamespace(family=SimpleNamespace(event=happened))
-    ruling = rule(case, FLOOR)
+    ruling = rule(case, FLOOR, known)
     assert ruling.named == (0,)
     assert set(ruling.doubts) == {1}
 
