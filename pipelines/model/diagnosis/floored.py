@@ -62,9 +62,10 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
         return None
     if twin is None:
         return None
-    found = Thresholds.of_twin(twin, case.families, model.nominal, weight)
+    weighted = twin.weighted(weight)
+    found = Thresholds.of_twin(*weighted, case.families, model.nominal)
     return Calibration(
         origin_of("twin", [prepared.motions[place][0] for place in places], model.nominal, chosen), conditions_of(prepared), weight,
         twin.rms, twin.noise, bounds_of(case.families, found.gain, found.own), found.wide,
         floors_of(twin.data, twin.fits[0].left) if chosen.evidence else (),
-        following(*twin.weighted(weight)).max(axis=1))
+        following(*weighted).max(axis=1))

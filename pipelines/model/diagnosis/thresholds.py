@@ -15,8 +15,8 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.screen import Screened, screen
-from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.diagnosis.wide import TIMES, USELESS, Wide, median
 
 __all__ = ["Thresholds", "without_twin"]
@@ -37,20 +37,21 @@ class Thresholds:
     several: tuple[int, ...] = ()  # which of the families these are, in the order of `wide`
 
     @classmethod
-    def of_twin(cls, twin: Twin, families: Sequence[Family], arm: Arm, weight: Array) -> Thresholds:
-        fit, residuals = twin.weighted(weight)
-        found = screen(twin.data, fit, families, arm, residuals)
+    def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], arm: Arm) -> Thresholds:
+        """`residuals` (replicas, rows), weighted, that `fit` leaves: as `Twin.weighted` makes them."""
+        data, weight = fit.data, fit.weight
+        found = screen(data, fit, families, arm, residuals)
         own = np.array([one.gain.max() for one in found])
         joints = tuple(f.joint for f in families)
         once = np.array([f.event for f in families])
         usual = np.array([median(own[[j == joint and not event for j, event in zip(joints, once, strict=True)]])
                           for joint in range(1, len(weight) + 1)])
-        left = np.asarray(np.bincount(twin.data.joint, np.mean(residuals**2, axis=0), minlength=len(weight)), dtype=np.float64)
+        left = np.asarray(np.bincount(data.joint, np.mean(residuals**2, axis=0), minlength=len(weight)), dtype=np.float64)
         place = np.array([(joint or 1) - 1 for joint in joints])
         gain = TIMES * np.max([own, np.where(once, 0.0, usual[place]), USELESS * left[place]], axis=0)
-        several = sorted(_on_several(twin.data, families, arm), key=lambda place: joints[place] is not None)
+        several = sorted(_on_several(data, families, arm), key=lambda place: joints[place] is not None)
         wide = Wide.of_twin(fit, residuals, [families[place] for place in several], usual, left, arm)
-        return cls(gain, own, f"{len(twin.fits)} replicas of the twin", weight, joints, wide, tuple(several))
+        return cls(gain, own, f"{len(residuals)} replicas of the twin", weight, joints, wide, tuple(several))
 
     def at(self, weight: Array) -> Thresholds:
         """The same with other weights: a cause acts on its joint; one on several is looked for anew, or counts where most."""
