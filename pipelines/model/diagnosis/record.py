@@ -32,12 +32,17 @@ def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
     return table
 
 
-def passed_rows(data: Data, effect: Effect, amplitude: float, x: Array, whole: bool = False) -> Array:
-    """(…, rows) with the rows of the effect's joint as they come out of it; `whole` torque begins where the log does."""
+def passed_rows(data: Data, effect: Effect, amplitude: float, x: Array, whole: bool = False, own: bool = False) -> Array:
+    """(…, rows) with the rows of the effect's joint as they come out of it; `whole` torque begins where the log does.
+
+    Args:
+        own: `x` has the rows of that joint alone.
+    """
     out, first, joint = x.copy(), 0, (effect.joint or 1) - 1
     for one in data.logs:
-        own = slice(first + joint * one.rows, first + (joint + 1) * one.rows)
+        before, count = (0, 1) if own else (joint, one.n_joints)
+        here = slice(first + before * one.rows, first + (before + 1) * one.rows)
         start = None if one.motion.logged is None else float(one.y[joint, 0]) if whole else 0.0
-        out[..., own] = effect.passed(amplitude, x[..., own], one.t, start)
-        first += one.n_joints * one.rows
+        out[..., here] = effect.passed(amplitude, x[..., here], one.t, start)
+        first += count * one.rows
     return out

@@ -5,6 +5,9 @@
 A lag slower than the motion hides most of the torque from the nominal model, inertia above all: the model that was fitted without
 it is so wrong that its derivative says nothing. So every column of the model goes through the lag, and amplitudes are solved
 anew, Golub & Pereyra 2003: gain = |r|² - min |y - H(Y β)|². Once for each lag on a grid; an exact refit then moves it.
+
+H changes the rows of one joint. With Q an orthonormal basis of the model, which r is orthogonal to, and d = Yβ - H(Yβ) the rest
+follows from those rows alone, marked j: HQ (HQ)ᵀ = 1 - Q_j Q_jᵀ + HQ_j (HQ_j)ᵀ and HQ (r + d) = HQ_j (r + d)_j - Q_j r_j.
 """
 
 from __future__ import annotations
@@ -14,12 +17,14 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.nominal import Fit, orthonormal
+from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.record import passed_rows
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.effects.base import Effect
 
 __all__ = ["beyond_first_order", "passed_through"]
+
+_RANK = 1e-12  # of the largest eigenvalue: what is smaller is rounding
 
 
 def passed_through(data: Data, fit: Fit, effect: Effect, residuals: Array) -> tuple[Array, Array] | None:
@@ -33,14 +38,19 @@ def passed_through(data: Data, fit: Fit, effect: Effect, residuals: Array) -> tu
     """
     if effect.joint is None or not effect.passing or not data.counts.all():
         return None
+    own = data.joint == effect.joint - 1
+    weight, basis, rest = float(fit.weight[effect.joint - 1]), fit.basis[:, own], residuals[:, own]
+    others, power = np.eye(len(basis)) - basis @ basis.T, np.sum(np.square(rest), axis=1)
     gains = []
     for amplitude in effect.passing:
-        table = passed_rows(data, effect, amplitude, fit.table)
-        modelled = passed_rows(data, effect, amplitude, fit.modelled, whole=True)
-        left = (fit.modelled - modelled) * fit.weights + residuals
-        basis = orthonormal(table * fit.weights)
-        left -= (left @ basis.T) @ basis
-        gains.append(np.sum(np.square(residuals), axis=1) - np.sum(np.square(left), axis=1))
+        passed = passed_rows(data, effect, amplitude, fit.basis[:, own], own=True)
+        modelled = passed_rows(data, effect, amplitude, fit.modelled[own], own=True, whole=True)
+        left = rest + weight * (fit.modelled[own] - modelled)
+        moment = left @ passed.T - rest @ basis.T
+        values, vectors = np.linalg.eigh(others + passed @ passed.T)
+        turned = (moment @ vectors)[:, values > _RANK * values[-1]]
+        imitated = np.sum(np.square(turned) / values[values > _RANK * values[-1]], axis=1)
+        gains.append(power - np.sum(np.square(left), axis=1) + imitated)
     best = np.argmax(gains, axis=0)
     return np.max(gains, axis=0), np.array(effect.passing)[best]
 
