@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from pipelines.log.experiment import Array
@@ -17,7 +20,7 @@ from pipelines.model.diagnosis.screen import INVISIBLE, Screened, gains_of
 from pipelines.model.diagnosis.through import beyond_first_order
 from pipelines.model.effects.base import Effect
 
-__all__ = ["best_form", "fitted", "laid_whole"]
+__all__ = ["best_form", "fitted", "laid_whole", "plainer"]
 
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
 _DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
@@ -35,6 +38,27 @@ def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     if tried.possible or effect.fixed_amplitudes is not None or one.amplitude is not None or not effect.free:
         return tried
     return _in_range(case, now, one, error) or tried
+
+
+def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error: float) -> Tried | None:
+    """The cause that, in the form that screening takes, has one number more than `best` at its joint and is worth it; None where
+    none is.
+
+    A spring along one line beside an offset, say: where gravity takes most of either, the spring's whole polynomial would be too
+    much for what it explains beyond the offset. A number is worth log n of the squared residual in units of its variance
+    (Schwarz 1978).
+    """
+    worth = []
+    for one in tried:
+        shape = one.screened.shape[0]
+        if one is best or one.screened.joint != best.screened.joint or one.log is not None or shape == one.effect:
+            continue
+        plain = replace(_refitted(case, now, one.screened, shape, error), sure=True)
+        numbers = plain.done.model.effects[-1].count - best.done.model.effects[-1].count
+        price = numbers * np.log(case.data.rows) * plain.done.rss / case.data.rows
+        if numbers == 1 and plain.possible and plain.rank < best.rank and plain.done.rss < best.done.rss - price:
+            worth.append(plain)
+    return min(worth, key=lambda one: one.rank, default=None)
 
 
 def _in_range(case: Case, now: Refined, one: Screened, error: float) -> Tried | None:

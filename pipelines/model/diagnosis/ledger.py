@@ -30,6 +30,7 @@ class Tried:
     error: float  # squared weighted error as a share of that before: held out; of an event, of the logs it happened in
     rank: float  # lowest first: the same, and what is left of the fitted logs, on a par
     visibility: float
+    sure: bool = False  # it leaves less than another with a number fewer, by more than the number is worth
 
     @property
     def possible(self) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.borne_out import borne_out, not_borne_out
 from pipelines.model.diagnosis.case import Case, held_out
-from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole
+from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole, plainer
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import orthonormal
 from pipelines.model.diagnosis.refit import Refined, refine
@@ -204,6 +204,9 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     done = {id(one.screened): one for one in there}
     tried = [done.get(id(one)) or fitted(case, now, one, error) for one in great]
     best = _fewest(sorted(tried, key=lambda one: one.rank))
+    plain = None if best is None else plainer(case, now, tried, best, error)
+    if plain is not None:
+        best, tried = plain, [plain if one.screened is plain.screened else one for one in tried]
     tried = [best_form(case, now, one, error) if one is best else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
 
@@ -249,7 +252,8 @@ def _other(passing: Sequence[Screened], best: Tried | None, tried: Sequence[Trie
 
 
 def _fewest(tried: Sequence[Tried]) -> Tried | None:
-    """Of those that leave nearly as little as the best, the one with fewest numbers; none where the best leaves no less."""
+    """Of those that leave nearly as little as the best, one whose further number is worth it, else the one with fewest;
+    none where the best leaves no less."""
     possible = [one for one in tried if one.error < 1.0 and one.possible]
     if not possible:
         return None
@@ -257,7 +261,7 @@ def _fewest(tried: Sequence[Tried]) -> Tried | None:
     joint = possible[0].screened.joint
     near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least) and one.screened.joint == joint
             and (joint is None or one.done.rms[joint - 1] <= _WORSE * possible[0].done.rms[joint - 1])]
-    return min(near, key=lambda one: (one.done.model.effects[-1].count, one.rank))
+    return min(near, key=lambda one: (not one.sure, one.done.model.effects[-1].count, one.rank))
 
 
 def clean(explored: Explored, most: int = 8) -> Array:

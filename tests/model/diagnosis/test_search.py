@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis import hypotheses
 from pipelines.model.diagnosis import search as search_module
 from pipelines.model.diagnosis.candidates import Family, families, whole_motion
 from pipelines.model.diagnosis.case import Case
@@ -163,6 +164,30 @@ def test_eleven_waves_a_turn_could_have_passed_for_themselves_and_for_no_spring(
     assert there["cogging", 2] > 0.9
     assert there["spring", 2] < 0.25
     assert there["cogging", 1] < 0.25
+
+
+@pytest.mark.parametrize(("less", "rank", "numbers", "taken"), [
+    (12.0, 0.49, 2, True), (6.0, 0.49, 2, False), (12.0, 0.51, 2, False), (12.0, 0.49, 3, False)])
+def test_a_further_number_is_taken_for_what_it_is_worth(less: float, rank: float, numbers: int, taken: bool,
+                                                        monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring along one line beside an offset: of 3000 rows of unit variance a number is worth log 3000, 8.0. It is not taken
+    where held-out time says otherwise, nor with two more."""
+
+    def fit(effect: Any, rss: float, at: float, count: int) -> Any:
+        model = SimpleNamespace(effects=(SimpleNamespace(effect=effect, count=count, possible=True),))
+        done: Any = SimpleNamespace(rss=rss, model=model, rms=np.ones(3))
+        screened: Any = SimpleNamespace(joint=2, shape=(find_effect(effect.name)(joint=2),), cause=effect.name)
+        return Tried(screened, effect, None, done, 0.5, at, 0.1)
+
+    line = find_effect("spring")(joint=2)
+    offset, whole = fit(find_effect("torque_offset")(joint=2), 3000.0, 0.5, 1), fit(replace(line, degree=5), 2995.0, 0.495, 6)
+    monkeypatch.setattr(hypotheses, "_refitted", lambda *_: fit(line, 3000.0 - less, rank, numbers))
+    case: Any = SimpleNamespace(data=SimpleNamespace(rows=3000))
+    found = hypotheses.plainer(case, cast(Any, None), [whole, offset], offset, 1.0)
+    assert (found is not None) is taken
+    if found is not None:
+        assert search_module._fewest(sorted([offset, found], key=lambda one: one.rank)) is found
+    assert search_module._fewest([whole, offset]) is offset
 
 
 def test_two_scales_of_torque_that_are_one_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
