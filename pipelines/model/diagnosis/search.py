@@ -6,7 +6,8 @@
     found.steps                     what each step tried
 
 A step ends the search where no cause exceeds its threshold, or where the best, fitted exactly, brings nothing on what was held
-out. Rivals are ranked by the error they leave on held-out rows; of those that leave nearly the same, the one with fewest numbers.
+out. Rivals are ranked by the error they leave on held-out rows; of those that leave nearly the same, the one with fewest numbers,
+or with one more that is worth it.
 """
 
 from __future__ import annotations
