@@ -99,7 +99,7 @@ def best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:
         return best
     chosen, least = best, _DECIDED * _left_at(case, best)
     for form in best.effect.forms():
-        other = _refitted(case, now, best.screened, form, error)
+        other = replace(_refitted(case, now, best.screened, form, error), sure=best.sure)
         if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < least:
             chosen, least = other, left
     return chosen

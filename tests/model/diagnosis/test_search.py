@@ -190,6 +190,23 @@ def test_a_further_number_is_taken_for_what_it_is_worth(less: float, rank: float
     assert search_module._fewest([whole, offset]) is offset
 
 
+@pytest.mark.parametrize("sure", [True, False])
+def test_another_law_of_a_cause_is_as_sure_of_it(sure: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring that was worth its number beside an offset is not given up for the offset when it turns out to harden."""
+    line, left = find_effect("spring")(joint=2), {False: 1.0, True: 0.5}
+
+    def fit(effect: Any, certain: bool) -> Any:
+        done: Any = SimpleNamespace(model=SimpleNamespace(effects=(SimpleNamespace(possible=True),)))
+        return Tried(cast(Any, None), effect, None, done, 0.5, 0.5, 0.1, certain)
+
+    straight = replace(line, degree=1, highest=5)
+    monkeypatch.setattr(hypotheses, "_refitted", lambda case, now, one, effect, error: fit(effect, False))
+    monkeypatch.setattr(hypotheses, "_left_at", lambda case, tried: left[tried.effect.degree > 1])
+    found = hypotheses.best_form(cast(Any, None), cast(Any, None), fit(straight, sure), 1.0)
+    assert found.effect.degree > 1
+    assert found.sure is sure
+
+
 def test_two_scales_of_torque_that_are_one_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """The drive of joint 3 gives a tenth less than its log tells, and a great wave at joint 1 hides what that does there. If the
     search begins with the scale of joint 2, it needs that of joint 1 beside it; of scales only the ratios show."""
