@@ -3,6 +3,8 @@
     python -m benchmarks.other_plants                          all
     python -m benchmarks.other_plants gantry-cogging six-tanh  these
     python -m benchmarks.other_plants --count 5 --keep FOLDER  the first five; logs stay in FOLDER, and are taken from there
+    python -m benchmarks.other_plants --drawn 3 --count 40     forty drawn at random, the third time
+    python -m benchmarks.other_plants --part 1/2               every second
 """
 
 from __future__ import annotations
@@ -17,17 +19,23 @@ from typing import Any
 
 from benchmarks.hidden_effects.judge import asked
 from benchmarks.other_plants.cases import CASES, Case
+from benchmarks.other_plants.drawn import drawn
 from pipelines.log.files import write_log
 
 __all__ = ["judged", "main"]
+
+_USUAL = 48
 
 
 def main() -> None:
     parser = _parser()
     arguments = parser.parse_args()
-    if unknown := sorted(set(arguments.names) - {case.name for case in CASES}):
+    cases = CASES if arguments.drawn is None else drawn(arguments.count or _USUAL, arguments.drawn)
+    if unknown := sorted(set(arguments.names) - {case.name for case in cases}):
         parser.error(f"no such case: {', '.join(unknown)}")
-    chosen = [case for case in CASES if not arguments.names or case.name in arguments.names][:arguments.count]
+    chosen = [case for case in cases if not arguments.names or case.name in arguments.names][:arguments.count]
+    which, parts = map(int, arguments.part.split("/"))
+    chosen = chosen[which - 1::parts]
     with tempfile.TemporaryDirectory() as place:
         home = arguments.keep or Path(place)
         outcomes = [_one(case, home / case.name) for case in chosen]
@@ -40,6 +48,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="; ".join(case.name for case in CASES))
     parser.add_argument("--count", type=int, help="no more than so many")
+    parser.add_argument("--drawn", type=int, metavar="SEED", help=f"cases drawn at random, {_USUAL} where no --count says how many")
+    parser.add_argument("--part", default="1/1", help="1/2, 2/2, …: every second of them")
     parser.add_argument("--keep", type=Path, help="where logs stay")
     return parser
 

@@ -19,13 +19,13 @@ from pipelines.log import schema
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.robot import format_robot
 
-__all__ = ["CASES", "Case"]
+__all__ = ["BEFORE", "CASES", "DELAY", "FIVE", "FOUR", "SLOW", "THREE", "Case"]
 
 Motions = tuple[tuple[str, str], ...]  # kind of motion, role of its log
-_FOUR: Motions = (("fourier", "identify"), ("moves", "identify"), ("fourier", "validate"), ("moves", "validate"))
-_FIVE: Motions = (*_FOUR[:2], ("ramps", "identify"), *_FOUR[2:])
-_THREE: Motions = (("fourier", "identify"), ("fourier", "validate"), ("moves", "validate"))
-_BEFORE: Motions = (("fourier", "reference"), ("moves", "reference"))
+FOUR: Motions = (("fourier", "identify"), ("moves", "identify"), ("fourier", "validate"), ("moves", "validate"))
+FIVE: Motions = (*FOUR[:2], ("ramps", "identify"), *FOUR[2:])
+THREE: Motions = (("fourier", "identify"), ("fourier", "validate"), ("moves", "validate"))
+BEFORE: Motions = (("fourier", "reference"), ("moves", "reference"))
 _SIZE = {"torque_offset": 0.1, "cogging": 0.1, "spring": 0.12, "hopping torque": 0.1}  # of the joint's typical torque
 
 
@@ -40,7 +40,7 @@ class Case:
     resolution: float = 1e-5  # [rad or m] of the encoders; a tenth of it on slides
     noise: float = 0.004  # of the typical torque
     coloured: bool = False
-    motions: Motions = _FOUR
+    motions: Motions = FOUR
     duration: float = 12.0  # [s] of each log
     fault: str = ""
     joint: int = 1
@@ -123,38 +123,38 @@ def _friction(kind: str, typical: Array, speed: Array, rng: np.random.Generator)
     return Friction(kind, coulomb, viscous, width, rng.uniform(0.08, 0.15, n) * speed)
 
 
-_DELAY = ("time_delay", "drive_lag")
-_SLOW = ("stribeck", "presliding", "three_sigmoid")
+DELAY = ("time_delay", "drive_lag")
+SLOW = ("stribeck", "presliding", "three_sigmoid")
 HEALTHY = (
     Case("pendulum", "tanh", "pd", 1e-3),
-    Case("pendulum", "root", "cascade", 2e-3, motions=_THREE),
-    Case("lift", "tanh", "pid", 1e-3, motions=_FIVE),
+    Case("pendulum", "root", "cascade", 2e-3, motions=THREE),
+    Case("lift", "tanh", "pid", 1e-3, motions=FIVE),
     Case("lift", "arctan", "cascade", 1e-3),
-    Case("table", "root", "pid", 1e-3, motions=_FIVE),
+    Case("table", "root", "pid", 1e-3, motions=FIVE),
     Case("table", "tanh", "computed torque", 5e-4, coloured=True),
     Case("planar", "arctan", "pd", 2e-3),
-    Case("planar", "tanh", "cascade", 4e-3, motions=_FIVE, duration=15.0),
+    Case("planar", "tanh", "cascade", 4e-3, motions=FIVE, duration=15.0),
     Case("upright", "tanh", "pid", 4e-3),
-    Case("upright", "root", "pd", 1e-3, motions=_FIVE, coloured=True),
-    Case("upright", "arctan", "pd+gravity", 1e-3, motions=_THREE),
+    Case("upright", "root", "pd", 1e-3, motions=FIVE, coloured=True),
+    Case("upright", "arctan", "pd+gravity", 1e-3, motions=THREE),
     Case("upright", "tanh", "cascade", 1e-3, resolution=2e-4, number_in_name=2),
     Case("scara", "tanh", "pid", 1e-3),
-    Case("scara", "root", "cascade", 2e-3, motions=_FIVE),
-    Case("gantry", "tanh", "pd", 1e-3, motions=_FIVE),
+    Case("scara", "root", "cascade", 2e-3, motions=FIVE),
+    Case("gantry", "tanh", "pd", 1e-3, motions=FIVE),
     Case("gantry", "arctan", "computed torque", 2e-3, coloured=True),
     Case("wrist", "tanh", "pd", 1e-3, resolution=1e-4),
     Case("wrist", "root", "pd+gravity", 1e-3),
     Case("six", "tanh", "pid", 1e-3),
     Case("six", "root", "cascade", 2e-3, duration=10.0),
-    Case("upright", "stribeck", "pid", 1e-3, motions=_FIVE, answers=_SLOW),
-    Case("upright", "lugre", "cascade", 1e-3, motions=_FIVE, answers=_SLOW),
-    Case("planar", "lugre", "pd", 1e-3, answers=_SLOW),
-    Case("planar", "tanh", "pid", 1e-3, motions=(*_BEFORE, *_FOUR), number_in_name=2))
+    Case("upright", "stribeck", "pid", 1e-3, motions=FIVE, answers=SLOW),
+    Case("upright", "lugre", "cascade", 1e-3, motions=FIVE, answers=SLOW),
+    Case("planar", "lugre", "pd", 1e-3, answers=SLOW),
+    Case("planar", "tanh", "pid", 1e-3, motions=(*BEFORE, *FOUR), number_in_name=2))
 FAULTY = (
     Case("planar", "root", "pid", 1e-3, fault="torque_offset", joint=2, answers=("torque_offset",)),
     Case("gantry", "tanh", "cascade", 1e-3, fault="torque_offset", joint=1, answers=("torque_offset",)),
     Case("upright", "tanh", "pid", 1e-3, fault="cogging", joint=2, number=14.3, answers=("cogging",)),
-    Case("gantry", "root", "pd", 1e-3, motions=_FIVE, fault="cogging", joint=2, number=2.0 * np.pi / 0.03, answers=("cogging",)),
+    Case("gantry", "root", "pd", 1e-3, motions=FIVE, fault="cogging", joint=2, number=2.0 * np.pi / 0.03, answers=("cogging",)),
     Case("six", "tanh", "pid", 1e-3, fault="cogging", joint=3, number=22.0, answers=("cogging",)),
     Case("scara", "tanh", "pid", 2e-3, fault="spring", joint=1, answers=("spring",)),
     Case("gantry", "arctan", "cascade", 1e-3, fault="spring", joint=3, number=0.05, answers=("spring",)),
@@ -163,15 +163,15 @@ FAULTY = (
     Case("upright", "tanh", "pid", 1e-3, duration=15.0, fault="viscous_drift", joint=1, size=-0.6, answers=("viscous_drift",)),
     Case("table", "arctan", "cascade", 1e-3, duration=15.0, fault="viscous_drift", joint=1, size=0.8, answers=("viscous_drift",)),
     Case("upright", "arctan", "pd", 1e-3, fault="asymmetric_friction", joint=3, size=0.3, answers=("asymmetric_friction",)),
-    Case("lift", "tanh", "cascade", 1e-3, motions=_FIVE, fault="load_friction", joint=1, size=0.08, answers=("load_friction",)),
-    Case("planar", "tanh", "pid", 1e-3, motions=_FIVE, fault="load_friction", joint=1, size=0.12, answers=("load_friction",)),
+    Case("lift", "tanh", "cascade", 1e-3, motions=FIVE, fault="load_friction", joint=1, size=0.08, answers=("load_friction",)),
+    Case("planar", "tanh", "pid", 1e-3, motions=FIVE, fault="load_friction", joint=1, size=0.12, answers=("load_friction",)),
     Case("upright", "root", "cascade", 1e-3, fault="gravity_tilt", size=0.09, number=0.8, answers=("gravity_tilt",)),
     Case("scara", "arctan", "pd", 1e-3, fault="gravity_tilt", size=0.09, number=2.0, answers=("gravity_tilt",)),
-    Case("upright", "tanh", "pid", 1e-3, fault="torque_delay", size=4e-3, answers=_DELAY),
+    Case("upright", "tanh", "pid", 1e-3, fault="torque_delay", size=4e-3, answers=DELAY),
     Case("wrist", "tanh", "pd", 1e-3, fault="torque_crosstalk", joint=2, size=0.15, number=0, answers=("torque_crosstalk",)),
-    Case("upright", "root", "pid", 1e-3, motions=(*_BEFORE, *_FOUR), fault="payload", size=0.6, answers=("payload",)),
-    Case("six", "tanh", "pid", 2e-3, motions=(*_BEFORE, *_FOUR), fault="payload", size=0.6, answers=("payload",)),
-    Case("scara", "root", "pd", 1e-3, motions=(*_BEFORE, *_FOUR), fault="cogging", joint=2, number=18.0, answers=("cogging",)),
+    Case("upright", "root", "pid", 1e-3, motions=(*BEFORE, *FOUR), fault="payload", size=0.6, answers=("payload",)),
+    Case("six", "tanh", "pid", 2e-3, motions=(*BEFORE, *FOUR), fault="payload", size=0.6, answers=("payload",)),
+    Case("scara", "root", "pd", 1e-3, motions=(*BEFORE, *FOUR), fault="cogging", joint=2, number=18.0, answers=("cogging",)),
     Case("upright", "tanh", "pid", 1e-3, fault="heat from another joint", joint=3, number=1),
     Case("planar", "root", "cascade", 1e-3, fault="hopping torque", joint=1),
     Case("scara", "tanh", "pid", 1e-3, fault="hopping torque", joint=2))
