@@ -1,36 +1,67 @@
 """By which curve dry friction changes its sign: nobody knows it of a real joint, and no cause is to be found in that.
 
-    wrong_law(found)        one law of friction has a name at several joints, which is no fault but how this make of arm rubs, or
-                            bends where dry friction changes its sign
-    loosened(prepared)      the same rows, for laws that fit the curve as well
+    of_one_law(causes)          one law of friction is among the greatest causes of several joints
+    wrong_law(found)            or has a name at several, which is no fault but how this make of arm rubs; or it bends where dry
+                                friction changes its sign
+    loosened(prepared)          the same rows, for laws that fit the curve as well
+    shows(prepared, other)      whether these leave less
+    plainer_of(found, again)    which of the two diagnoses holds
 
-It is asked after a diagnosis by the laws as they are, and not from the start: a torque that is late, or another joint's, bends the
+It is asked after a look by the laws as they are, and not from the start: a torque that is late, or another joint's, bends the
 curve as well, and what that takes in is missed as a hump at low speed once the cause has been found.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.result import Diagnosis, Finding
 from pipelines.model.effects import find_effect
 
-__all__ = ["loosened", "wrong_law"]
+__all__ = ["SEVERAL", "loosened", "of_one_law", "plainer_of", "shows", "wrong_law"]
 
+SEVERAL = 2  # joints
+_LESS = 0.95
 _WIDTHS = 10.0  # by then tanh and the root have come to their level, within half a per cent
 
 
 def wrong_law(found: Diagnosis) -> bool:
-    """Whether the same law of friction was found at two joints or more, or one that bends where dry friction changes its sign;
-    not of what has changed, for that it was before as well."""
+    """Whether the same law of friction was found at two joints or more, or one that bends where dry friction changes its sign.
+
+    What has no name in the end may be what the search did not come to: it takes no more than a few causes, and an arm may have
+    more joints. Of what has changed nothing else is asked, for a curve was the same before: but other motion shows more of it.
+    """
     if found.question == "what has changed":
-        return False
-    laws = [one for one in found.findings if find_effect(one.cause).friction]
-    return any(count > 1 for count in Counter(one.cause for one in laws).values()) or any(_turning(one, found) for one in laws)
+        return found.verdict == "unknown"
+    named = [(one.cause, one.joint) for one in found.findings]
+    tried = [(one.cause, one.joint) for one in found.ledger if one.accepted] if found.verdict == "unknown" else []
+    return (of_one_law([*named, *tried])
+            or any(_turning(one, found) for one in found.findings if find_effect(one.cause).friction))
+
+
+def of_one_law(causes: Iterable[tuple[str, int | None]]) -> bool:
+    """Whether the same law of friction is among these causes and their joints at several joints."""
+    places = Counter(name for name, _ in set(causes))
+    return any(count >= SEVERAL and find_effect(name).friction for name, count in places.items())
+
+
+def shows(prepared: Prepared, other: Prepared) -> bool:
+    """Whether the `loosened` laws, `other`, leave clearly less of some joint."""
+    less, most = (fit_nominal(one.data, one.columns)[1].rms for one in (other, prepared))
+    return bool((less < _LESS * most).any())
+
+
+def plainer_of(found: Diagnosis, again: Diagnosis) -> Diagnosis:
+    """The one that finds less; of one without a name and one that has an answer, the answer."""
+    if found.verdict == "unknown":
+        return found if again.verdict == "unknown" else again
+    return min(found, again, key=lambda one: len(one.findings))
 
 
 def _turning(law: Finding, found: Diagnosis) -> bool:

@@ -10,7 +10,7 @@ is left; search with the twin's thresholds; judge what was found on held-out log
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.change_of_sign import loosened, wrong_law
+from pipelines.model.diagnosis.change_of_sign import SEVERAL, loosened, of_one_law, plainer_of, shows, wrong_law
 from pipelines.model.diagnosis.compliance import Compliance
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
@@ -36,7 +36,7 @@ from pipelines.model.diagnosis.pruned import settled, unlike_motion, unnamed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
-from pipelines.model.diagnosis.search import Found, gap_first, gives_way, provisional, search
+from pipelines.model.diagnosis.search import Explored, Found, gap_first, gives_way, greatest, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
@@ -66,23 +66,39 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
     prepared = memory.prepared(logs, chosen, arm)
-    found = _diagnosed(prepared, chosen, say, calibration, memory)
-    other = loosened(prepared) if wrong_law(found) else prepared
-    if other is prepared:
+    seen = _looked_at(prepared, chosen, say, calibration, memory)
+    other, again = loosened(prepared), None
+    if other is not prepared and of_one_law(greatest(seen.rough)):
+        say("fitting by which curve friction changes its sign")
+        again = _diagnosed(_looked_at(other, chosen, say, calibration, Memory()), chosen, say, calibration, Memory())
+        if len(again.findings) < SEVERAL:
+            return again
+    found = _diagnosed(seen, chosen, say, calibration, memory)
+    if other is prepared or not wrong_law(found) or (prepared.reference is not None and not shows(prepared, other)):
         return found
-    say("fitting by which curve friction changes its sign")
-    return min(found, _diagnosed(other, chosen, say, calibration, Memory()), key=lambda one: len(one.findings))
+    if again is None:
+        say("fitting by which curve friction changes its sign")
+        again = _diagnosed(_looked_at(other, chosen, say, calibration, Memory()), chosen, say, calibration, Memory())
+    return plainer_of(found, again)
 
 
-def _diagnosed(prepared: Prepared, chosen: DiagnosisSettings, say: Callable[[str], None], calibration: Calibration | None,
-               memory: Memory) -> Diagnosis:
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Logs at a first look."""
+
+    first: Responding
+    case: Case
+    prepared: Prepared
+    rough: tuple[Explored, ...]  # the greatest causes; empty where there are reference logs to compare with
+
+
+def _looked_at(prepared: Prepared, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None, memory: Memory) -> _Seen:
     if prepared.logs.frf:
         say("looking at the frequency responses")
     first = responding(_plain(prepared, chosen, calibration, memory), prepared, chosen.without)
-    if first.held.prepared.reference is not None:
-        say("comparing with the reference logs")
-        return _changed(first, first.held.prepared.reference, chosen, calibration, memory)
     case, prepared = _nameable(first.held.case, first.stiff), first.held.prepared
+    if prepared.reference is not None:
+        return _Seen(first, case, prepared, ())
     say("looking for the greatest causes")
     rough = provisional(case)
     if first.stiff is not None and not first.stiff.named and gives_way(rough[0]):
@@ -91,7 +107,15 @@ def _diagnosed(prepared: Prepared, chosen: DiagnosisSettings, say: Callable[[str
         there = _nameable(_case(slow, chosen), first.stiff)
         seen = provisional(there)
         if gap_first(seen[0]):
-            case, prepared, rough, first = there, slow, seen, replace(first, held=Held(there, slow))
+            return _Seen(replace(first, held=Held(there, slow)), there, slow, seen)
+    return _Seen(first, case, prepared, rough)
+
+
+def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None, memory: Memory) -> Diagnosis:
+    first, case, prepared, rough = seen.first, seen.case, seen.prepared, seen.rough
+    if prepared.reference is not None:
+        say("comparing with the reference logs")
+        return _changed(first, prepared.reference, chosen, calibration, memory)
     say("simulating the twin" if calibration is None else "taking the stored thresholds")
     floored = floored_by(prepared, case, rough, chosen, calibration)
     say("looking for causes")

@@ -82,6 +82,10 @@ class Exact:
     def without(self, place: int) -> Exact:
         return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
 
+    def beside(self, nominal: Exact) -> Exact:
+        """Its effects beside another nominal model."""
+        return replace(nominal, effects=tuple(_following(one, nominal.columns.laws) for one in self.effects))
+
     @cached_property
     def nominal(self) -> Arm:
         return nominal_arm(self.columns, self.beta)

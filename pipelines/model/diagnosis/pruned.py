@@ -290,8 +290,7 @@ def _without(found: Found, kept: list[int], case: Case, weighted: Refined | None
     effects = found.final.model.effects
     if len(kept) == len(last.model.effects):
         return last
-    step = found.steps[len(kept) - 1].best if kept else None
-    if step is not None and kept == list(range(len(kept))):  # it was fitted like this before
-        return refine(step.done.model, case.data, last.weight)
+    if kept and kept == list(range(len(kept))):  # it was fitted like this before
+        return refine(found.steps[len(kept)].before.model, case.data, last.weight)
     model = Exact(found.final.model.columns, found.final.model.beta, tuple(effects[k] for k in kept))
     return refine(model, case.data, last.weight)

@@ -20,6 +20,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.borne_out import borne_out, not_borne_out
 from pipelines.model.diagnosis.case import Case, held_out
+from pipelines.model.diagnosis.curves import with_curves_anew
 from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole, plainer
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import orthonormal
@@ -29,7 +30,7 @@ from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.diagnosis.waves import without_waves
 
-__all__ = ["Explored", "Found", "Step", "clean", "gap_first", "gives_way", "provisional", "search"]
+__all__ = ["Explored", "Found", "Step", "clean", "gap_first", "gives_way", "greatest", "provisional", "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
@@ -97,6 +98,12 @@ def provisional(case: Case) -> tuple[Explored, ...]:
             break
         now = _reweighted(best.done)
     return tuple(found)
+
+
+def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:
+    """Of what `provisional` found, the causes that explain much of what their joint leaves, and their joints."""
+    found = [(one, best) for one in rough if (best := _fewest(one.tried)) is not None]
+    return [(best.effect.name, best.effect.joint) for one, best in found if _share(best.screened, one.before) >= _LARGE]
 
 
 def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
@@ -281,6 +288,7 @@ def clean(explored: Explored, most: int = 8) -> Array:
 
 def _reweighted(done: Refined) -> Refined:
     """Joints weighted by what this model leaves of them."""
+    done = with_curves_anew(done)
     for _ in range(_ROUNDS):
         weight = 1.0 / np.maximum(done.rms, 1e-12)
         settled = np.abs(weight / done.weight - 1.0).max() < _SETTLED

@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, orthonormal
 from pipelines.model.diagnosis.screen import Screened, for_each, products_apart, screen, screen_event
 from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.wide import TIMES
+from pipelines.model.diagnosis.wide import ONCE, TIMES
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Chance", "Chosen", "apart", "bounds", "changes", "fit_changed", "joined", "standing_set"]
@@ -271,5 +271,5 @@ def bounds(families: Sequence[Family], wanted: Sequence[bool], fit: Fit, later: 
     once = np.array([f.event for f in families])
     there = [own[(joint == j) & np.isfinite(own) & ~once] for j in range(fit.data.n_joints + 1)]
     usual = np.array([np.median(some) if len(some) else 0.0 for some in there])
-    gain = np.maximum(TIMES * np.maximum(own, np.where(once, 0.0, usual[joint])), least[joint])
+    gain = np.maximum(TIMES * np.where(once, ONCE * own, np.maximum(own, usual[joint])), least[joint])
     return Thresholds(gain, own, "reference logs", fit.weight, tuple(f.joint for f in families))

@@ -1,7 +1,8 @@
 """What a cause has to exceed before it is believed: what the twin, in which nothing is wrong, shows of it and of its like.
 
 A threshold is three times the largest of: the most that any replica gives the cause itself; what half the causes at the same place
-get, which keeps the luck of few replicas out; and a hundredth of what is left at the joint, which is of no use to anybody.
+get, which keeps the luck of few replicas out; and a hundredth of what is left at the joint, which is of no use to anybody. What
+happened once has to exceed twice that, for no other log bears it out.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pipelines.model.diagnosis.candidates import Family, lay_family
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.screen import Screened, screen
-from pipelines.model.diagnosis.wide import TIMES, USELESS, Wide, median
+from pipelines.model.diagnosis.wide import ONCE, TIMES, USELESS, Wide, median
 
 __all__ = ["Thresholds", "without_twin"]
 
@@ -48,7 +49,7 @@ class Thresholds:
                           for joint in range(1, len(weight) + 1)])
         left = np.asarray(np.bincount(data.joint, np.mean(residuals**2, axis=0), minlength=len(weight)), dtype=np.float64)
         place = np.array([(joint or 1) - 1 for joint in joints])
-        gain = TIMES * np.max([own, np.where(once, 0.0, usual[place]), USELESS * left[place]], axis=0)
+        gain = TIMES * np.max([np.where(once, ONCE, 1.0) * own, np.where(once, 0.0, usual[place]), USELESS * left[place]], axis=0)
         several = sorted(_on_several(data, families, arm), key=lambda place: joints[place] is not None)
         wide = Wide.of_twin(fit, residuals, [families[place] for place in several], usual, left, arm)
         return cls(gain, own, f"{len(residuals)} replicas of the twin", weight, joints, wide, tuple(several))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis import diagnose as diagnose_module
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.change_of_sign import loosened, wrong_law
+from pipelines.model.diagnosis.change_of_sign import loosened, plainer_of, wrong_law
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
@@ -29,7 +29,6 @@ from tests.model.estimation.experiments import COULOMB
 
 if TYPE_CHECKING:
     from pipelines.model.diagnosis.calibration import Calibration
-    from pipelines.model.diagnosis.inputs import Prepared
     from pipelines.model.diagnosis.result import Diagnosis
 
 LAWS = ("stribeck", "concave_friction", "quadratic_drag")
@@ -82,14 +81,43 @@ def test_where_slow_samples_are_left_out_the_curve_is_not_asked() -> None:
     assert [law.free for law in kept if isinstance(law, Coulomb)] == [("sharpness",)] * 3
 
 
+def told(verdict: str, causes: Sequence[str], question: str = "what is wrong", tried: Sequence[str] = ()) -> Diagnosis:
+    """What `wrong_law` reads of a diagnosis: causes and their joints, named and only tried."""
+    findings, ledger = ([SimpleNamespace(cause=name, joint=int(joint), parameters={}, accepted=True)
+                         for name, _, joint in (one.partition(":") for one in names)] for names in (causes, tried))
+    return cast("Diagnosis", SimpleNamespace(verdict=verdict, findings=findings, question=question, nominal=None, ledger=ledger))
+
+
 @pytest.mark.parametrize(("causes", "question", "asked"), [
     (("concave_friction:1", "concave_friction:3", "cogging:2"), "what is wrong", True),
     (("concave_friction:1", "stribeck:3", "cogging:2", "cogging:3"), "what is wrong", False),
     (("concave_friction:1", "concave_friction:3"), "what has changed", False)])
 def test_one_law_at_several_joints_is_no_fault_of_several_joints(causes: tuple[str, ...], question: str, asked: bool) -> None:
     """Bearings of one make rub by one law; two ripples are two faults, and what was there before is no news."""
-    findings = tuple(SimpleNamespace(cause=name, parameters={}) for name, _, _ in (one.partition(":") for one in causes))
-    assert wrong_law(cast("Diagnosis", SimpleNamespace(findings=findings, question=question, nominal=None))) is asked
+    assert wrong_law(told("cause", causes, question)) is asked
+
+
+def test_what_was_found_at_some_of_many_joints_is_asked_again() -> None:
+    """Six joints rub by an arc tangent, and a search for four causes ends beside the others without a name for them."""
+    assert wrong_law(told("unknown", (), tried=("torque_gain:2", "concave_friction:6", "concave_friction:4")))
+    assert not wrong_law(told("unknown", (), tried=("torque_gain:2", "cogging:6", "cogging:4")))
+    assert not wrong_law(told("cause", ("torque_gain:2",), tried=("torque_gain:2", "concave_friction:6", "concave_friction:4")))
+
+
+def test_what_has_changed_without_a_name_is_asked_again() -> None:
+    """Other motion shows more of the curve than the reference logs did."""
+    assert wrong_law(told("unknown", (), "what has changed"))
+    assert not wrong_law(told("nothing-wrong", (), "what has changed"))
+
+
+def test_of_two_diagnoses_the_one_that_finds_less_holds_and_an_answer_before_none() -> None:
+    unknown, one, two = told("unknown", ()), told("cause", ("cogging:3",)), told("cause", ("cogging:3", "stribeck:3"))
+    well = told("nothing-wrong", ())
+    assert plainer_of(two, one) is one
+    assert plainer_of(one, two) is one
+    assert plainer_of(unknown, two) is two
+    assert plainer_of(unknown, well) is well
+    assert plainer_of(two, unknown) is unknown
 
 
 @pytest.mark.parametrize(("speed", "asked"), [(0.02, True), (0.3, False)])
@@ -97,7 +125,8 @@ def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(spe
     """Two widths of tanh are the curve by which it does; thirty are another law."""
     law = Acting.of(Coulomb(1), {"level": 1.0, "sharpness": 100.0})
     finding = SimpleNamespace(cause="concave_friction", joint=1, parameters={"speed": Value(speed, 0.001, "rad/s")})
-    found = SimpleNamespace(findings=(finding,), question="what is wrong", nominal=SimpleNamespace(friction=(law,)))
+    found = SimpleNamespace(verdict="cause", findings=(finding,), question="what is wrong", ledger=(),
+                            nominal=SimpleNamespace(friction=(law,)))
     assert wrong_law(cast("Diagnosis", found)) is asked
 
 
@@ -106,13 +135,29 @@ def test_stored_thresholds_are_for_the_other_curve_as_well(stored: Calibration |
     """An arm in order whose friction changes its sign by an arc tangent is in order with and without --calibration."""
     asked = []
 
-    def diagnosed(prepared: Prepared, chosen: object, say: object, calibration: object, memory: object) -> SimpleNamespace:
-        free = {law.free for law in prepared.columns.laws if isinstance(law, Coulomb)}
+    def diagnosed(seen: Any, chosen: object, say: object, calibration: object, memory: object) -> Diagnosis:
+        free = {law.free for law in seen.prepared.columns.laws if isinstance(law, Coulomb)}
         asked.append((free, calibration))
-        laws = () if ("sharpness", "roundness") in free else ("concave_friction:1", "concave_friction:2")
-        return SimpleNamespace(findings=tuple(SimpleNamespace(cause=name[:-2], parameters={}) for name in laws),
-                               question="what is wrong", nominal=None)
+        return told("cause", () if ("sharpness", "roundness") in free else ("concave_friction:1", "concave_friction:2"))
 
     monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
-    assert diagnose_module.diagnose(Logs((hidden(1),)), calibration=stored).findings == ()
+    assert len(diagnose_module.diagnose(Logs((hidden(1),)), calibration=stored).findings) == 0
     assert [calibration for _, calibration in asked] == [stored, stored]
+
+
+@pytest.mark.parametrize("enough", [True, False])
+def test_where_the_first_look_shows_one_law_at_several_joints_the_twin_is_made_once(enough: bool,
+                                                                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the laws that fit the curve; those as they are have their turn only where these find several causes as well."""
+    asked = []
+
+    def diagnosed(seen: Any, *rest: object) -> Diagnosis:
+        loose = any("roundness" in law.free for law in seen.prepared.columns.laws)
+        asked.append(loose)
+        return told("cause", ("cogging:1",) if loose and enough else ("cogging:1", "concave_friction:1", "concave_friction:2"))
+
+    monkeypatch.setattr(diagnose_module, "greatest", lambda rough: [("concave_friction", 1), ("concave_friction", 2)])
+    monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
+    found = diagnose_module.diagnose(Logs((hidden(1),)))
+    assert asked == ([True] if enough else [True, False])
+    assert len(found.findings) == (1 if enough else 3)

@@ -1,0 +1,31 @@
+"""By which curve friction changes its sign, looked for anew beside what was found.
+
+    done = with_curves_anew(done)
+
+A fault bends what the nominal model took for that curve, and its numbers, two that do nearly the same, may then lie where no step
+leads back from: what is missed there would pass for another law of friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pipelines.model.diagnosis.beside import less
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.refit import Refined, refine
+
+__all__ = ["with_curves_anew"]
+
+_CLEARLY = 1e-3  # of the squared residual, that the others leave less
+
+
+def with_curves_anew(done: Refined) -> Refined:
+    """The model with its laws of friction fitted from where they began, less the torque of its effects, where that leaves less."""
+    model = done.model
+    if not model.effects or all(len(law.free) < 2 for law in model.columns.laws):
+        return done
+    begun = tuple(law if len(law.free) < 2 else next(iter(law.forms()), law) for law in model.columns.laws)
+    columns, fit = fit_nominal(less(done.data, done.of_effects), replace(model.columns, laws=begun))
+    other = refine(model.beside(Exact.start(columns, fit)), done.data, done.weight)
+    return other if other.rss < (1.0 - _CLEARLY) * done.rss else done

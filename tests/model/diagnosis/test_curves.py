@@ -1,0 +1,57 @@
+"""A fault bends what passes for the curve by which friction changes its sign; once it is known, the curve is found again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.change_of_sign import loosened
+from pipelines.model.diagnosis.curves import with_curves_anew
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.refit import Refined, refine
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.effects.torque_offset import TorqueOffset
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import hidden
+from tests.model.estimation.experiments import COULOMB
+
+
+def by_the_root(motion: Motion) -> Array:
+    """Friction that changes its sign as v/sqrt(v^2 + 0.01^2), less the tanh that the logs have."""
+    x = 100.0 * motion.dq
+    return np.array(COULOMB) * (x / np.sqrt(1.0 + x**2) - np.tanh(x))
+
+
+def led_astray(loose: bool, **away: float) -> tuple[Refined, Refined]:
+    """The model fitted from where it should, and from where a fault has left the curve of joint 2; both beside an offset."""
+    prepared = prepare(Logs((hidden(1, by_the_root), hidden(2, by_the_root))), DiagnosisSettings())
+    prepared = loosened(prepared) if loose else prepared
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit).with_effect(TorqueOffset(2), np.zeros(1))
+    laws = tuple(replace(law, **away) if isinstance(law, Coulomb) and law.joint == 2 else law for law in columns.laws)
+    astray = replace(model, columns=replace(columns, laws=laws))
+    good, bad = (refine(one, prepared.data, fit.weight) for one in (model, astray))
+    return good, bad
+
+
+@pytest.mark.parametrize(("sharpness", "roundness"), [(2000.0, 3.5), (900.0, 0.4), (5.0, 3.5)])
+def test_the_curve_is_found_from_where_no_step_leads_back(sharpness: float, roundness: float) -> None:
+    good, bad = led_astray(True, sharpness=sharpness, roundness=roundness)
+    assert bad.rms[1] > 2.0 * good.rms[1]
+    again = with_curves_anew(bad)
+    np.testing.assert_allclose(again.rms, good.rms, rtol=0.01)
+    curve = next(law for law in again.model.columns.laws if isinstance(law, Coulomb) and law.joint == 2)
+    assert curve.roundness == pytest.approx(2.0, abs=0.4)
+    assert curve.sharpness == pytest.approx(100.0, rel=0.2)
+    assert again.model.effects[0].effect == TorqueOffset(2)
+
+
+def test_where_the_curve_is_not_fitted_nothing_is_done_again() -> None:
+    _, bad = led_astray(False, sharpness=900.0)
+    assert with_curves_anew(bad) is bad
