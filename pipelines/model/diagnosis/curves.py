@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.nominal import fit_nominal
@@ -17,7 +19,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 
 __all__ = ["with_curves_anew"]
 
-_CLEARLY = 1e-3  # of the squared residual, that the others leave less
+_CLEARLY = 1e-3  # of the squared residual, every joint in units of its own, that the others leave less
 
 
 def with_curves_anew(done: Refined) -> Refined:
@@ -27,5 +29,6 @@ def with_curves_anew(done: Refined) -> Refined:
         return done
     begun = tuple(law if len(law.free) < 2 else next(iter(law.forms()), law) for law in model.columns.laws)
     columns, fit = fit_nominal(less(done.data, done.of_effects), replace(model.columns, laws=begun))
-    other = refine(model.beside(Exact.start(columns, fit)), done.data, done.weight)
-    return other if other.rss < (1.0 - _CLEARLY) * done.rss else done
+    least = np.maximum(done.rms, 1e-12)
+    other = refine(model.beside(Exact.start(columns, fit)), done.data, 1.0 / least)
+    return other if np.mean(np.square(other.rms / least)) < 1.0 - _CLEARLY else done

@@ -90,7 +90,8 @@ def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: fl
     done = refine(start, case.data, now.weight)
     left = held_out(done, case) / error
     rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
-    return Tried(one, effect, None, done, left, rank, _visibility(now, table))
+    believable = done.model.effects[-1].effect.believable([log.motion for log in case.data.logs], done.model.nominal)
+    return Tried(one, effect, None, done, left, rank, _visibility(now, table), believable=believable)
 
 
 def best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:

@@ -31,11 +31,12 @@ class Tried:
     rank: float  # lowest first: the same, and what is left of the fitted logs, on a par
     visibility: float
     sure: bool = False  # it leaves less than another with a number fewer, by more than the number is worth
+    believable: bool = True  # an arm with it could have moved as it did
 
     @property
     def possible(self) -> bool:
-        """Whether the cause's numbers lie in their ranges."""
-        return self.done.model.effects[-1].possible
+        """Whether the cause's numbers lie in their ranges, and the logs could be of an arm with them."""
+        return self.believable and self.done.model.effects[-1].possible
 
 
 def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],

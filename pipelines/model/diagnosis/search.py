@@ -267,7 +267,7 @@ def _fewest(tried: Sequence[Tried]) -> Tried | None:
         return None
     least = possible[0].rank
     joint = possible[0].screened.joint
-    near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least) and one.screened.joint == joint
+    near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least) and joint in (None, one.screened.joint)
             and (joint is None or one.done.rms[joint - 1] <= _WORSE * possible[0].done.rms[joint - 1])]
     return min(near, key=lambda one: (not one.sure, one.done.model.effects[-1].count, one.rank))
 

@@ -26,6 +26,7 @@ What a search over effects asks, so that it need not know any of them:
     shared               non-linear numbers that are those of the friction at its joint: one surface changes sign over one speed
     fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
     possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
+    believable           whether an arm with it could have moved as it did: one that is clipped all the time follows nothing
     per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
     again                whether one place may have it more than once: waves of several orders along one turn
     acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
@@ -119,6 +120,10 @@ class Effect(ABC):
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
         """The samples in which it acts, where it acts for a moment only."""
         return None
+
+    def believable(self, motions: Sequence[Motion], arm: ArmModel) -> bool:
+        """Whether an arm with it, in this shape, could have moved as it did in these logs."""
+        return True
 
     @property
     def free(self) -> tuple[str, ...]:

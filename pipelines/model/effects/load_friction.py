@@ -21,11 +21,15 @@ class LoadFriction(Effect):
     """τ = µ |τ_l| tanh(w v), τ_l what the joint transmits: its torque without friction. Coulomb friction is Fc + µ |τ_l| then.
 
     What rubs behind a gear is part of its load: τ_l has the share s of the joint's other friction too. Lifting a weight then rubs
-    more than lowering it, which is no friction that differs by direction.
+    more than lowering it, which is no friction that differs by direction. And a gear may lose a part of what goes in, not of what
+    comes out: the share i of the loss is part of the load as well,
+
+        τ = µ |τ_l| tanh(w v) / (1 - i µ c),   c = sign(τ_l) tanh(w v).
     """
 
     sharpness: float = 100.0  # w [s/rad]
     behind: float = 0.0  # s, held where it is 0
+    input_side: float = 0.0  # i, held where it is 0
 
     name = "load_friction"
     title = "Friction that grows with load"
@@ -33,6 +37,7 @@ class LoadFriction(Effect):
         Quantity("mu", "1", 0.0, 0.5, "friction per unit of transmitted torque"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
         Quantity("behind", "1", 0.0, 1.0, "share of the joint's other friction that loads it too", shape=True, unsaid=0.0),
+        Quantity("input_side", "1", 0.0, 1.0, "how far it goes by what goes in, not by what comes out", shape=True, unsaid=0.0),
     )
     signature = "Friction that grows with the torque the joint carries and changes sign with the direction of motion."
     explanation = "Teeth and bearings are pressed together by the torque that passes them, and rub in proportion."
@@ -52,10 +57,12 @@ class LoadFriction(Effect):
 
     @property
     def free(self) -> tuple[str, ...]:
-        return tuple(name for name in super().free if name != "behind" or self.behind > 0.0)
+        held = [name for name in ("behind", "input_side") if getattr(self, name) == 0.0]
+        return tuple(name for name in super().free if name not in held)
 
     def forms(self) -> tuple[Self, ...]:
-        return (replace(self, behind=_HALF),)
+        behind = replace(self, behind=_HALF)
+        return behind, replace(behind, input_side=_HALF)
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """Under the load that the joint carries at rest, and what rubs behind it."""
@@ -63,28 +70,35 @@ class LoadFriction(Effect):
         resting = Motion(np.zeros(len(dq)), still, still, still)
         moving = replace(resting, dq=self.on_own_row(arm, dq)[..., 0])
         load = self.own(arm.torque(resting)) + values.get("behind", 0.0) * self.own(arm.friction_torque(moving))
-        return np.asarray(values["mu"] * np.abs(load) * np.tanh(values["sharpness"] * dq))
+        return _lost(load, np.tanh(values["sharpness"] * dq), values)
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The load is the torque of everything inside it, friction before it apart and other effects included."""
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
         own, side = self.own(tau), np.tanh(values["sharpness"] * self.own(motion.dq))
         load = own - (1.0 - values.get("behind", 0.0)) * self.own(arm.friction_torque(motion))
-        tau[:, self._index] = own + values["mu"] * np.abs(load) * side
+        tau[:, self._index] = own + _lost(load, side, values)
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """What the drive applies, τ, is friction before it f, the load τ_l and what that causes:
 
-            τ_l = (τ - f)/(1 + µ sign(τ - f) tanh(w v))
+            τ_l = (τ - f)(1 - i µ c)/(1 + (1 - i) µ c),   c = sign(τ - f) tanh(w v)
 
         Solved for the load, because the load holds the acceleration that is being computed.
         """
         def applied(command: Array, motion: Motion, _: Array) -> Array:
             left, friction = command.copy(), (1.0 - values.get("behind", 0.0)) * self.own(arm.friction_torque(motion))
             passed = self.own(command) - friction
-            side = np.sign(passed) * np.tanh(values["sharpness"] * self.own(motion.dq))
-            left[..., self._index] = friction + passed / (1.0 + values["mu"] * side)
+            lost = values["mu"] * np.sign(passed) * np.tanh(values["sharpness"] * self.own(motion.dq))
+            into = values.get("input_side", 0.0)
+            left[..., self._index] = friction + passed * (1.0 - into * lost) / (1.0 + (1.0 - into) * lost)
             return left
 
         return Hooks(actuator=applied)
+
+
+def _lost(load: Array, side: Array, values: Values) -> Array:
+    """What a load (…) costs where the joint moves to one `side` (…) [-1, 1]."""
+    into = values.get("input_side", 0.0) * values["mu"] * np.sign(load) * side
+    return np.asarray(values["mu"] * np.abs(load) * side / (1.0 - into))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -12,6 +12,8 @@ from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quant
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueSaturation"]
+
+_MOST = 0.5  # of the time
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,12 @@ class TorqueSaturation(Effect):
         asked = self.own(tau if motion.tau is None else motion.tau)
         tau[:, self._index] += values["coefficient"] * self._excess(motion, asked, values["limit"])
         return tau
+
+    def believable(self, motions: Sequence[Motion], arm: ArmModel) -> bool:
+        """Not where most of the time more is asked for than comes out: such a joint follows nothing. Of clipped torque the logs say
+        no more than that it is high, so that a limit below nearly all of it would explain whatever there is."""
+        beyond = [np.abs(self.own(self._asked(motion, arm))) > self.limit for motion in motions]
+        return bool(np.concatenate(beyond).mean() <= _MOST)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         def applied(command: Array, motion: Motion, _: Array) -> Array:

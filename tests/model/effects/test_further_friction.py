@@ -86,11 +86,12 @@ def test_presliding_simulates_as_it_fits(law: dict[str, float], time: float) -> 
     assert np.abs(np.array(loads) - Presliding(2).torque(motion, arm, values)[:, 1]).max() < 0.04
 
 
+@pytest.mark.parametrize("input_side", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("behind", [0.0, 0.6, 1.0])
-def test_load_friction_of_the_simulation_is_that_of_the_log(behind: float) -> None:
+def test_load_friction_of_the_simulation_is_that_of_the_log(behind: float, input_side: float) -> None:
     """What the drive gives, less what friction takes, is the load: forward and inverse form are one."""
     motion, arm = swinging(), synthetic_arm()
-    values = {"mu": 0.2, "sharpness": 80.0, "behind": behind}
+    values = {"mu": 0.2, "sharpness": 80.0, "behind": behind, "input_side": input_side}
     logged = LoadFriction(2).apply(motion, arm, values)
     hooks = LoadFriction(2).simulate(arm, values)
     assert hooks.actuator is not None
@@ -104,6 +105,15 @@ def test_what_rubs_behind_a_gear_loads_it_too() -> None:
     found = LoadFriction(2).apply(motion, arm, {"mu": 0.1, "sharpness": 80.0, "behind": 1.0})[:, 1]
     passed = arm.torque(motion)[:, 1]
     np.testing.assert_allclose(found, passed * (1.0 + 0.1 * np.sign(passed) * np.tanh(80.0 * motion.dq[:, 1])), rtol=1e-12)
+
+
+def test_a_gear_may_lose_a_part_of_what_goes_in() -> None:
+    """The drive gives τ = τ_l + 0.15 |τ| tanh(w v): a part of its own torque, of which the loss is a part itself."""
+    motion, arm = swinging(), synthetic_arm()
+    values = {"mu": 0.15, "sharpness": 80.0, "behind": 1.0, "input_side": 1.0}
+    found = LoadFriction(2).apply(motion, arm, values)[:, 1]
+    lost = 0.15 * np.abs(found) * np.tanh(80.0 * motion.dq[:, 1])
+    np.testing.assert_allclose(found - lost, arm.torque(motion)[:, 1], rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("behind", [0.0, 1.0])
