@@ -16,7 +16,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.absorbed import Absorbed
+from pipelines.model.diagnosis.absorbed import Absorbed, Unexplained
 from pipelines.model.diagnosis.beside import Held, acted
 from pipelines.model.diagnosis.calibrated import conditions_of, following_of, origin_of, refuse_unfit
 from pipelines.model.diagnosis.calibration import Calibration
@@ -47,6 +47,8 @@ from pipelines.model.effects.base import Effect
 __all__ = ["diagnose"]
 
 Tell = Callable[[str], None]
+
+_MOVED = "the base parameters have moved since the reference logs, and no cause that is known moves them so"
 
 
 def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None,
@@ -163,16 +165,23 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     done = settled(found, rule(found, since.floor), case, now, since.floor)
     noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
     moved = since.absorbed(done.found.final.of_effects, () if done.ruling.named else case.families)
-    if moved is not None and done.ruling.verdict == "unknown":
+    if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
         done = unnamed(done, _with_load(found, case, now, since.floor, noise, chosen.seed))
     floored = Floored(since.floor, "reference logs", None, given, noise)
-    told = diagnosis_of(first, case, done, floored, chosen, since.probed, moved is not None and not moved.unsure)
+    told = diagnosis_of(first, case, done, floored, chosen, since.probed, isinstance(moved, Absorbed) and not moved.unsure)
     if given is None:
         told = replace(told, calibration=Calibration(
             origin_of("reference logs", logs, None, chosen), conditions_of(now), since.chance.weight, since.floor,
             np.full(case.data.n_joints, np.nan), since.chance.bounds, None, ()))
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
+    if isinstance(moved, Unexplained):
+        return _nameless(told, _MOVED) if told.verdict == "nothing-wrong" else told
     return told if moved is None else _with_moved(told, moved, done.found.final, now, case, chosen)
+
+
+def _nameless(told: Diagnosis, why: str) -> Diagnosis:
+    turning = () if told.nominal is None else told.nominal.robot.revolute
+    return replace(told, verdict="unknown", reason=why, summary=sentence(Ruling("unknown", (), why), (), turning))
 
 
 def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared, case: Case,
@@ -188,7 +197,7 @@ def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared,
     if why := moved.unsure:
         if told.findings:
             return _not_accepted(told, moved.effect.name, moved.effect.joint, why)
-        return replace(told, verdict="unknown", reason=why, summary=sentence(Ruling("unknown", (), why), (), turning))
+        return _nameless(told, why)
     one = carried(moved, final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
         return _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)

@@ -38,7 +38,7 @@ from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.since import Moved, since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import white
 from pipelines.model.diagnosis.verdict import Ruling
@@ -112,8 +112,8 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
     laws = () if left else every  # what the residual does not show may be in the base parameters
-    moved = ask(found.final.of_effects, laws) if ask is not None and (taken_in or laws) else None
-    moved = moved if moved is not None and any(_is(one, moved) for one in rest) else None
+    seen = ask(found.final.of_effects, laws) if ask is not None and (taken_in or laws) else None
+    moved = seen if isinstance(seen, Absorbed) and any(_is(one, seen) for one in rest) else None
     refused = {place: why for place, why in refused.items() if moved is None or place != (moved.effect.name, moved.effect.joint)}
     unmoved = [one for one in taken_in if moved is None or not _is(one, moved)]
     if unmoved and not every:
@@ -137,7 +137,7 @@ def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisS
 
 
 def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory,
-          ) -> tuple[Case, Prepared, Callable[[Array, Sequence[Family]], Absorbed | None] | None]:
+          ) -> tuple[Case, Prepared, Moved | None]:
     """The nominal model on these logs, beside what the reference logs show as well; and what says what base parameters took in
     since, less a torque (rows,)."""
     case, prepared = first.held.case, first.held.prepared

@@ -116,7 +116,8 @@ def fit_columns(data: Data, table: Array, y: Array | None = None, weight: Array 
 def _solved(grams: list[Array], moments: list[Array], weight: Array) -> Array:
     gram = sum(w**2 * g for w, g in zip(weight, grams, strict=True))
     moment = sum(w**2 * m for w, m in zip(weight, moments, strict=True))
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    size = np.sqrt(np.diag(gram))
+    size = np.where(size > 0.0, size, np.inf)  # a column of zeros has the number 0, and not rounding over nothing
     values, vectors = np.linalg.eigh(gram / size / size[:, None])
     keep = values > 1e-12 * values[-1]
     return np.asarray((vectors[:, keep] / values[keep]) @ (vectors[:, keep].T @ (moment / size)) / size)

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.absorbed import Absorbed, Sessions, absorbed
+from pipelines.model.diagnosis.absorbed import Absorbed, Sessions, Unexplained, absorbed
 from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.candidates import Arms, Family, families, lay_one, whole_motion
 from pipelines.model.diagnosis.case import Case
@@ -30,9 +30,10 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.thresholds import Thresholds
 
-__all__ = ["Known", "Probed", "Since", "since_reference"]
+__all__ = ["Known", "Moved", "Probed", "Since", "since_reference"]
 
 Probed = Callable[[Refined, Data | None, Arms], tuple[Probe, Thresholds]]
+Moved = Callable[[Array, Sequence[Family]], Absorbed | Unexplained | None]
 Known = tuple[Array, Mapping[tuple[str, int | None], float]]  # weights (joints,) and gains with these
 
 
@@ -45,7 +46,7 @@ class Since:
     left: Array  # (rows,) [N m] of the reference logs, by the model that has the standing effects
     standing: tuple[Standing, ...]
     acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
-    absorbed: Callable[[Array, Sequence[Family]], Absorbed | None]  # see `absorbed`: less a torque (rows,) [N m] of the later logs
+    absorbed: Moved  # see `absorbed`: less a torque (rows,) [N m] of the later logs
     chance: Chance
     probed: Probed  # beside a final model: what limits are looked for with
 
@@ -91,7 +92,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
                 beside=(*before, *acting))
     kept = len(columns.kept)
 
-    def moved(torque: Array, laws: Sequence[Family]) -> Absorbed | None:
+    def moved(torque: Array, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
         rows, _ = joined(reference, less(prepared.data, torque))
         two = Sessions(rows, later, base[:kept], nominal[kept:], common, whole.weight)
         return absorbed(two, arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs
@@ -69,6 +70,26 @@ def test_without_a_change_the_base_parameters_have_not_moved() -> None:
     found = diagnose(Logs((pushed(1, OFFSET), pushed(2, OFFSET)), (),
                           (pushed(4, OFFSET, "reference"), pushed(5, OFFSET, "reference"))), SETTINGS)
     assert found.verdict == "nothing-wrong"
+
+
+def loaded(seed: int, mass: float, role: str = "identify") -> ExperimentLog:
+    """A load 0.1 m beyond the tip, along the last link."""
+    body = {"mass": mass, "first_moment_x": 0.1 * mass, "inertia_yy": 0.01 * mass, "inertia_zz": 0.01 * mass}
+    values = {q.name: body.get(q.name, 0.0) for q in Payload.parameters}
+    return recorded(arm().extended(Acting.of(Payload(), values)), motion_of(seed), 8.0, np.random.default_rng([4, seed]),
+                    name=f"{role}-{seed}", experiment="excitation", role=role, period=10.0)
+
+
+@pytest.mark.parametrize(("without", "verdict"), [((), "cause"), (("payload",), "unknown")])
+def test_base_parameters_that_moved_as_no_cause_moves_them_are_no_arm_in_order(without: tuple[str, ...], verdict: str) -> None:
+    """Nothing stands in the residual, and yet the arm is another: with the load in the library it has a name, without it none."""
+    brief = replace(SETTINGS, without=(*SETTINGS.without, *without))
+    found = diagnose(Logs((loaded(1, 0.3), loaded(2, 0.3)), (loaded(3, 0.3, "validate"),),
+                          (loaded(4, 0.0, "reference"), loaded(5, 0.0, "reference"))), brief)
+    assert found.verdict == verdict
+    assert [one.cause for one in found.findings] == ([] if without else ["payload"])
+    if without:
+        assert "base parameters have moved" in found.summary + found.reason
 
 
 def story(effect: Effect, explained: float, numbers: int) -> Absorbed:

@@ -1,0 +1,22 @@
+"""The linear fit under a diagnosis: what numbers it gives to columns that tell nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import fit_columns, rows_of
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from tests.model.diagnosis.arms import hidden
+
+
+@pytest.mark.parametrize("place", [0, 5])
+def test_a_column_of_zeros_has_the_number_zero(place: int) -> None:
+    """A load's moment across a planar arm moves nothing; its number was rounding divided by nothing, 1e137."""
+    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    table = rows_of(prepared.data, prepared.columns)
+    plain, more = fit_columns(prepared.data, table), fit_columns(prepared.data, np.insert(table, place, 0.0, axis=0))
+    assert more.beta[place] == 0.0
+    np.testing.assert_allclose(np.delete(more.beta, place), plain.beta, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(more.left, plain.left, atol=1e-9)
