@@ -58,10 +58,11 @@ def shows(prepared: Prepared, other: Prepared) -> bool:
 
 
 def plainer_of(found: Diagnosis, again: Diagnosis) -> Diagnosis:
-    """The one that finds less; of one without a name and one that has an answer, the answer."""
+    """The one that finds less, and of as much the one whose curve is fitted, `again`; of one without a name and one that has an
+    answer, the answer."""
     if found.verdict == "unknown":
         return found if again.verdict == "unknown" else again
-    return min(found, again, key=lambda one: len(one.findings))
+    return min(again, found, key=lambda one: len(one.findings))
 
 
 def _turning(law: Finding, found: Diagnosis) -> bool:

@@ -115,6 +115,7 @@ def test_of_two_diagnoses_the_one_that_finds_less_holds_and_an_answer_before_non
     well = told("nothing-wrong", ())
     assert plainer_of(two, one) is one
     assert plainer_of(one, two) is one
+    assert plainer_of(told("cause", ("concave_friction:1",)), one) is one  # the curve is fitted in the second
     assert plainer_of(unknown, two) is two
     assert plainer_of(unknown, well) is well
     assert plainer_of(two, unknown) is unknown
