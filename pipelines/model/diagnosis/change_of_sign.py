@@ -32,10 +32,12 @@ _WIDTHS = 10.0  # by then tanh and the root have come to their level, within hal
 
 
 def wrong_law(found: Diagnosis) -> bool:
-    """Whether the same law of friction was found at two joints or more, or one that bends where dry friction changes its sign.
+    """Whether a diagnosis may have taken the curve for a cause, or miss one for it.
 
-    What has no name in the end may be what the search did not come to: it takes no more than a few causes, and an arm may have
-    more joints. Of what has changed nothing else is asked, for a curve was the same before: but other motion shows more of it.
+    Of what is wrong: where the same law of friction was found at two joints or more, or one that bends where dry friction changes
+    its sign. What has no name in the end may be what the search did not come to: it takes no more than a few causes, and an arm may
+    have more joints. Of what has changed: only where it has no name, for a curve was the same before; but other motion shows more
+    of it.
     """
     if found.question == "what has changed":
         return found.verdict == "unknown"
@@ -58,8 +60,8 @@ def shows(prepared: Prepared, other: Prepared) -> bool:
 
 
 def plainer_of(found: Diagnosis, again: Diagnosis) -> Diagnosis:
-    """The one that finds less, and of as much the one whose curve is fitted, `again`; of one without a name and one that has an
-    answer, the answer."""
+    """The one that finds less, and of as much the one whose curve is fitted, `again`, even where that is without a name: what
+    was `found` are names that the curve may have given. Where `found` has no name, an answer."""
     if found.verdict == "unknown":
         return found if again.verdict == "unknown" else again
     return min(again, found, key=lambda one: len(one.findings))
@@ -75,8 +77,11 @@ def _turning(law: Finding, found: Diagnosis) -> bool:
 
 def loosened(prepared: Prepared) -> Prepared:
     """The same, the laws that a nominal model has by default in their forms with most numbers: by which curve friction changes its
-    sign is fitted too. Where slow samples are left out it is not among the equations, and the laws stay as they are."""
+    sign is fitted too. Where slow samples are left out it is not among the equations, and the laws stay as they are; so they do
+    where they fit it already, or cannot."""
     if any(speed > 0.0 for speed in prepared.recipe.min_speed):
         return prepared
     laws = tuple(next(iter(law.forms()), law) if law.evidence == "none" else law for law in prepared.columns.laws)
+    if all(law.free == own.free for law, own in zip(laws, prepared.columns.laws, strict=True)):
+        return prepared
     return replace(prepared, columns=replace(prepared.columns, laws=laws))

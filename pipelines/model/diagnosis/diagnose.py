@@ -71,17 +71,20 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     seen = _looked_at(prepared, chosen, say, calibration, memory)
     other, again = loosened(prepared), None
     if other is not prepared and of_one_law(greatest(seen.rough)):
-        say("fitting by which curve friction changes its sign")
-        again = _diagnosed(_looked_at(other, chosen, say, calibration, Memory()), chosen, say, calibration, Memory())
+        again = _again(other, chosen, say, calibration)
         if len(again.findings) < SEVERAL:
             return again
     found = _diagnosed(seen, chosen, say, calibration, memory)
     if other is prepared or not wrong_law(found) or (prepared.reference is not None and not shows(prepared, other)):
         return found
-    if again is None:
-        say("fitting by which curve friction changes its sign")
-        again = _diagnosed(_looked_at(other, chosen, say, calibration, Memory()), chosen, say, calibration, Memory())
-    return plainer_of(found, again)
+    return plainer_of(found, again or _again(other, chosen, say, calibration))
+
+
+def _again(other: Prepared, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None) -> Diagnosis:
+    """By the loosened laws, which no extension asks for: nothing of it need be remembered."""
+    say("fitting by which curve friction changes its sign")
+    memory = Memory()
+    return _diagnosed(_looked_at(other, chosen, say, calibration, memory), chosen, say, calibration, memory)
 
 
 @dataclass(frozen=True, eq=False)

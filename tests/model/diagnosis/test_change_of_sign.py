@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,7 +15,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis import diagnose as diagnose_module
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.change_of_sign import loosened, plainer_of, wrong_law
+from pipelines.model.diagnosis.change_of_sign import loosened, plainer_of, shows, wrong_law
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
@@ -23,22 +24,27 @@ from pipelines.model.diagnosis.search import search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
 from tests.model.estimation.experiments import COULOMB
 
 if TYPE_CHECKING:
     from pipelines.model.diagnosis.calibration import Calibration
+    from pipelines.model.diagnosis.inputs import Prepared
     from pipelines.model.diagnosis.result import Diagnosis
 
 LAWS = ("stribeck", "concave_friction", "quadratic_drag")
 
 
+def changing_by(curve: Callable[[Array], Array]) -> Callable[[Motion], Array]:
+    """What friction that changes its sign by `curve` has more than that of the logs."""
+    return lambda motion: np.array(COULOMB) * (curve(100.0 * motion.dq) - np.tanh(100.0 * motion.dq))
+
+
 def case_with(curve: Callable[[Array], Array]) -> Case:
     """Logs of an arm whose joints change the sign of their friction by `curve`, with laws of friction as the only causes."""
-    def instead(motion: Motion) -> Array:
-        return np.array(COULOMB) * (curve(100.0 * motion.dq) - np.tanh(100.0 * motion.dq))
-
+    instead = changing_by(curve)
     logs = Logs((hidden(1, instead), hidden(2, instead)), (hidden(3, instead, "validate"),))
     prepared = loosened(prepare(logs, DiagnosisSettings()))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
@@ -79,6 +85,23 @@ def test_where_slow_samples_are_left_out_the_curve_is_not_asked() -> None:
     """The change of sign is not among the equations then."""
     kept = loosened(prepare(Logs((hidden(1),)), DiagnosisSettings(min_speed=(0.05,)))).columns.laws
     assert [law.free for law in kept if isinstance(law, Coulomb)] == [("sharpness",)] * 3
+
+
+def test_laws_that_fit_the_curve_or_cannot_are_not_fitted_again() -> None:
+    """The whole diagnosis would be done twice for the same answer."""
+    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    loose = loosened(prepared)
+    assert loose is not prepared
+    assert loosened(loose) is loose
+    other = replace(prepared, columns=replace(prepared.columns, laws=tuple(ThreeSigmoid(joint) for joint in (1, 2, 3))))
+    assert loosened(other) is other
+
+
+def test_curves_that_leave_no_less_are_no_reason_to_ask_again() -> None:
+    """Of a joint that changes its sign by tanh nothing is missed by tanh; by the root it is."""
+    for curve, less in ((np.tanh, False), (lambda x: x / np.sqrt(1.0 + x**2), True)):
+        prepared = prepare(Logs((hidden(1, changing_by(curve)),)), DiagnosisSettings())
+        assert shows(prepared, loosened(prepared)) is less
 
 
 def told(verdict: str, causes: Sequence[str], question: str = "what is wrong", tried: Sequence[str] = ()) -> Diagnosis:
@@ -162,3 +185,25 @@ def test_where_the_first_look_shows_one_law_at_several_joints_the_twin_is_made_o
     found = diagnose_module.diagnose(Logs((hidden(1),)))
     assert asked == ([True] if enough else [True, False])
     assert len(found.findings) == (1 if enough else 3)
+
+
+def test_what_was_worked_out_of_the_other_curve_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The comparison with the reference logs, which is most of the work, is asked for by the first look and by what follows."""
+    asked: list[tuple[str, bool, object]] = []
+
+    def is_loose(prepared: Prepared) -> bool:
+        return any("roundness" in law.free for law in prepared.columns.laws)
+
+    def looked_at(prepared: Prepared, chosen: object, say: object, calibration: object, memory: object) -> Any:
+        asked.append(("look", is_loose(prepared), memory))
+        return SimpleNamespace(prepared=prepared, rough=())
+
+    def diagnosed(seen: Any, chosen: object, say: object, calibration: object, memory: object) -> Diagnosis:
+        asked.append(("rest", is_loose(seen.prepared), memory))
+        return told("cause", () if is_loose(seen.prepared) else ("concave_friction:1", "concave_friction:2"))
+
+    monkeypatch.setattr(diagnose_module, "_looked_at", looked_at)
+    monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
+    diagnose_module.diagnose(Logs((hidden(1),)))
+    assert [one[:2] for one in asked] == [("look", False), ("rest", False), ("look", True), ("rest", True)]
+    assert asked[2][2] is asked[3][2]
