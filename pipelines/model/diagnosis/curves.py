@@ -16,6 +16,7 @@ from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import Refined, refine
+from pipelines.model.effects.base import Effect
 
 __all__ = ["with_curves_anew"]
 
@@ -23,12 +24,21 @@ _CLEARLY = 1e-3  # of the squared residual, every joint in units of its own, tha
 
 
 def with_curves_anew(done: Refined) -> Refined:
-    """The model with its laws of friction fitted from where they began, less the torque of its effects, where that leaves less."""
+    """The model with its laws of friction fitted from where they began, less the torque of its effects, where that leaves less.
+
+    Not where no law fits its curve: the laws of a model that was given keep their form, for a number more would pass for what the
+    cause explains.
+    """
     model = done.model
-    if not model.effects or all(len(law.free) < 2 for law in model.columns.laws):
+    if not model.effects or all(_begun(law) is law for law in model.columns.laws):
         return done
-    begun = tuple(law if len(law.free) < 2 else next(iter(law.forms()), law) for law in model.columns.laws)
+    begun = tuple(map(_begun, model.columns.laws))
     columns, fit = fit_nominal(less(done.data, done.of_effects), replace(model.columns, laws=begun))
     least = np.maximum(done.rms, 1e-12)
     other = refine(model.beside(Exact.start(columns, fit)), done.data, 1.0 / least)
     return other if np.mean(np.square(other.rms / least)) < 1.0 - _CLEARLY else done
+
+
+def _begun(law: Effect) -> Effect:
+    """The form with the same numbers from which `law` was fitted; itself where there is none."""
+    return next((form for form in law.forms() if len(law.free) > 1 and form.free == law.free), law)

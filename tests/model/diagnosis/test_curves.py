@@ -16,6 +16,7 @@ from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
@@ -55,3 +56,11 @@ def test_the_curve_is_found_from_where_no_step_leads_back(sharpness: float, roun
 def test_where_the_curve_is_not_fitted_nothing_is_done_again() -> None:
     _, bad = led_astray(False, sharpness=900.0)
     assert with_curves_anew(bad) is bad
+
+
+def test_a_law_of_a_model_that_was_given_keeps_its_form() -> None:
+    """Stribeck friction whose tail is held: a number more in the nominal model would pass for what the cause explains."""
+    _, bad = led_astray(False)
+    laws = (*bad.model.columns.laws, Stribeck(1))
+    given = replace(bad, model=replace(bad.model, columns=replace(bad.model.columns, laws=laws)))
+    assert with_curves_anew(given) is given
