@@ -112,10 +112,11 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
 
 
 def _of_joint(step: Step, found: Found, floor: Array) -> float:
-    """Share of the power above the noise that all that was found takes off the joint of a step; of the arm, off some joint."""
-    noise = np.square(floor)
-    before, after = (np.square(one.rms) - noise for one in (found.nominal, found.final))
-    share = 1.0 - after / np.maximum(before, 1e-300)
+    """Share of the power above the noise that all that was found takes off the joint of a step; of the arm, off some joint.
+    Of a joint that stands in the noise it is none."""
+    before, after = (np.square(one.rms) for one in (found.nominal, found.final))
+    above = before - np.square(floor)
+    share = np.divide(before - after, above, out=np.zeros(len(above)), where=above > 0.0)
     joint = None if step.best is None else step.best.effect.joint
     return float(share.max() if joint is None else share[joint - 1])
 
