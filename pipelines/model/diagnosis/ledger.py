@@ -56,6 +56,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
                   "comes again at other moments" if not one.stands_out else
                   _REFUSED if id(one) in refused and fitted is None else
                   "weaker than others" if fitted is None else
+                  "the arm could not have moved so with it" if not fitted.believable else
                   "impossible numbers" if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else
                   _REFUSED if id(one) in refused else

@@ -261,15 +261,16 @@ def _other(passing: Sequence[Screened], best: Tried | None, tried: Sequence[Trie
 
 
 def _fewest(tried: Sequence[Tried]) -> Tried | None:
-    """Of those that leave nearly as little as the best, one whose further number is worth it, else the one with fewest;
-    none where the best leaves no less."""
+    """Of those at the joint of the best that leave nearly as little, one whose further number is worth it, else the one with
+    fewest; where the best is of the arm, of those at any joint; none where the best leaves no less."""
     possible = [one for one in tried if one.error < 1.0 and one.possible]
     if not possible:
         return None
     least = possible[0].rank
     joint = possible[0].screened.joint
+    own = slice(None) if joint is None else slice(joint - 1, joint)
     near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least) and joint in (None, one.screened.joint)
-            and (joint is None or one.done.rms[joint - 1] <= _WORSE * possible[0].done.rms[joint - 1])]
+            and (one.done.rms[own] <= _WORSE * possible[0].done.rms[own]).all()]
     return min(near, key=lambda one: (not one.sure, one.done.model.effects[-1].count, one.rank))
 
 
