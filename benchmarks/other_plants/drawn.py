@@ -34,7 +34,7 @@ def drawn(count: int, seed: int) -> tuple[Case, ...]:
 
 def _one(rng: np.random.Generator) -> Case:
     kind = rng.random()
-    plain = _plain(rng, rng.choice(sorted(ARMS)))
+    plain = _plain(rng, str(rng.choice(sorted(ARMS))))
     if kind < _HEALTHY:
         if rng.random() < 0.2:
             return replace(plain, law=str(rng.choice(["stribeck", "lugre"])), motions=FIVE, answers=SLOW)
