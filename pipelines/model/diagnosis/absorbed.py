@@ -39,7 +39,8 @@ _SURE = 5.0  # standard deviations of a number
 _TELLS = 25.0  # of what is left of the move, in variances: five standard deviations between two stories
 _PARSIMONY = 0.02  # of the move
 _CHANCE = 3.0  # times what the parameters move between parts of the reference logs
-_UNEXPLAINED = 0.5  # of the squared residual: of 12 arms in order, moved otherwise than before, none had more than 0.7 %
+# Of the squared residual that two sets of parameters leave. Of 12 arms in order, moved otherwise than before, none had over 0.7 %.
+_UNEXPLAINED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +95,7 @@ class Absorbed:
 class Unexplained:
     """Base parameters that have moved far, and no cause moves them so."""
 
-    share: float  # of the squared residual, that separate parameters take away
+    times: float  # what two sets of them leave, one set for both leaves: the residual, not squared
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,8 @@ class Move:
 
 def absorbed(two: Sessions, arm: Arm, families: Sequence[Family] = (), usual: float = 0.0, without: Sequence[str] = (),
              ) -> Absorbed | Unexplained | None:
-    """The cause that explains best how the base parameters moved; None where they did not, or not far enough to be sure of it.
+    """The cause that explains best how the base parameters moved; None where they did not, or not far enough to be sure of it;
+    `Unexplained` where they moved far, and no cause that is known moves them so.
 
     Args:
         families: laws to be asked beside the causes that act on base parameters; none where the residual shows what is wrong.
@@ -125,7 +127,8 @@ def absorbed(two: Sessions, arm: Arm, families: Sequence[Family] = (), usual: fl
     best = chosen([one for one in found if one is not None], move)
     far = move.power >= _CHANCE * usual * move.whole
     if best is None:
-        return Unexplained(move.power / move.whole) if far and move.power >= _UNEXPLAINED * move.whole else None
+        more = move.power / move.whole
+        return Unexplained(float(np.sqrt(1.0 + more))) if far and more >= _UNEXPLAINED else None
     return best if far or best.effect.evidence == "base parameters" else None
 
 

@@ -48,7 +48,8 @@ __all__ = ["diagnose"]
 
 Tell = Callable[[str], None]
 
-_MOVED = "the base parameters have moved since the reference logs, and no cause that is known moves them so"
+_MOVED = ("the base parameters have moved since the reference logs, and no cause that is known moves them so: one set for "
+          "before and after leaves {:.2g} times what a set for each leaves")
 
 
 def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None,
@@ -178,7 +179,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
             np.full(case.data.n_joints, np.nan), since.chance.bounds, None, ()))
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
     if isinstance(moved, Unexplained):
-        return _nameless(told, _MOVED) if told.verdict == "nothing-wrong" else told
+        return _nameless(told, _MOVED.format(moved.times)) if told.verdict == "nothing-wrong" else told
     return told if moved is None else _with_moved(told, moved, done.found.final, now, case, chosen)
 
 
