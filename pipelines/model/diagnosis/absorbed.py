@@ -127,7 +127,7 @@ def absorbed(two: Sessions, arm: Arm, families: Sequence[Family] = (), usual: fl
     best = chosen([one for one in found if one is not None], move)
     far = move.power >= _CHANCE * usual * move.whole
     if best is None:
-        more = move.power / move.whole
+        more = move.power / max(move.whole, 1e-300)
         return Unexplained(float(np.sqrt(1.0 + more))) if far and more >= _UNEXPLAINED else None
     return best if far or best.effect.evidence == "base parameters" else None
 
