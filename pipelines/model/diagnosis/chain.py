@@ -27,16 +27,19 @@ def gains(found: Found, named: Sequence[int], order: Sequence[int], simulated: S
     Args:
         named: numbers of the steps whose causes the final model holds.
         order: places in `named`, as they are told.
-        simulated: the nominal arm and that after each step: simulated anew only where the order is another, or a step was dropped.
+        simulated: the nominal arm and that after each step: where the order is another, only what lies between is simulated anew;
+            where a step was dropped, all.
         beside: effects that the rows are without, and the arms that are simulated are not.
     """
     as_found = list(range(len(order)))
-    if list(order) == as_found == list(named) and len(simulated) == len(order) + 1:
+    whole = sorted(named) == as_found and len(simulated) == len(order) + 1  # nothing that was found is dropped
+    if whole and list(order) == as_found:
         models = [found.nominal, *(found.steps[k + 1].before for k in as_found[:-1]), found.final]
         runs = list(simulated)
     else:
         models = [found.nominal, *(with_some(found, order[:count]) for count in range(1, len(order))), found.final]
-        runs = simulation_errors([acted(one.model.arm, beside) for one in models], prepared.judging or prepared.motions)
+        known = {0: simulated[0], len(order): simulated[-1]} if whole else None
+        runs = simulation_errors([acted(one.model.arm, beside) for one in models], prepared.judging or prepared.motions, known)
     torques = [torque_gain(before, after, prepared.judge, blocks) for before, after in pairwise(models)]
     return [gain_of(torque, before, after) for torque, (before, after) in zip(torques, pairwise(runs), strict=True)]
 

@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -132,22 +132,33 @@ def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str
     return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
 
 
-def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
+def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int, Simulation] | None = None) -> list[Simulation]:
     """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else.
 
     Without logs nothing is simulated.
+
+    Args:
+        known: of arms, by their places, that were simulated already beside others with the same effects as these.
     """
+    none = [Simulation.none(arm.n_joints) for arm in arms]
     if not motions:
-        return [Simulation.none(arm.n_joints) for arm in arms]
+        return none
     logs = motions[:_LOGS]
     soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
+    if known:
+        how, left = next(iter(known.values())).how, [k for k in range(len(arms)) if k not in known]
+        if how == "none":
+            return none
+        found = shared_out(partial(_if_possible, motions=logs, closed=how == "closed-loop", soft=soft), [arms[k] for k in left])
+        every = {**known, **dict(zip(left, found, strict=True))}
+        return [every[k] for k in range(len(arms))]
     for closed in (True, False):
         if closed and not all(in_loop(arms[0], log) for log, _ in logs):
             continue
         found = shared_out(partial(_if_possible, motions=logs, closed=closed, soft=soft), arms)
         if found[0].how != "none":
             return found
-    return [Simulation.none(arm.n_joints) for arm in arms]
+    return none
 
 
 def in_loop(arm: Arm, log: ExperimentLog) -> bool:

@@ -71,6 +71,23 @@ def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest
     assert "runs away" in farther(first, second)
 
 
+def test_an_arm_beside_those_that_are_simulated_already_is_simulated_as_they_were() -> None:
+    """In windows beside windows, over the same time; and not at all beside what could not be simulated."""
+    log = session()[0]
+    prepared = prepare(Logs((replace(log, controller=None),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    arm = Exact.start(columns, fit).arm
+    first = simulation_errors([arm], prepared.motions)[0]
+    same, other = simulation_errors([arm, arm], prepared.motions, {0: first})
+    assert same is first
+    assert (other.how, other.samples.sum()) == ("windowed", first.samples.sum())
+    np.testing.assert_array_equal(other.position_rms, first.position_rms)
+    none = Simulation.none(arm.n_joints)
+    assert [one.how for one in simulation_errors([arm, arm], prepared.motions, {0: none})] == ["none", "none"]
+    closed = prepare(Logs((log,)), DiagnosisSettings()).motions  # they could be closed, and what is known was not
+    assert [one.how for one in simulation_errors([arm, arm], closed, {0: first})] == ["windowed", "windowed"]
+
+
 def test_a_fast_log_drives_its_windows_by_the_mean_torque_of_a_millisecond() -> None:
     """Five samples of 0.2 ms make one; none is left of a millisecond of which a sample is missing, or of no use."""
     t = np.delete(2e-4 * np.arange(61), 23)

@@ -20,9 +20,10 @@ def simulated_anew(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The arms that are simulated again; a gain is told by the simulations before and after."""
     asked: list[str] = []
 
-    def simulate(arms: list[str], motions: object) -> list[str]:
-        asked.extend(arms)
-        return [f"simulated {arm}" for arm in arms]
+    def simulate(arms: list[str], motions: object, known: dict[int, str] | None = None) -> list[str]:
+        left = [k for k in range(len(arms)) if k not in (known or {})]
+        asked.extend(arms[k] for k in left)
+        return [f"simulated {arm}" if k in left else (known or {})[k] for k, arm in enumerate(arms)]
 
     monkeypatch.setattr(chain, "simulation_errors", simulate)
     monkeypatch.setattr(chain, "acted", lambda arm, beside: arm)
@@ -32,12 +33,12 @@ def simulated_anew(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return asked
 
 
-@pytest.mark.parametrize(("named", "order", "anew"), [
-    ((0, 1), (0, 1), []),  # as they were found
-    ((0,), (0,), ["nominal", "final"]),  # the last was dropped, and the weights are still its
-    ((1,), (0,), ["nominal", "final"]),  # the first
-    ((0, 1), (1, 0), ["nominal", "with [1]", "final"])])  # told in another order
-def test_a_gain_is_that_of_the_arm_that_is_told(named: tuple[int, ...], order: tuple[int, ...], anew: list[str],
+@pytest.mark.parametrize(("named", "order", "chained"), [
+    ((0, 1), (0, 1), ["then nominal", "then 1", "then 2"]),  # as they were found
+    ((0,), (0,), ["simulated nominal", "simulated final"]),  # the last was dropped, and the weights are still its
+    ((1,), (0,), ["simulated nominal", "simulated final"]),  # the first
+    ((0, 1), (1, 0), ["then nominal", "simulated with [1]", "then 2"])])  # told in another order: only what lies between is another
+def test_a_gain_is_that_of_the_arm_that_is_told(named: tuple[int, ...], order: tuple[int, ...], chained: list[str],
                                                simulated_anew: list[str]) -> None:
     """What was simulated after each step of the search serves only where the final model is the search's own."""
     steps = [SimpleNamespace(before=left(name)) for name in ("nominal", "after 1", "after 2")]
@@ -45,6 +46,5 @@ def test_a_gain_is_that_of_the_arm_that_is_told(named: tuple[int, ...], order: t
     runs: Any = ["then nominal", "then 1", "then 2"]
     prepared: Any = SimpleNamespace(judging=(), motions=(), judge=None)
     worth: Any = chain.gains(found, named, list(order), runs, prepared, (), 10)
-    assert simulated_anew == anew
-    chained = [f"simulated {arm}" for arm in anew] or runs
+    assert [f"simulated {arm}" for arm in simulated_anew] == [one for one in chained if one.startswith("simulated")]
     assert worth == list(pairwise(chained))
