@@ -35,6 +35,8 @@ def main() -> None:
         parser.error(f"no such case: {', '.join(unknown)}")
     chosen = [case for case in cases if not arguments.names or case.name in arguments.names][:arguments.count]
     which, parts = map(int, arguments.part.split("/"))
+    if not 1 <= which <= parts:
+        parser.error(f"no such part: {arguments.part}")
     chosen = chosen[which - 1::parts]
     with tempfile.TemporaryDirectory() as place:
         home = arguments.keep or Path(place)
@@ -48,10 +50,18 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="; ".join(case.name for case in CASES))
     parser.add_argument("--count", type=int, help="no more than so many")
-    parser.add_argument("--drawn", type=int, metavar="SEED", help=f"cases drawn at random, {_USUAL} where no --count says how many")
+    parser.add_argument("--drawn", type=_seed, metavar="SEED",
+                        help=f"cases drawn at random, {_USUAL} where no --count says how many")
     parser.add_argument("--part", default="1/1", help="1/2, 2/2, …: every second of them")
     parser.add_argument("--keep", type=Path, help="where logs stay")
     return parser
+
+
+def _seed(text: str) -> int:
+    """From 1: numbers in the names of drawn cases begin with it, and those of the others are small."""
+    if (number := int(text)) < 1:
+        raise argparse.ArgumentTypeError("seeds begin at 1")
+    return number
 
 
 def _one(case: Case, folder: Path) -> str:

@@ -49,7 +49,7 @@ __all__ = ["diagnose"]
 Tell = Callable[[str], None]
 
 _MOVED = ("the base parameters have moved since the reference logs, and no cause that is known moves them so: one set for "
-          "before and after leaves {:.2g} times what a set for each leaves")
+          "before and after leaves {:.2g} times what a set for each leaves; look at the tool, and at the zeros of the encoders")
 
 
 def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None,
@@ -72,19 +72,22 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     seen = _looked_at(prepared, chosen, say, calibration, memory)
     other, again = loosened(prepared), None
     if other is not prepared and of_one_law(greatest(seen.rough)):
-        again = _again(other, chosen, say, calibration)
-        if len(again.findings) < SEVERAL:
-            return again
-    found = _diagnosed(seen, chosen, say, calibration, memory)
-    if other is prepared or not wrong_law(found) or (prepared.reference is not None and not shows(prepared, other)):
-        return found
-    return plainer_of(found, again or _again(other, chosen, say, calibration))
+        again = _again(other, chosen, say, calibration, memory)
+    if again is not None and again.verdict != "unknown" and len(again.findings) < SEVERAL:
+        held = again
+    else:
+        held = found = _diagnosed(seen, chosen, say, calibration, memory)
+        if other is not prepared and wrong_law(found) and (prepared.reference is None or shows(prepared, other)):
+            again = again or _again(other, chosen, say, calibration, memory)
+            held = plainer_of(found, again)
+    if held is again:
+        memory.instead(prepared, other)
+    return held
 
 
-def _again(other: Prepared, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None) -> Diagnosis:
-    """By the loosened laws, which no extension asks for: nothing of it need be remembered."""
+def _again(other: Prepared, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None, memory: Memory) -> Diagnosis:
+    """By the loosened laws."""
     say("fitting by which curve friction changes its sign")
-    memory = Memory()
     return _diagnosed(_looked_at(other, chosen, say, calibration, memory), chosen, say, calibration, memory)
 
 

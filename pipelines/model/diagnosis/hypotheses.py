@@ -95,15 +95,21 @@ def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: fl
 
 
 def best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:
-    """The cause by the law that leaves decidedly less of its joint, fitted and held out, where it has more than one."""
+    """The cause by the law that leaves decidedly less of its joint, fitted and held out, where it has more than one; each further
+    number has to leave decidedly less again."""
     if best.log is not None:
         return best
-    chosen, least = best, _DECIDED * _left_at(case, best)
+    chosen, least = best, _left_at(case, best)
     for form in best.effect.forms():
         other = replace(_refitted(case, now, best.screened, form, error), sure=best.sure)
-        if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < least:
+        further = chosen is best or _count(other) > _count(chosen)
+        if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < (_DECIDED if further else 1.0) * least:
             chosen, least = other, left
     return chosen
+
+
+def _count(tried: Tried) -> int:
+    return tried.done.model.effects[-1].count
 
 
 def _left_at(case: Case, tried: Tried) -> float:

@@ -169,22 +169,24 @@ def test_stored_thresholds_are_for_the_other_curve_as_well(stored: Calibration |
     assert [calibration for _, calibration in asked] == [stored, stored]
 
 
-@pytest.mark.parametrize("enough", [True, False])
-def test_where_the_first_look_shows_one_law_at_several_joints_the_twin_is_made_once(enough: bool,
-                                                                                   monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the laws that fit the curve; those as they are have their turn only where these find several causes as well."""
-    asked = []
+@pytest.mark.parametrize(("loose", "plain", "asked", "verdict"), [
+    (told("cause", ("cogging:1",)), None, [True], "cause"),  # nothing that the laws as they are find could hold
+    (told("cause", ("cogging:1", "stribeck:1")), told("nothing-wrong", ()), [True, False], "nothing-wrong"),
+    (told("unknown", ()), told("nothing-wrong", ()), [True, False], "nothing-wrong"),
+    (told("unknown", ()), told("cause", ("concave_friction:1", "concave_friction:2")), [True, False], "unknown")])
+def test_where_the_first_look_shows_one_law_at_several_joints_the_twin_is_made_once(
+        loose: Diagnosis, plain: Diagnosis | None, asked: list[bool], verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the laws that fit the curve; those as they are have their turn only where these find several causes, or no name."""
+    made = []
 
     def diagnosed(seen: Any, *rest: object) -> Diagnosis:
-        loose = any("roundness" in law.free for law in seen.prepared.columns.laws)
-        asked.append(loose)
-        return told("cause", ("cogging:1",) if loose and enough else ("cogging:1", "concave_friction:1", "concave_friction:2"))
+        made.append(any("roundness" in law.free for law in seen.prepared.columns.laws))
+        return loose if made[-1] else cast("Diagnosis", plain)
 
     monkeypatch.setattr(diagnose_module, "greatest", lambda rough: [("concave_friction", 1), ("concave_friction", 2)])
     monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
-    found = diagnose_module.diagnose(Logs((hidden(1),)))
-    assert asked == ([True] if enough else [True, False])
-    assert len(found.findings) == (1 if enough else 3)
+    assert diagnose_module.diagnose(Logs((hidden(1),))).verdict == verdict
+    assert made == asked
 
 
 def test_what_was_worked_out_of_the_other_curve_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,9 +7,11 @@ from dataclasses import replace
 import pytest
 
 from pipelines.model.diagnosis import memory as module
+from pipelines.model.diagnosis.change_of_sign import loosened
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects.coulomb import Coulomb
 from tests.model.diagnosis.arms import hidden
 
 
@@ -39,3 +41,14 @@ def test_other_roles_other_logs_and_other_settings_are_other_questions(calls: li
                          (Logs((replace(one),), (other,)), DiagnosisSettings())):
         known.prepared(logs, chosen, None)
     assert calls == ["prepare"] * 4
+
+
+def test_the_laws_by_which_a_diagnosis_holds_are_those_of_its_extension(calls: list[str]) -> None:
+    """A cause that was found once the curve of friction fitted would be refused beside another curve."""
+    known, logs = Memory(), Logs((hidden(1),), (hidden(2),))
+    first = known.prepared(logs, DiagnosisSettings(), None)
+    known.instead(first, loosened(first))
+    again = known.prepared(logs, DiagnosisSettings(), None)
+    assert again.data is first.data
+    assert {law.free for law in again.columns.laws if isinstance(law, Coulomb)} == {("sharpness", "roundness")}
+    assert calls == ["prepare"]
