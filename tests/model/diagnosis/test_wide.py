@@ -71,6 +71,19 @@ def test_what_an_error_of_an_angle_does_elsewhere_does_not_grow_with_its_joint(
     assert grown[0] < 10.0
 
 
+def test_what_happened_once_has_to_gain_twice_as_much(there: tuple[Fit, Array, tuple[Family, ...], Arm]) -> None:
+    """No other log bears it out: six times what chance gives it in any replica, where what acts always needs three times that; by
+    weights of now and by others."""
+    fit, noise, every, arm = there
+    bounds = Thresholds.of_twin(*left(fit, noise, fit.weight), every, arm)
+    event = np.array([family.event for family in every])
+    for weight in (fit.weight, fit.weight * np.array([1.0, 0.5, 2.0])):
+        now = bounds.at(weight)
+        assert (now.gain[event] >= 5.99 * now.own[event]).all()
+        assert (now.gain[~event] >= 2.99 * now.own[~event]).all()
+    assert event.any()
+
+
 def test_longer_logs_give_chance_more_to_gain(there: tuple[Fit, Array, tuple[Family, ...], Arm]) -> None:
     fit, noise, every, arm = there
     wide = Wide.of_twin(*left(fit, noise, fit.weight), every, np.ones(3), np.ones(3), arm)
