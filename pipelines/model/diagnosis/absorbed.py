@@ -76,6 +76,12 @@ class Absorbed:
     explained: float  # of the difference between one set of base parameters and two
     gain: float  # squared weighted residual that it takes away beside one set, in parts of that difference
     rivals: tuple[Effect, ...] = ()  # elsewhere, that explain it as well: no name then
+    times: float = 1.0  # what two sets of base parameters leave, one set for both leaves: the residual, not squared
+
+    @property
+    def far(self) -> bool:
+        """Whether they have moved so far that something has changed, by whatever name."""
+        return self.times**2 >= 1.0 + _UNEXPLAINED
 
     @property
     def count(self) -> int:
@@ -126,10 +132,11 @@ def absorbed(two: Sessions, arm: Arm, families: Sequence[Family] = (), usual: fl
              *(_tried(effect, two, arm, move, _ALONE, None) for effect in _laws(two, one, families, arm, move))]
     best = chosen([one for one in found if one is not None], move)
     far = move.power >= _CHANCE * usual * move.whole
+    more = move.power / max(move.whole, 1e-300)
+    times = float(np.sqrt(1.0 + more))
     if best is None:
-        more = move.power / max(move.whole, 1e-300)
-        return Unexplained(float(np.sqrt(1.0 + more))) if far and more >= _UNEXPLAINED else None
-    return best if far or best.effect.evidence == "base parameters" else None
+        return Unexplained(times) if far and more >= _UNEXPLAINED else None
+    return replace(best, times=times) if far or best.effect.evidence == "base parameters" else None
 
 
 def _moved(two: Sessions, one: Fit) -> Move | None:

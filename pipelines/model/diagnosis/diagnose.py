@@ -207,7 +207,8 @@ def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared,
         return _nameless(told, why)
     one = carried(moved, final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
-        return _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)
+        told = _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)
+        return _nameless(told, _MOVED.format(moved.times)) if moved.far and not told.findings else told
     findings = strongest((one.finding, *told.findings))
     return replace(told, verdict="cause", findings=findings, reason="", extended=one.arm,
                    summary=sentence(Ruling("cause", (), ""), findings, turning))

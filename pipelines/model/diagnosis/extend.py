@@ -30,6 +30,7 @@ from pipelines.model.diagnosis.findings import extended_arm, findings, held_find
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
+from pipelines.model.diagnosis.ledger import UNBELIEVABLE
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import at_odds, vague
@@ -185,8 +186,9 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
                                       (BY_CHANCE if vague(found, k, prepared, case) else "")):
             why[step.best.effect.name, step.best.effect.joint] = doubt
     taken = {(one.cause, one.joint) for one in told}
-    why |= {(f.cause, f.joint): "it takes nothing off the held-out error" for f in case.families
-            if (f.cause, f.joint) not in taken}
+    unlike = {(trial.cause, trial.joint) for step in found.steps for trial in step.trials if trial.reason == UNBELIEVABLE}
+    why |= {place: UNBELIEVABLE if place in unlike else "it takes nothing off the held-out error"
+            for place in ((f.cause, f.joint) for f in case.families) if place not in taken}
     return found, told, why
 
 

@@ -33,7 +33,7 @@ _SHAPE = 1e-3
 # least took 0.4 of its joint, a wrong one 0.09.
 _FIFTH = 0.2
 _TRIFLE = "it takes away less than what the law of a cause found before it may leave"
-_REST_UNKNOWN = "most of what stands above the noise at its joint has no name, and beside that this one is not sure"
+_REST_UNKNOWN = "most of what stands above the noise where it is seen has no name, and beside that this one is not sure"
 _MISFIT = "beside a gap, where nobody knows how the link lay in it at first, nothing that happened once is told from it"
 _LITTLE = "it explains less than half of what stands above the floor, which is so little that it may be the floor"
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
@@ -97,7 +97,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
         return Ruling("nothing-wrong", (), _NO_FLOOR if len(joints) else "")
     once = {k: _MISFIT for k, step in enumerate(accepted) if gap and _happened(step)}
     if not known:
-        doubts = once | {k: _REST_UNKNOWN for k, step in enumerate(accepted) if _of_joint(step, found, floor) < _FIFTH}
+        doubts = once | {k: _REST_UNKNOWN for k, step in enumerate(accepted) if _where_seen(step, found, floor) < _FIFTH}
         doubts |= {k: _TRIFLE for k, step in enumerate(accepted)
                    if _most_taken(step, found, floor) < _SHAPE and not _one_more(step, accepted[:k])}
         return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
@@ -111,14 +111,14 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Rul
     return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in once), "", once)
 
 
-def _of_joint(step: Step, found: Found, floor: Array) -> float:
-    """Share of the power above the noise that all that was found takes off the joint of a step; of the arm, off some joint.
-    Of a joint that stands in the noise it is none."""
+def _where_seen(step: Step, found: Found, floor: Array) -> float:
+    """Share of the power above the noise that all that was found takes off the joint where a step takes most: a weak drive is seen
+    at the joint before it. Of a joint that stands in the noise it is none."""
     before, after = (np.square(one.rms) for one in (found.nominal, found.final))
     above = before - np.square(floor)
     share = np.divide(before - after, above, out=np.zeros(len(above)), where=above > 0.0)
-    joint = None if step.best is None else step.best.effect.joint
-    return float(share.max() if joint is None else share[joint - 1])
+    done = step.before if step.best is None else step.best.done
+    return float(share[np.argmax((np.square(step.before.rms) - np.square(done.rms)) / np.maximum(np.square(floor), 1e-300))])
 
 
 def _one_more(step: Step, before: Sequence[Step]) -> bool:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
+from pipelines.model.diagnosis import diagnose as diagnose_module
 from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs
@@ -94,6 +96,17 @@ def test_base_parameters_that_moved_as_no_cause_moves_them_are_no_arm_in_order(w
         told = re.search(r"leaves ([\d.e+]+) times", found.reason)
         assert told is not None
         assert float(told[1]) > 1.5
+
+
+@pytest.mark.parametrize(("mass", "verdict"), [(0.3, "unknown"), (0.0, "nothing-wrong")])
+def test_a_load_that_is_not_accepted_leaves_no_arm_in_order(mass: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The base parameters have moved all the same, and the ledger says why the load has no name."""
+    doubted = SimpleNamespace(doubt="it is farther", finding=SimpleNamespace(cause="payload", joint=None))
+    monkeypatch.setattr(diagnose_module, "carried", lambda *_: doubted)
+    found = diagnose(Logs((loaded(1, mass), loaded(2, mass)), (loaded(3, mass, "validate"),),
+                          (loaded(4, 0.0, "reference"), loaded(5, 0.0, "reference"))), SETTINGS)
+    assert (found.verdict, found.findings) == (verdict, ())
+    assert [one.reason for one in found.rejected if one.cause == "payload"] == (["it is farther"] if mass else [])
 
 
 def story(effect: Effect, explained: float, numbers: int) -> Absorbed:

@@ -18,6 +18,7 @@ from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.contact import Contact
 from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.stribeck import Stribeck
+from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.effects.viscous_drift import ViscousDrift
 
 FLOOR = np.array([0.01, 0.01, 0.01])
@@ -161,3 +162,9 @@ def test_without_a_floor_a_joint_in_the_noise_is_no_fifth_of_what_the_arm_shows(
     case = found(left(0.01, 0.05, 0.9e-3), left(0.01, 0.0497, 0.89e-3), effects=(GravityTilt(),))
     ruling = rule(case, 1e-3 * np.ones(3), known=False)
     assert (ruling.named, set(ruling.doubts)) == ((), {0})
+
+
+def test_without_a_floor_a_weak_drive_is_asked_where_it_is_seen() -> None:
+    """A drive of joint 2 that gives too little looks there like a lighter arm, and is seen at joint 1 alone."""
+    case = found(left(0.16, 0.9e-3, 0.01), left(0.003, 0.9e-3, 0.01), effects=(TorqueGain(2),))
+    assert rule(case, 1e-3 * np.ones(3), known=False).named == (0,)
