@@ -35,16 +35,15 @@ def wrong_law(found: Diagnosis) -> bool:
     """Whether a diagnosis may have taken the curve for a cause, or miss one for it.
 
     Of what is wrong: where the same law of friction was found at two joints or more, or one that bends where dry friction changes
-    its sign. What has no name in the end may be what the search did not come to: it takes no more than a few causes, and an arm may
-    have more joints. Of what has changed: only where it has no name, for a curve was the same before; but other motion shows more
-    of it.
+    its sign. What has no name in the end may be what the search did not come to, for it takes no more than a few causes, or what
+    the law that was found leaves of the curve. Of what has changed: only where it has no name, for a curve was the same before; but
+    other motion shows more of it.
     """
     if found.question == "what has changed":
         return found.verdict == "unknown"
-    named = [(one.cause, one.joint) for one in found.findings]
-    tried = [(one.cause, one.joint) for one in found.ledger if one.accepted] if found.verdict == "unknown" else []
-    return (of_one_law([*named, *tried])
-            or any(_turning(one, found) for one in found.findings if find_effect(one.cause).friction))
+    laws = [one for one in found.findings if find_effect(one.cause).friction]
+    tried = found.verdict == "unknown" and any(one.accepted and find_effect(one.cause).friction for one in found.ledger)
+    return tried or of_one_law((one.cause, one.joint) for one in laws) or any(_turning(one, found) for one in laws)
 
 
 def of_one_law(causes: Iterable[tuple[str, int | None]]) -> bool:

@@ -124,6 +124,7 @@ def test_what_was_found_at_some_of_many_joints_is_asked_again() -> None:
     """Six joints rub by an arc tangent, and a search for four causes ends beside the others without a name for them."""
     assert wrong_law(told("unknown", (), tried=("torque_gain:2", "concave_friction:6", "concave_friction:4")))
     assert not wrong_law(told("unknown", (), tried=("torque_gain:2", "cogging:6", "cogging:4")))
+    assert wrong_law(told("unknown", (), tried=("concave_friction:1",)))  # the only joint of an arm of one
     assert not wrong_law(told("cause", ("torque_gain:2",), tried=("torque_gain:2", "concave_friction:6", "concave_friction:4")))
 
 
