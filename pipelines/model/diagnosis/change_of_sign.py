@@ -1,7 +1,7 @@
 """By which curve dry friction changes its sign: nobody knows it of a real joint, and no cause is to be found in that.
 
     of_one_law(causes)          one law of friction is among the greatest causes of several joints
-    wrong_law(found)            or has a name at several, which is no fault but how this make of arm rubs; or it bends where dry
+    wrong_law(found, most)      or has a name at several, which is no fault but how this make of arm rubs; or it bends where dry
                                 friction changes its sign
     loosened(prepared)          the same rows, for laws that fit the curve as well
     shows(prepared, other)      whether these leave less
@@ -31,19 +31,22 @@ _LESS = 0.95
 _WIDTHS = 10.0  # by then tanh and the root have come to their level, within half a per cent
 
 
-def wrong_law(found: Diagnosis) -> bool:
+def wrong_law(found: Diagnosis, most: int) -> bool:
     """Whether a diagnosis may have taken the curve for a cause, or miss one for it.
 
     Of what is wrong: where the same law of friction was found at two joints or more, or one that bends where dry friction changes
-    its sign. What has no name in the end may be what the search did not come to, for it takes no more than a few causes, or what
-    the law that was found leaves of the curve. Of what has changed: only where it has no name, for a curve was the same before; but
-    other motion shows more of it.
+    its sign; or is left at two above its threshold by a search that took as many causes as it may, `most`. What has no name in the
+    end may be what the law that was found leaves of the curve. Of what has changed: only where it has no name, for a curve was the
+    same before; but other motion shows more of it.
     """
     if found.question == "what has changed":
         return found.verdict == "unknown"
     laws = [one for one in found.findings if find_effect(one.cause).friction]
     tried = found.verdict == "unknown" and any(one.accepted and find_effect(one.cause).friction for one in found.ledger)
-    return tried or of_one_law((one.cause, one.joint) for one in laws) or any(_turning(one, found) for one in laws)
+    last = max((one.step for one in found.ledger), default=0)
+    left = [(one.cause, one.joint) for one in found.ledger if last > most and one.step == last and one.gain > one.threshold]
+    return (tried or of_one_law([(one.cause, one.joint) for one in laws]) or of_one_law(left)
+            or any(_turning(one, found) for one in laws))
 
 
 def of_one_law(causes: Iterable[tuple[str, int | None]]) -> bool:

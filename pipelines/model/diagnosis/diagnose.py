@@ -77,7 +77,8 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
         held = again
     else:
         held = found = _diagnosed(seen, chosen, say, calibration, memory)
-        if other is not prepared and wrong_law(found) and (found.verdict == "cause" or again is not None or shows(prepared, other)):
+        doubted = other is not prepared and wrong_law(found, chosen.most)
+        if doubted and (found.verdict == "cause" or again is not None or shows(prepared, other)):
             again = again or _again(other, chosen, say, calibration, memory)
             held = plainer_of(found, again)
     if held is again:
