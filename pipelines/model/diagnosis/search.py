@@ -215,7 +215,9 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     plain = None if best is None else plainer(case, now, tried, best, error)
     if plain is not None:
         best, tried = plain, [plain if one.screened is plain.screened else one for one in tried]
-    lasting = _fewest(sorted((one for one in tried if one.log is None), key=lambda one: one.rank))  # an event may be refused yet
+    lasting = best
+    if best is not None and best.log is not None:  # an event may be refused yet
+        lasting = _fewest(sorted((one for one in tried if one.log is None), key=lambda one: one.rank))
     tried = [best_form(case, now, one, error) if one in (best, lasting) else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
 
