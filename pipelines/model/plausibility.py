@@ -32,8 +32,8 @@ _RATIO = 2.5  # a load of a quarter of the arm's mass doubles a joint's inertia 
 _RATIO_RESIDUAL = 0.25
 _EXPLAINED, _UNEXPLAINED, _APART = 0.1, 0.3, 5.0  # relative residuals; a saturated or touched arm is not so clear a case
 _TIMED = 1.0  # samples; a wider bound cannot tell an offset of one sample
-# Times the bound of a drift: what friction remembers of a reversal, which no row of the model has, drifted by 1.3 bounds in an arm
-# in order, and a log that is refused is lost.
+# Times the bound of a drift, beyond which a log is refused and not only warned of: what friction remembers of a reversal, which no
+# row of the model has, drifted by 1.3 bounds in an arm in order, and a log that is refused is lost.
 _DRIFTS = 2.0
 _CONDITION = 1e4  # of unit columns: what 0.01 % of noise in the motion makes of a parameter
 
@@ -193,10 +193,10 @@ def _clock(e: Evidence) -> Sequence[Check | NotTested]:
     words = (f"torque lies {abs(found.samples):.2f} ± {found.bound:.2f} samples ({abs(found.samples) * ms:.3g} ms) "
              f"{'behind' if found.samples > 0 else 'ahead of'} the motion")
     drift = f"{found.drift:+.2f} ± {found.drift_bound:.2f} samples over the log"
-    if abs(found.drift) > 1.0 + _DRIFTS * found.drift_bound:
+    if abs(found.drift) > 1.0 + found.drift_bound:
         return [e.subject.say("T06", "warn",
                               f"the clocks of q and tau drift by {drift}",
-                              signal="tau", gate=True,
+                              signal="tau", gate=abs(found.drift) > 1.0 + _DRIFTS * found.drift_bound,
                               remedy="stamp position and torque by one clock")]
     if abs(found.samples) > 1.0 + found.bound:
         return [e.subject.say("T06", "warn",

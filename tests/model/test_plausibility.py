@@ -10,7 +10,8 @@ import pytest
 from pipelines.log.doctor.checks import NotTested, Subject
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.robot import LinkParameters
-from pipelines.model.clock_offset import clock_offset
+from pipelines.model import plausibility as plausibility_module
+from pipelines.model.clock_offset import Offset, clock_offset
 from pipelines.model.evidence import Evidence
 from pipelines.model.plausibility import excitation_condition, plausibility, plausibility_findings
 from pipelines.model.rigid.choose import rigid_body
@@ -170,6 +171,14 @@ def test_what_is_wrong_with_an_arm_is_not_a_mix_up(cause: str, seed: int) -> Non
 def test_a_late_encoder_is_a_warning_not_a_gate(delay: float) -> None:
     log = make_log(fourier(np.random.default_rng(3)), torque=lambda path, t: arm_torque(path, t - delay))
     assert said(log) == [("T06", False)]
+
+
+@pytest.mark.parametrize(("bound", "found"), [(8.0, []), (5.03, [("T06", False)]), (0.5, [("T06", True)])])
+def test_a_drift_that_is_hardly_sure_is_told_and_the_log_is_kept(bound: float, found: list[tuple[str, bool]],
+                                                                monkeypatch: pytest.MonkeyPatch) -> None:
+    """6.58 +- 5.03 samples were the bristles of an arm in order; 6.58 +- 0.5 are two clocks."""
+    monkeypatch.setattr(plausibility_module, "clock_offset", lambda *_: Offset(0.1, 0.2, 6.58, bound, 3))
+    assert said(good_log()) == found
 
 
 def test_a_delay_of_one_joint_is_not_a_clock() -> None:

@@ -29,8 +29,8 @@ _REST_OF_GAP = 0.6  # the same beside a gap: where the link is in it hangs on lu
 # Without a floor: of the power that stood above the noise. The law of a cause found first is that of the machine to a few
 # hundredths of its torque, and what it leaves looks like other causes.
 _SHAPE = 1e-3
-# What is left of a joint beside its friction is of no known cause, or not all of it. Of 40 single causes found without a floor the
-# least took 0.4 of its joint, a wrong one 0.09.
+# What is left of a joint beside its friction is of no known cause, or not all of it. Of 33 arms whose causes were named
+# rightly without a floor the least took 0.4 of its joint; a wrong one took 0.09, and two LuGre joints told as Stribeck took none.
 _FIFTH = 0.2
 _TRIFLE = "it takes away less than what the law of a cause found before it may leave"
 _REST_UNKNOWN = "most of what stands above the noise where it is seen has no name, and beside that this one is not sure"
