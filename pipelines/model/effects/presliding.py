@@ -21,6 +21,9 @@ _ONE = 1e-6  # from an exponent of 1, within which it is 1
 _SLIDES = 1e-12  # of the largest bending
 _LEAST = 0.05  # exponent of elements: below, all slip as one
 _SLIPS = 12  # elements that slip one after the other
+_BREAKAWAY = 0.3  # from which a refit finds others, and none
+_STRIBECK = 0.1  # of the fastest speed: where it looks for the speed over which friction falls
+_SIDE_BY_SIDE = 256  # stretches of a motion
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ class Presliding(Effect):
     Bristles know no more than how far they bend. Where inner loops close, elements that slip one after the other stand in their
     place (Iwan 1966; Al-Bender, Lampaert & Swevers 2005): u = Σ w_i z_i, dz_i = 2 dx/X_i within ±1, w_i and X_i such that a
     reversal while sliding goes as above.
+
+    With a breakaway b more friction at standstill than at speed, which falls over v_s (Canudas de Wit et al. 1995, eq. (4)),
+
+        du/dt = v/x_c (1 - s u/h(v)),  h(v) = 1 + b exp(-(v/v_s)^2)
     """
 
     distance: float = 1e-2  # x_c [rad]
@@ -45,6 +52,8 @@ class Presliding(Effect):
     damping_time: float = 0.0  # T_d [s]
     exponent: float = 1.0  # n, held where it is 1
     inner_loops: float = 0.0
+    breakaway: float = 0.0  # b, held where it is 0
+    breakaway_speed: float = 0.1  # v_s [rad/s]
 
     name = "presliding"
     title = "Presliding"
@@ -56,6 +65,8 @@ class Presliding(Effect):
         Quantity("exponent", "1", 0.0, 3.0, "how gradually it begins to slide", shape=True, unsaid=1.0),
         Quantity("inner_loops", "1", 0.0, 1.0, "1 where a small loop inside a large one closes", shape=True, discrete=True,
                  unsaid=0.0),
+        Quantity("breakaway", "1", 0.0, 5.0, "how much larger friction is at standstill than at speed", shape=True, unsaid=0.0),
+        Quantity("breakaway_speed", "rad/s", 1e-3, 5.0, "speed over which it falls to that", shape=True, unsaid=0.1),
     )
     signature = "After each reversal friction turns over along a loop against position, whatever the speed."
     explanation = "Contacts, seals and gears bend before they slide, and bend back after a reversal."
@@ -66,31 +77,43 @@ class Presliding(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         contact, unit = self._contact, self._unit
-        states = contact.along(self.own(motion.q) / unit)
+        v = self.own(motion.dq) / unit
+        states = contact.along(self.own(motion.q) / unit, v)
         u = contact.bent(states)
         if self.damping_time:
-            u = u + self.damping_time * contact.bent(contact.rate(states, self.own(motion.dq) / unit))
+            u = u + self.damping_time * contact.bent(contact.rate(states, v))
         return self.on_own_row(arm, u)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """From a thousandth to a tenth of the travel."""
         travel = float(np.ptp(self.own(motion.q))) or 1.0
+        slow = float(np.clip(_STRIBECK * np.abs(self.own(motion.dq)).max(initial=0.0), 1e-3, 5.0))
         for distance in np.geomspace(1e-3 * travel, 0.1 * travel, 9).tolist():
-            yield replace(self, distance=float(np.clip(distance, 1e-6, 0.2)))
+            yield replace(self, distance=float(np.clip(distance, 1e-6, 0.2)), breakaway_speed=slow)
 
     def full(self) -> Self:
         return replace(self, elastic=_HALFWAY)
 
     def forms(self) -> tuple[Self, ...]:
-        return replace(self, exponent=_OTHER), replace(self, exponent=_OTHER, inner_loops=1.0)
+        return (replace(self, exponent=_OTHER), replace(self, exponent=_OTHER, inner_loops=1.0),
+                replace(self, elastic=-1.0, breakaway=_BREAKAWAY))
 
     @property
     def free(self) -> tuple[str, ...]:
-        return tuple(name for name in super().free if name != "exponent" or self.exponent != 1.0)
+        held = {"elastic", "exponent"} if self.breakaway else {"breakaway", "breakaway_speed"}
+        if self.exponent == 1.0:
+            held.add("exponent")
+        return tuple(name for name in super().free if name not in held)
+
+    def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
+        """Without a speed over which nothing falls."""
+        said = super().reported(values)
+        return said if values["breakaway"] else {name: x for name, x in said.items() if not name.startswith("breakaway")}
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
-        """What is left of it at constant speed: Coulomb friction."""
-        return np.asarray(values["amplitude"] * np.sign(dq))
+        """What is left of it at constant speed: Coulomb friction, and its breakaway."""
+        shaped = self.at(values)
+        return np.asarray(values["amplitude"] * np.sign(dq) * _level(dq, shaped.breakaway, shaped.breakaway_speed))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         shaped, amplitude = self.at(values), values["amplitude"]
@@ -108,12 +131,16 @@ class Presliding(Effect):
         return Hooks(load=load, states=contact.states, rate=rate)
 
     @property
-    def _contact(self) -> _Bristles | _Slips:
+    def _contact(self) -> _Bristles | _Slips | _Breaking:
+        if self.breakaway:
+            return _Breaking(self.breakaway, self.breakaway_speed / self._unit)
         return _Slips(self.elastic, self.exponent) if self.inner_loops else _Bristles(self.elastic, self.exponent)
 
     @property
     def _unit(self) -> float:
         """d [rad]: y(x) from -1 is zero at x = 1, or where e < 0 at 1 + e + (1 - e) ln(1 - e), for n = 1."""
+        if self.breakaway:
+            return self.distance
         e, n = self.elastic, self.exponent
         one = (1.0 - e) * math.log(1.0 - e) if abs(n - 1.0) < _ONE else ((1.0 - e) - (1.0 - e) ** n) / (1.0 - n)
         return self.distance * math.log(2.0) / (1.0 if e >= 0.0 else 1.0 + e + one)
@@ -127,7 +154,7 @@ class _Bristles:
     exponent: float
     states = 1
 
-    def along(self, q: Array) -> Array:
+    def along(self, q: Array, v: Array) -> Array:
         """(samples, states), relaxed at the start; exact between the samples where they keep direction."""
         begin, side, which, travel = _strokes(q)
         at, first = 0.0, np.empty(len(begin))
@@ -184,7 +211,7 @@ class _Slips:
             mean = (1.0 + _SLIPS * n * np.diff(g ** (1.0 / n))) / (1.0 - n)
         return np.asarray(1.0 + self.elastic + (1.0 - self.elastic) * mean)
 
-    def along(self, q: Array) -> Array:
+    def along(self, q: Array, v: Array) -> Array:
         """(samples, states), relaxed at the start; exact between the samples where they keep direction."""
         begin, side, which, travel = _strokes(q)
         half = 0.5 * self._travels
@@ -206,6 +233,47 @@ class _Slips:
 
     def bent(self, states: Array) -> Array:
         return np.asarray(states @ self._weights)
+
+
+@dataclass(frozen=True)
+class _Breaking:
+    """One state u. It slides at the less the faster it goes, and forgets over a travel that hangs on the speed."""
+
+    breakaway: float
+    speed: float
+    states = 1
+
+    def along(self, q: Array, v: Array) -> Array:
+        """(samples, states), relaxed at the start; exact between the samples where they keep speed and direction."""
+        step = np.diff(q)
+        level = _level(0.5 * (v[1:] + v[:-1]), self.breakaway, self.speed)
+        kept = np.exp(-np.abs(step) / level)
+        return _recursion(kept, np.sign(step) * level * (1.0 - kept))[:, None]
+
+    def rate(self, states: Array, v: Array) -> Array:
+        return np.asarray(v * (1.0 - np.sign(v) * states[:, 0] / _level(v, self.breakaway, self.speed)))[:, None]
+
+    def bent(self, states: Array) -> Array:
+        return np.asarray(states[:, 0])
+
+
+def _level(v: Array, breakaway: float, speed: float) -> Array:
+    """h(v)"""
+    return np.asarray(1.0 + breakaway * np.exp(-np.square(v / speed)))
+
+
+def _recursion(kept: Array, added: Array) -> Array:
+    """(steps + 1,) x_(k+1) = kept_k x_k + added_k from 0, worked out in many stretches side by side that are then joined."""
+    long = -(-len(kept) // _SIDE_BY_SIDE)
+    a, b = np.ones((_SIDE_BY_SIDE, long)), np.zeros((_SIDE_BY_SIDE, long))
+    a.flat[:len(kept)], b.flat[:len(kept)] = kept, added
+    for k in range(1, long):
+        b[:, k] += a[:, k] * b[:, k - 1]
+        a[:, k] *= a[:, k - 1]
+    first = np.zeros((_SIDE_BY_SIDE, 1))
+    for k in range(1, _SIDE_BY_SIDE):
+        first[k] = a[k - 1, -1] * first[k - 1] + b[k - 1, -1]
+    return np.append(0.0, (a * first + b).ravel()[:len(kept)])
 
 
 def _strokes(q: Array) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.intp], Array]:

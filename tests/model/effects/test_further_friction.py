@@ -29,13 +29,13 @@ def swinging(hz: float = 0.7, samples: int = 4001) -> Motion:
     return Motion(t, q, dq, ddq)
 
 
-def bristles(motion: Motion, distance: float) -> Array:
-    """du/dt = (v - |v| u)/x_c, by an adaptive integrator over the true speed."""
+def bristles(motion: Motion, distance: float, breakaway: float = 0.0, slow: float = 0.2) -> Array:
+    """du/dt = v - |v| u/h(v) over x_c, by an adaptive integrator over the true speed."""
     w = 2 * np.pi * 0.7
 
     def rate(t: float, u: Array) -> Array:
         v = 0.3 * w * np.cos(w * t) + 0.05 * 5.3 * w * np.cos(5.3 * w * t)
-        return np.asarray((v - abs(v) * u) / distance)
+        return np.asarray((v - abs(v) * u / (1.0 + breakaway * np.exp(-(v / slow) ** 2))) / distance)
 
     solved = solve_ivp(rate, (0.0, 4.0), [0.0], t_eval=motion.t, rtol=1e-9, atol=1e-11, max_step=2e-3)
     return np.asarray(solved.y[0])
@@ -43,14 +43,16 @@ def bristles(motion: Motion, distance: float) -> Array:
 
 @pytest.mark.parametrize("distance", [0.003, 0.03, 0.2])
 @pytest.mark.parametrize("time", [0.0, 2e-3])
-def test_presliding_solves_its_differential_equation(distance: float, time: float) -> None:
-    """Dahl and LuGre along a motion with reversals. Between the samples a turning point is missed by a T²/8 of travel at most,
+@pytest.mark.parametrize("breakaway", [0.0, 0.6])
+def test_presliding_solves_its_differential_equation(distance: float, time: float, breakaway: float) -> None:
+    """Dahl and LuGre, with more friction at standstill and without, along a motion with reversals. Between the samples a turning point is missed by a T²/8 of travel at most,
     there and back."""
     motion, arm = swinging(), synthetic_arm()
-    u = bristles(motion, distance)
+    u = bristles(motion, distance, breakaway)
     v = motion.dq[:, 1]
-    expected = 2.0 * (u + time * (v - np.abs(v) * u) / distance)
-    found = Presliding(2).torque(motion, arm, DAHL | {"amplitude": 2.0, "distance": distance, "damping_time": time})[:, 1]
+    expected = 2.0 * (u + time * (v - np.abs(v) * u / (1.0 + breakaway * np.exp(-np.square(v / 0.2)))) / distance)
+    found = Presliding(2).torque(motion, arm, DAHL | {"amplitude": 2.0, "distance": distance, "damping_time": time,
+                                                      "breakaway": breakaway, "breakaway_speed": 0.2})[:, 1]
     missed = 2.0 * np.abs(motion.ddq).max() * 1e-3**2 / 8.0 / distance
     assert np.abs(found - expected).max() < (missed + 1e-4) * np.abs(expected).max()
 
@@ -66,7 +68,8 @@ def test_presliding_starts_again_from_where_it_was() -> None:
 
 @pytest.mark.parametrize(("law", "time"), [
     ({}, 0.0), ({}, 1e-3), ({"elastic": 0.5}, 0.0), ({"elastic": 0.5}, 1e-3), ({"elastic": 0.3, "exponent": 0.6}, 0.0),
-    ({"elastic": 0.2, "inner_loops": 1.0}, 0.0)], ids=["Dahl", "LuGre", "elastic", "elastic, damped", "abrupt", "slips"])
+    ({"elastic": 0.2, "inner_loops": 1.0}, 0.0), ({"breakaway": 0.5, "breakaway_speed": 0.3}, 1e-3)],
+    ids=["Dahl", "LuGre", "elastic", "elastic, damped", "abrupt", "slips", "breakaway"])
 def test_presliding_simulates_as_it_fits(law: dict[str, float], time: float) -> None:
     """The state of the forward simulation, stepped along the motion, gives the torque of the fit."""
     motion, arm = swinging(), synthetic_arm()
