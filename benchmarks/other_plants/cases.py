@@ -7,14 +7,16 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from benchmarks.other_plants.arms import ARMS, Arm
+from benchmarks.other_plants.faults import Fault
+from benchmarks.other_plants.friction import Friction
 from benchmarks.other_plants.loops import Loop, motion
-from benchmarks.other_plants.plant import Fault, Friction, Plant
+from benchmarks.other_plants.plant import Plant
 from pipelines.log import schema
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.robot import format_robot
@@ -26,6 +28,7 @@ FOUR: Motions = (("fourier", "identify"), ("moves", "identify"), ("fourier", "va
 FIVE: Motions = (*FOUR[:2], ("ramps", "identify"), *FOUR[2:])
 THREE: Motions = (("fourier", "identify"), ("fourier", "validate"), ("moves", "validate"))
 BEFORE: Motions = (("fourier", "reference"), ("moves", "reference"))
+_TOUCHED = 0  # number of the log in which something is touched
 _SIZE = {"torque_offset": 0.1, "cogging": 0.1, "spring": 0.12, "hopping torque": 0.1}  # of the joint's typical torque
 
 
@@ -65,15 +68,16 @@ class Case:
         typical = typical + law.coulomb
         resolution = np.array([self.resolution * (0.1 if axis.slide else 1.0) for axis in arm.axes])
         robot = arm.described(tuple(resolution.tolist()), np.ceil(6.0 * typical), self.geared)
-        sick = self._fault(typical, law, speed)
         counts = 12.0 * typical / 2**13
+        sick = self._fault(typical, law, speed)
         logs = []
         for place, (kind, role) in enumerate(self.motions):
             own = np.random.default_rng([seed, place])
             t: Array = np.arange(round(self.duration / self.sample_time)) * self.sample_time
             path = motion(kind, arm, t, own)
             loop = Loop(self.loop, arm, self.sample_time, inertia, min(5.0, 0.02 / self.sample_time), counts)
-            plant = Plant(arm, law, None if role == "reference" else sick, self.noise * typical, self.coloured, resolution)
+            now = None if role == "reference" or (self.fault == "contact" and place != _TOUCHED) else sick
+            plant = Plant(arm if now is None else self._bent(arm), law, now, self.noise * typical, self.coloured, resolution)
             q, tau = plant.run(loop, path, self.sample_time, own)
             values = {"t": t + 3.0 * place, "q": q, "tau": tau, **dict(zip(("q_ref", "dq_ref", "ddq_ref"), path, strict=True))}
             signals = {name: Signal(array, schema.unit_of(name, "pd"), schema.SIGNALS[name][1]) for name, array in values.items()}
@@ -87,13 +91,26 @@ class Case:
         if not self.fault:
             return None
         j = self.joint - 1
-        size = self.size or _SIZE.get(self.fault, 0.0) * float(typical[j])
-        if self.fault == "asymmetric_friction":
+        size, number = self.size or _SIZE.get(self.fault, 0.0) * float(typical[j]), self.number
+        if self.fault in ("asymmetric_friction", "concave_friction"):
             size *= float(law.coulomb[j])
+            number *= float(speed[j])
+        elif self.fault == "quadratic_drag":
+            size *= float(typical[j] / speed[j] ** 2)
+        elif self.fault == "torque_saturation":
+            size *= float(typical[j])
         elif self.fault == "heat from another joint":
             other = int(self.number)
             size = float(typical[other] * speed[other])
-        return Fault(self.fault, j, size, self.number)
+        return Fault(self.fault, j, size, number)
+
+    def _bent(self, arm: Arm) -> Arm:
+        """With the link before a joint as long as it truly is; its description and its loop know no better."""
+        if self.fault != "link_length":
+            return arm
+        axes, j = list(arm.axes), self.joint - 1
+        axes[j] = replace(axes[j], a=axes[j].a + self.size)
+        return replace(arm, axes=tuple(axes))
 
 
 def _scales(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array, Array]:

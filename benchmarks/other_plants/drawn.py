@@ -20,7 +20,13 @@ _HEALTHY, _OUTSIDE = 0.45, 0.1  # of the cases
 _REFERENCE = 0.25
 _ARTICULATED = ("planar", "upright", "scara", "six")
 _UNDER_LOAD = {"lift": (1,), "planar": (1, 2), "upright": (2, 3), "six": (2, 3)}
+_EVERY = {name: tuple(range(1, len(arm.axes) + 1)) for name, arm in ARMS.items()}
+_TURNING = {name: tuple(k for k, axis in enumerate(arm.axes, start=1) if not axis.slide and axis.reach >= 1.2)
+            for name, arm in ARMS.items() if name in ("pendulum", "planar", "upright", "scara", "wrist", "six")}
+_LONG = {"planar": (2,), "upright": (3,), "scara": (2,), "six": (3,)}  # the link before it carries much
 _COUPLED = {"planar": (1, 2), "upright": (2, 3), "scara": (1, 2), "six": (2, 3), "wrist": (1, 2, 3)}
+# Of two joints only the ratio of their scales shows: one too weak is the other too strong.
+_SCALED = {name: joints for name, joints in _COUPLED.items() if name != "planar"}
 # A constant force on a slide that gravity pulls along is its weight, which nobody knows.
 _FREE = {"pendulum": (1,), "table": (1, 2), "planar": (1, 2), "upright": (1, 2, 3), "scara": (1, 2, 4), "gantry": (1, 2),
          "wrist": (1, 2, 3), "six": (1, 2, 3, 4, 5, 6)}
@@ -110,10 +116,50 @@ def _drift(plain: Case, rng: np.random.Generator) -> Case:
     return replace(made, motions=FOUR, duration=15.0)
 
 
+def _position(plain: Case, rng: np.random.Generator) -> Case:
+    made = _at(plain, rng, _EVERY, "position_friction", rng.uniform(0.25, 0.5))
+    slides = ARMS[made.arm].axes[made.joint - 1].slide
+    return replace(made, number=2.0 * np.pi / rng.uniform(0.1, 0.2) if slides else float(rng.integers(1, 4)))
+
+
+def _lag(plain: Case, rng: np.random.Generator, fault: str) -> Case:
+    """Where rows know little of each other, a drive that is slow and an encoder that is late are one."""
+    made = _at(plain, rng, _EVERY, fault, rng.uniform(0.004, 0.008))
+    made = replace(made, sample_time=min(plain.sample_time, 2e-3))
+    if fault == "time_delay":
+        made = replace(made, size=round(made.size / made.sample_time) * made.sample_time)
+    return made if fault == "torque_lag" or made.arm in _ARTICULATED else replace(made, answers=DELAY)
+
+
+def _encoder(plain: Case, rng: np.random.Generator) -> Case:
+    made = _at(plain, rng, _TURNING, "encoder_eccentricity", rng.uniform(0.003, 0.006))
+    return replace(made, number=rng.uniform(0.0, 2.0 * np.pi))
+
+
+def _misread(plain: Case, rng: np.random.Generator) -> Case:
+    made = _at(plain, rng, _COUPLED, "encoder_crosstalk", _signed(rng, 0.015, 0.03))
+    others = [joint - 1 for joint in _COUPLED[made.arm] if joint != made.joint]
+    return replace(made, number=float(rng.choice(others)))
+
+
+def _touch(plain: Case, rng: np.random.Generator) -> Case:
+    made = _at(plain, rng, dict.fromkeys(_ARTICULATED, (1,)), "contact", rng.uniform(15.0, 40.0), rng.uniform(-1.0, 1.0))
+    return replace(made, motions=(FOUR, FIVE)[rng.integers(2)])
+
+
 _FAULTS: dict[str, Callable[[Case, np.random.Generator], Case]] = {
     "torque_offset": lambda plain, rng: _at(plain, rng, _FREE, "torque_offset"),
     "cogging": _cogging, "spring": _spring, "gravity_tilt": _tilt, "torque_delay": _delay, "torque_crosstalk": _crosstalk,
     "payload": _payload, "viscous_drift": _drift,
-    "torque_gain": lambda plain, rng: _at(plain, rng, _COUPLED, "torque_gain", _signed(rng, 0.08, 0.2)),
+    "position_friction": _position, "encoder_eccentricity": _encoder, "encoder_crosstalk": _misread, "contact": _touch,
+    "time_delay": lambda plain, rng: _lag(plain, rng, "time_delay"),
+    "drive_lag": lambda plain, rng: _lag(plain, rng, "drive_lag"),
+    "torque_lag": lambda plain, rng: _lag(plain, rng, "torque_lag"),
+    "link_length": lambda plain, rng: _at(plain, rng, _LONG, "link_length", _signed(rng, 0.012, 0.025)),
+    "quadratic_drag": lambda plain, rng: _at(plain, rng, _EVERY, "quadratic_drag", rng.uniform(0.1, 0.25)),
+    "concave_friction": lambda plain, rng: _at(plain, rng, _EVERY, "concave_friction", rng.uniform(0.3, 0.5),
+                                               rng.uniform(0.5, 1.0)),
+    "torque_saturation": lambda plain, rng: _at(plain, rng, _COUPLED, "torque_saturation", rng.uniform(1.3, 1.8)),
+    "torque_gain": lambda plain, rng: _at(plain, rng, _SCALED, "torque_gain", _signed(rng, 0.08, 0.2)),
     "asymmetric_friction": lambda plain, rng: _at(plain, rng, _FREE, "asymmetric_friction", rng.uniform(0.15, 0.4)),
     "load_friction": lambda plain, rng: _at(plain, rng, _UNDER_LOAD, "load_friction", rng.uniform(0.06, 0.15))}

@@ -51,7 +51,7 @@ class Sessions:
     later: Mask  # (rows,)
     rigid: Array  # (k, rows) of the rigid body
     others: Array  # (m, rows) of friction, with coefficients of their own before and after
-    common: Array  # (n, rows) of the standing set
+    common: Array  # (n, rows) of the standing set, and of what was found in the later rows
     weight: Array  # (joints,)
 
     def fit(self, moved: bool, more: Array | None = None) -> Fit:

@@ -172,7 +172,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     found = search(case, chosen.most)
     done = settled(found, rule(found, since.floor), case, now, since.floor)
     noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
-    moved = since.absorbed(done.found.final.of_effects, () if done.ruling.named else case.families)
+    moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
     if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
         done = unnamed(done, _with_load(found, case, now, since.floor, noise, chosen.seed))
     floored = Floored(since.floor, "reference logs", None, given, noise)

@@ -113,7 +113,7 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
     laws = () if left else every  # what the residual does not show may be in the base parameters
-    seen = ask(found.final.of_effects, laws) if ask is not None and (taken_in or laws) else None
+    seen = ask(found.final, laws) if ask is not None and (taken_in or laws) else None
     moved = seen if isinstance(seen, Absorbed) and any(_is(one, seen) for one in rest) else None
     refused = {place: why for place, why in refused.items() if moved is None or place != (moved.effect.name, moved.effect.joint)}
     unmoved = [one for one in taken_in if moved is None or not _is(one, moved)]

@@ -15,10 +15,11 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origin_of, refuse_unfit, thresholds_of
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.clean import clean
 from pipelines.model.diagnosis.evidence import floors_of
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.own_motion import following
-from pipelines.model.diagnosis.search import Explored, clean
+from pipelines.model.diagnosis.search import Explored
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import drive_noise, make_twin, replayable, white

@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.own_motion import following, standing_out
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
-from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, too_little, without_steps
+from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, at_floor, held_out_high, seen_in, too_little, without_steps
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unlike_motion", "unnamed", "vague"]
@@ -78,6 +78,10 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         final = _without(found, kept, case, final)
     while kept and (why := _harm(found, final, case)):
         doubts[kept.pop()] = why
+        final = _without(found, kept, case, final)
+    if not known and kept and (unsure := _unseen(found, kept, final, case, floor)):
+        doubts |= dict.fromkeys(unsure, REST_UNKNOWN)
+        kept = [k for k in kept if k not in unsure]
         final = _without(found, kept, case, final)
     if known and len(kept) < len(found.final.model.effects) and too_little(found.nominal.rms, final.rms, floor):
         doubts |= dict.fromkeys(kept, _BESIDE)
@@ -161,6 +165,13 @@ def _harm(found: Found, final: Refined, case: Case) -> str:
     """Why the model with everything is worse than the nominal one on some held-out log."""
     left = [held_out_left(one, case.judge, case.blocks) for one in (found.nominal, final)]
     return worse_log(case.data if case.judge is None else case.judge, *left)
+
+
+def _unseen(found: Found, kept: list[int], final: Refined, case: Case, floor: Array) -> list[int]:
+    """Those beside which most of what stands above the noise in held-out time has no name."""
+    rows = case.data if case.judge is None else case.judge
+    nominal, last = (rows.rms(held_out_left(one, case.judge, case.blocks)) for one in (found.nominal, final))
+    return [k for k in kept if not seen_in(found.steps[k], nominal, last, floor)]
 
 
 def _not_told(step: Step, prepared: Prepared, blocks: int) -> bool:

@@ -12,25 +12,23 @@ or with one more that is worth it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.borne_out import borne_out, not_borne_out
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.curves import with_curves_anew
-from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole, plainer
+from pipelines.model.diagnosis.hypotheses import best_form, fitted, plainer
 from pipelines.model.diagnosis.ledger import Tried, ledger
-from pipelines.model.diagnosis.nominal import orthonormal
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
-from pipelines.model.diagnosis.waves import without_waves
 
-__all__ = ["Explored", "Found", "Step", "clean", "gap_first", "gives_way", "greatest", "provisional", "search"]
+__all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "greatest", "provisional", "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
@@ -107,7 +105,8 @@ def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:
 
 
 def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
-    """Up to `most` causes; what `rough` explored already is not done again, as long as it leads the same way."""
+    """Up to `most` causes, the same at several joints being one; what `rough` explored already is not done again, as long as it
+    leads the same way."""
     now = rough[0].before if rough else refine(case.model, case.data, case.weight)
     nominal = now
     steps: list[Step] = []
@@ -121,7 +120,7 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         explored = rough[number - 1] if same else _explored(case, now, screened, gate.passed)
         if same and not case.floored:
             explored = _explored(case, now, screened, gate.passed, explored.tried)
-        step = _step(case, explored, gate, number, number <= most)
+        step = _step(case, explored, gate, number, _different(now) < most)
         steps.append(step)
         asked.append((explored, gate))
         if step.best is None:
@@ -138,6 +137,13 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         follows = number < len(rough) and same and step.best is _fewest(rough[number - 1].tried)
         now = rough[number].before if follows else _reweighted(step.best.done)
     return Found(nominal, tuple(steps), now)
+
+
+def _different(now: Refined) -> int:
+    """How many causes a model has: one that is there at several joints counts once, two at one joint twice."""
+    places = Counter((one.effect.name, one.effect.joint) for one in now.model.effects)
+    names = {name for name, _ in places}
+    return sum(max(count for (name, _), count in places.items() if name == wanted) for wanted in names)
 
 
 def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explored, _Gate]]) -> tuple[int, Step, Tried] | None:
@@ -274,20 +280,6 @@ def _fewest(tried: Sequence[Tried]) -> Tried | None:
     near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least) and joint in (None, one.screened.joint)
             and (one.done.rms[own] <= _WORSE * possible[0].done.rms[own]).all()]
     return min(near, key=lambda one: (not one.sure, one.done.model.effects[-1].count, one.rank))
-
-
-def clean(explored: Explored, most: int = 8) -> Array:
-    """(rows,) [N m] what is left when everything that the most promising causes could explain is taken away, right or wrong, and
-    every line along an angle, of which no cause need know.
-
-    Noise is in it, and hardly any fault: a fault would pass for noise, and the twin would be too noisy to show anything.
-    """
-    now, fit = explored.before, explored.before.fit
-    best = sorted((one for one in explored.screened if not one.family.event), key=lambda one: -one.gain[0])[:most]
-    tables = [laid_whole(now.data, one.shape[0].full(), now.model.arm) for one in best]
-    basis = orthonormal(np.concatenate([fit.project(table) for table in tables]))
-    residual = fit.residual - (basis @ fit.residual) @ basis
-    return without_waves(now.data, np.asarray(residual / fit.weights))
 
 
 def _reweighted(done: Refined) -> Refined:

@@ -33,7 +33,7 @@ from pipelines.model.diagnosis.thresholds import Thresholds
 __all__ = ["Known", "Moved", "Probed", "Since", "since_reference"]
 
 Probed = Callable[[Refined, Data | None, Arms], tuple[Probe, Thresholds]]
-Moved = Callable[[Array, Sequence[Family]], Absorbed | Unexplained | None]
+Moved = Callable[[Refined, Sequence[Family]], Absorbed | Unexplained | None]
 Known = tuple[Array, Mapping[tuple[str, int | None], float]]  # weights (joints,) and gains with these
 
 
@@ -46,7 +46,7 @@ class Since:
     left: Array  # (rows,) [N m] of the reference logs, by the model that has the standing effects
     standing: tuple[Standing, ...]
     acting: tuple[Acting, ...]  # the same, for a model, after those that were taken out before
-    absorbed: Moved  # see `absorbed`: less a torque (rows,) [N m] of the later logs
+    absorbed: Moved  # see `absorbed`: beside what was found in the later logs
     chance: Chance
     probed: Probed  # beside a final model: what limits are looked for with
 
@@ -92,9 +92,11 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
                 beside=(*before, *acting))
     kept = len(columns.kept)
 
-    def moved(torque: Array, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
-        rows, _ = joined(reference, less(prepared.data, torque))
-        two = Sessions(rows, later, base[:kept], nominal[kept:], common, whole.weight)
+    def moved(found: Refined, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
+        """The numbers of what was found stay free: they were fitted beside base parameters that could do a part of it."""
+        rows, _ = joined(reference, less(prepared.data, found.of_effects))
+        beside = np.concatenate([common, _slopes(found, later)])
+        two = Sessions(rows, later, base[:kept], nominal[kept:], beside, whole.weight)
         return absorbed(two, arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)
 
     pairs = list(zip(standing, sizes, strict=True))

@@ -23,6 +23,7 @@ _LEAST = 0.05  # exponent of elements: below, all slip as one
 _SLIPS = 12  # elements that slip one after the other
 _BREAKAWAY = 0.3  # from which a refit finds others, and none
 _STRIBECK = 0.1  # of the fastest speed: where it looks for the speed over which friction falls
+_FAST = 20.0  # times that speed: nothing of a breakaway is left
 _SIDE_BY_SIDE = 256  # stretches of a motion
 
 
@@ -259,7 +260,7 @@ class _Breaking:
 
 def _level(v: Array, breakaway: float, speed: float) -> Array:
     """h(v)"""
-    return np.asarray(1.0 + breakaway * np.exp(-np.square(v / speed)))
+    return np.asarray(1.0 + breakaway * np.exp(-np.square(np.minimum(np.abs(v), _FAST * speed) / speed)))
 
 
 def _recursion(kept: Array, added: Array) -> Array:

@@ -45,8 +45,8 @@ def bristles(motion: Motion, distance: float, breakaway: float = 0.0, slow: floa
 @pytest.mark.parametrize("time", [0.0, 2e-3])
 @pytest.mark.parametrize("breakaway", [0.0, 0.6])
 def test_presliding_solves_its_differential_equation(distance: float, time: float, breakaway: float) -> None:
-    """Dahl and LuGre, with more friction at standstill and without, along a motion with reversals. Between the samples a turning point is missed by a T²/8 of travel at most,
-    there and back."""
+    """Dahl and LuGre, with more friction at standstill and without, along a motion with reversals. Between the samples a turning
+    point is missed by a T²/8 of travel at most, there and back."""
     motion, arm = swinging(), synthetic_arm()
     u = bristles(motion, distance, breakaway)
     v = motion.dq[:, 1]

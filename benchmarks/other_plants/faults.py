@@ -1,0 +1,138 @@
+"""What a fault does to the arm it is in: to the loads, to what the drives make of a command, to what encoders and log say.
+
+    acting = Acting(Fault("cogging", 1, 0.4, 14.3), law, sample_time, rng)
+    made = acting.driven(command, v)            once a sample
+    load = acting.load(now)                     at every stage of the integrator
+    acting.after(applied, v)                    once a sample
+    seen, logged = acting.seen(q), acting.logged(commands)
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.other_plants.friction import Friction
+from pipelines.log.experiment import Array
+
+__all__ = ["Acting", "Fault", "Now"]
+
+_HEATING, _HOPS = 5.0, 0.7  # [s] time constant of a gear that warms, mean time between two hops
+_DRIFTING = 6.0  # [s] time constant of viscous friction that drifts
+_TOUCH = (3.0, 3.25)  # [s] from and to when something is touched
+_PHASE = 0.7  # [rad] of whatever goes with an angle
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong, at one joint (from 0) or none; `size` in the unit of its kind."""
+
+    kind: str
+    joint: int = 0
+    size: float = 0.0
+    number: float = 0.0  # order [1/rad or 1/m] of what goes with the angle; of what comes from another joint: which
+
+
+@dataclass(frozen=True, eq=False)
+class Now:
+    """The arm at one stage of the integrator. Arrays (joints,)."""
+
+    t: float  # [s]
+    q: Array
+    v: Array
+    dry: Array  # [N m] its friction
+    applied: Array  # [N m] by the drives
+    pushed: Callable[[Array], Array]  # [N m] what a force [N] (3,) at the tip does to the joints
+
+
+class Acting:
+    """A fault during one run, with what it remembers. Without one, nothing."""
+
+    def __init__(self, fault: Fault | None, law: Friction, sample_time: float, rng: np.random.Generator) -> None:
+        self.kind, self.j, self.size, self.number = ("", 0, 0.0, 0.0) if fault is None else (
+            fault.kind, fault.joint, fault.size, fault.number)
+        self._law, self._lasting, self._rng = law, sample_time, rng
+        self._heat, self._hop = 0.0, 1.0
+        late = round(self.size / sample_time) if self.kind in ("torque_delay", "time_delay") else 0
+        self._late: deque[Array] = deque(maxlen=late + 1)
+        self._made: Array | None = None
+
+    def driven(self, command: Array) -> Array:
+        """What the drives make of the command."""
+        made, j = command.copy(), self.j
+        if self.kind == "torque_delay":
+            self._late.append(made)
+            return self._late[0]
+        if self.kind == "torque_gain":
+            made[j] *= 1.0 + self.size
+        elif self.kind == "torque_crosstalk":
+            made[j] += self.size * command[int(self.number)]
+        elif self.kind == "torque_saturation":
+            made[j] = np.clip(made[j], -self.size, self.size)
+        elif self.kind == "drive_lag":
+            before = made if self._made is None else self._made
+            made[j] = before[j] - np.expm1(-self._lasting / self.size) * (made[j] - before[j])
+            self._made = made
+        return made
+
+    def load(self, now: Now) -> Array:
+        """(joints,) [N m] that acts beside friction, in the direction of motion."""
+        out, j = np.zeros_like(now.q), self.j
+        q, v, size = now.q[j], now.v[j], self.size
+        if self.kind == "asymmetric_friction":
+            out[j] = -size * abs(np.tanh(v / self._law.width[j]))
+        elif self.kind == "load_friction":
+            out[j] = -size * abs(now.applied[j]) * np.tanh(v / self._law.width[j])
+        elif self.kind == "viscous_drift":
+            out[j] = size * self._law.viscous[j] * v * np.expm1(-now.t / _DRIFTING)
+        elif self.kind == "quadratic_drag":
+            out[j] = -size * v * abs(v)
+        elif self.kind == "concave_friction":
+            out[j] = -size * np.tanh(v / self.number)
+        elif self.kind == "position_friction":
+            out[j] = -size * now.dry[j] * np.sin(self.number * q + _PHASE)
+        elif self.kind == "heat from another joint":
+            out[j] = -self._heat * (now.dry[j] + self._law.viscous[j] * v)
+        elif self.kind == "hopping torque":
+            out[j] = self._hop * size
+        elif self.kind == "torque_offset":
+            out[j] = size
+        elif self.kind == "cogging":
+            out[j] = size * (np.sin(self.number * q + _PHASE) + 0.3 * np.sin(2.0 * self.number * q))
+        elif self.kind == "spring":
+            out[j] = -size * ((q - self.number) + 0.1 * (q - self.number) ** 3)
+        elif self.kind == "contact" and _TOUCH[0] <= now.t < _TOUCH[1]:
+            out = now.pushed(np.array([np.cos(self.number), np.sin(self.number), 0.3]) * size)
+        return out
+
+    def after(self, applied: Array, v: Array) -> None:
+        """A sample has gone by."""
+        if self.kind == "heat from another joint":
+            other = int(self.number)
+            self._heat += self._lasting / _HEATING * (abs(applied[other] * v[other]) / self.size - self._heat)
+        if self.kind == "hopping torque" and self._rng.random() < self._lasting / _HOPS:
+            self._hop = -self._hop
+
+    def seen(self, q: Array) -> Array:
+        """What the encoders see of q, before they count it."""
+        out, j = q.copy(), self.j
+        if self.kind == "encoder_eccentricity":
+            out[j] += self.size * np.sin(q[j] + self.number)
+        elif self.kind == "encoder_crosstalk":
+            out[j] += self.size * q[int(self.number)]
+        elif self.kind == "time_delay":
+            self._late.append(q.copy())
+            out[j] = self._late[0][j]
+        return out
+
+    def logged(self, commands: Array) -> Array:
+        """What the log holds of the commands (samples, joints)."""
+        if self.kind != "torque_lag":
+            return commands
+        out, kept = commands.copy(), np.exp(-self._lasting / self.size)
+        for k in range(1, len(out)):
+            out[k, self.j] = kept * out[k - 1, self.j] + (1.0 - kept) * commands[k, self.j]
+        return out
