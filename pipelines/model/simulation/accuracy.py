@@ -1,7 +1,7 @@
 """Choose the integrator's step: as large as its error allows, which is a tenth of what different noise does.
 
-The error is measured, not guessed: stretches of the experiment are run with m and 2m steps a sample, without noise and without
-quantisation, whose flips would hide it; two runs with different noise say what may be wrong.
+The error is measured, not guessed: stretches of the experiment are run with m steps a sample and with 2m of Runge-Kutta, without
+noise and without quantisation, whose flips would hide it; two runs with different noise say what may be wrong.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.experiment import Experiment
+from pipelines.model.simulation.integrate import HeldBody
 from pipelines.model.simulation.plant import Plant
 from pipelines.model.simulation.replicas import Noise, run_together
 
@@ -24,7 +25,7 @@ _STRETCH = 0.25  # [s] length of a stretch that is tried
 _SHARE = 0.1  # of the noise difference that the step may cause
 _CANDIDATES = (1, 2, 4, 8, 16, 32, 64)  # steps a sample
 _AMPLE = 8  # steps a sample, where noise is what matters
-_GAIN = 4.0  # what halving the step takes off the error at least: 16 once friction is resolved, for the method is of order 4
+_GAIN = 4.0  # what halving the step takes off the error at least: of order 2 is what holds the body, of order 4 what does not
 _UNHEARD = 1e-9  # [rad] tolerance where nothing is random and nothing counts steps
 
 
@@ -39,7 +40,7 @@ class Step:
 
 
 def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None) -> Step:
-    """The fewest Runge-Kutta steps a sample whose error is at most a tenth of the difference that noise makes.
+    """The fewest steps a sample whose error is at most a tenth of the difference that noise makes.
 
     Raises:
         InputRejected: D15, the model's inertia matrix is singular or worse; D17, the arm runs away however small the step, or
@@ -52,14 +53,15 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two counts that have nothing to do with each other
     allowed = np.maximum(_SHARE * np.maximum(random, counted), _UNHEARD)
     calm = [_without_steps(stretch) for stretch in stretches]
-    coarse = _positions(one, calm, _CANDIDATES[0])
+    held = HeldBody.fits(one.prepared(1))
+    coarse = _positions(one, calm, _CANDIDATES[0], exact=False)
     for steps, finer in zip(_CANDIDATES, (*_CANDIDATES[1:], 2 * _CANDIDATES[-1]), strict=True):
-        fine = _positions(one, calm, finer)
+        fine = _positions(one, calm, finer, exact=True)
         error = _rms(coarse, fine)
         for count, left in ((steps, error), (finer, error / _GAIN)):
             if (left <= allowed).all():
                 return Step(count, left, random, allowed)
-        coarse = fine
+        coarse = _positions(one, calm, finer, exact=False) if held else fine
     raise InputRejected("D17", f"with {_CANDIDATES[-1]} steps a sample the simulation still is {error.max():.2g} rad off",
                         remedy="friction that changes sign within a very small speed needs a lower sharpness")
 
@@ -87,15 +89,15 @@ def _without_steps(experiment: Experiment) -> Experiment:
     return replace(experiment, controller=controller, resolution=np.zeros(experiment.n_joints))
 
 
-def _positions(plant: Plant, stretches: list[Experiment], steps: int) -> list[Array]:
+def _positions(plant: Plant, stretches: list[Experiment], steps: int, exact: bool) -> list[Array]:
     """True positions (samples, joints) of each stretch; not a number where the arm runs away: the step is too large then."""
     with np.errstate(all="ignore"):
         try:
-            return [one.true_q[0] for one in run_together(plant, stretches, steps)]
+            return [one.true_q[0] for one in run_together(plant, stretches, steps, exact=exact)]
         except (InputRejected, OverflowError):
             if len(stretches) == 1:
                 return [np.full(stretches[0].q_ref.shape, np.nan)]
-    return [position for stretch in stretches for position in _positions(plant, [stretch], steps)]
+    return [position for stretch in stretches for position in _positions(plant, [stretch], steps, exact)]
 
 
 def _noise_difference(plant: Plant, stretches: list[Experiment], noise: Noise) -> Array:

@@ -41,6 +41,8 @@ class ManyChains:
         for k in range(4):
             self._frames[0, k, k] = self._frames[:, 3, 3] = 1.0
         self._twists = np.zeros((n, 3, 4, replicas))
+        self._inverse: Array = np.zeros((replicas, n, n))  # of what is held
+        self._bias: Array = np.zeros((n, replicas))
 
     def acceleration(self, q: Array, dq: Array, torque: Array, out: Array) -> None:
         """a (joints, replicas) [rad/s^2] into `out`, for q, dq and the torque that is left for motion, all of that shape."""
@@ -50,6 +52,22 @@ class ManyChains:
             out[:] = np.linalg.solve(mass.transpose(2, 0, 1), rest)[..., 0].T
         except np.linalg.LinAlgError:
             out[:] = np.nan  # whoever simulates refuses it as a runaway
+
+    def hold(self, q: Array, dq: Array) -> None:
+        """Keep D and c + h as they are at q and dq, for `held_acceleration`."""
+        mass, self._bias = self.equations(q, dq)
+        try:
+            self._inverse = np.asarray(np.linalg.inv(mass.transpose(2, 0, 1)))
+        except np.linalg.LinAlgError:
+            self._inverse = np.full_like(self._inverse, np.nan)
+
+    def held_acceleration(self, torque: Array, out: Array) -> None:
+        """`acceleration` with D, c and h as they were last held."""
+        out[:] = self.gained(torque - self._bias)
+
+    def gained(self, torque: Array) -> Array:
+        """(joints, replicas) acceleration that a torque more of that shape gives what is held."""
+        return np.asarray((self._inverse @ torque.T[..., None])[..., 0].T)
 
     def equations(self, q: Array, dq: Array) -> tuple[Array, Array]:
         """D (joints, joints, replicas) and c + h (joints, replicas)."""

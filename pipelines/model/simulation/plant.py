@@ -136,12 +136,20 @@ class MovingPlant:
     def motion(self, t: Array, q: Array, dq: Array) -> Motion:
         return Motion(t, q.T, dq.T, self._zeros)
 
-    def accelerations(self, t: Array, q: Array, dq: Array, states: Array, command: Array, out: Array) -> None:
-        """ddq (joints, replicas) into `out`. t (replicas,), states (replicas, states), the rest (joints, replicas)."""
+    def accelerations(self, t: Array, q: Array, dq: Array, states: Array, command: Array, out: Array,
+                      held: ManyChains | None = None) -> None:
+        """ddq (joints, replicas) into `out`. t (replicas,), states (replicas, states), the rest (joints, replicas).
+
+        Args:
+            held: a rigid body that is taken as it was last held.
+        """
         if self._loaded or self._driven:
             command = self._through_effects(self.motion(t, q, dq), states, command)
         self.friction.take_off(command, dq, self._left)
-        self.rigid.acceleration(q, dq, self._left, out)
+        if held is None:
+            self.rigid.acceleration(q, dq, self._left, out)
+        else:
+            held.held_acceleration(self._left, out)
 
     def _through_effects(self, motion: Motion, states: Array, command: Array) -> Array:
         torque = command.T

@@ -100,6 +100,7 @@ def _rms(x: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(np.square(x), axis=(0, 1))))
 
 
+@np.errstate(all="ignore")  # a window may run away: its steps do not settle then
 def _follow(plant: Plant, motion: Motion, tau: Array, sample_time: float, first: Indices, length: int, steps: int) -> Array:
     """q and dq (windows, length, 2 joints) of the windows that start at `first`."""
     moving = plant.prepared(len(first))
