@@ -96,7 +96,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
 
 def unnamed(done: Settled, floor: Array) -> Settled:
     """The same where the base parameters tell what has changed: what is left near the floor, and has no name, is no alarm then."""
-    alone = without_steps(done.found, floor, True)
+    alone = without_steps(done.found, floor, True, named=True)
     if alone.verdict == "unknown" and not at_floor(done.found.nominal.rms, floor):
         return done
     return replace(done, ruling=Ruling("nothing-wrong", (), "", done.ruling.doubts), simulated=())

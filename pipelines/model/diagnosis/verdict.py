@@ -78,13 +78,15 @@ def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
     return _ruled(found, floor, known, [step for step in found.steps if step.best is not None])
 
 
-def without_steps(found: Found, floor: Array, known: bool) -> Ruling:
-    """The same where nothing that was found is believed."""
-    return _ruled(replace(found, final=found.nominal), floor, known, [])
+def without_steps(found: Found, floor: Array, known: bool, named: bool = False) -> Ruling:
+    """The same where nothing that was found is believed; `named`: what is wrong has a name that the residual does not show."""
+    return _ruled(replace(found, final=found.nominal), floor, known, [], known and not named)
 
 
-def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step]) -> Ruling:
-    other = next((step.other for step in found.steps if step.other is not None and (known or _much(step.other, found))), None)
+def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_share: bool | None = None) -> Ruling:
+    """`any_share`: whether something that gives way counts however little it explains; by default where the floor is known."""
+    every = known if any_share is None else any_share
+    other = next((step.other for step in found.steps if step.other is not None and (every or _much(step.other, found))), None)
     joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
     high = _named(joints.tolist())
     gap = any(step.best is not None and step.best.effect.evidence == "reversals" for step in accepted)
@@ -164,7 +166,7 @@ def _named(joints: Iterable[int]) -> str:
 
 
 def _much(other: Screened, found: Found) -> bool:
-    """Without a floor: whether what gives way would explain half of what its joint leaves, or all joints."""
+    """Whether what gives way would explain half of what its joint leaves, or all joints."""
     residual, joint = found.nominal.residual, other.joint
     own = residual if joint is None else residual[found.nominal.data.joint == joint - 1]
     return float(other.gain[0]) > _HALF * float(own @ own)

@@ -266,15 +266,16 @@ def _level(v: Array, breakaway: float, speed: float) -> Array:
 def _recursion(kept: Array, added: Array) -> Array:
     """(steps + 1,) x_(k+1) = kept_k x_k + added_k from 0, worked out in many stretches side by side that are then joined."""
     long = -(-len(kept) // _SIDE_BY_SIDE)
-    a, b = np.ones((_SIDE_BY_SIDE, long)), np.zeros((_SIDE_BY_SIDE, long))
-    a.flat[:len(kept)], b.flat[:len(kept)] = kept, added
+    a, b = np.ones(_SIDE_BY_SIDE * long), np.zeros(_SIDE_BY_SIDE * long)
+    a[:len(kept)], b[:len(kept)] = kept, added
+    a, b = (np.ascontiguousarray(x.reshape(_SIDE_BY_SIDE, long).T) for x in (a, b))
     for k in range(1, long):
-        b[:, k] += a[:, k] * b[:, k - 1]
-        a[:, k] *= a[:, k - 1]
-    first = np.zeros((_SIDE_BY_SIDE, 1))
-    for k in range(1, _SIDE_BY_SIDE):
-        first[k] = a[k - 1, -1] * first[k - 1] + b[k - 1, -1]
-    return np.append(0.0, (a * first + b).ravel()[:len(kept)])
+        b[k] += a[k] * b[k - 1]
+        a[k] *= a[k - 1]
+    first = [0.0]
+    for factor, more in zip(a[-1, :-1].tolist(), b[-1, :-1].tolist(), strict=True):
+        first.append(factor * first[-1] + more)
+    return np.append(0.0, (a * np.array(first) + b).T.ravel()[:len(kept)])
 
 
 def _strokes(q: Array) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.intp], Array]:

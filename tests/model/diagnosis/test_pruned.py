@@ -144,11 +144,18 @@ def test_what_gained_no_more_than_chance_is_asked_again_beside_what_was_found_af
     assert pruned._asked_again(found, [], [0, 1], among()) == ([], ())
 
 
-@pytest.mark.parametrize(("rest", "floor", "verdict"), [(0.018, 0.018, "nothing-wrong"), (0.018, 0.01, "unknown")])
+@pytest.mark.parametrize(("rest", "floor", "share", "verdict"), [
+    (0.018, 0.018, 0.0, "nothing-wrong"), (0.018, 0.01, 0.0, "unknown"), (0.014, 0.01, 0.0, "nothing-wrong"),
+    (0.018, 0.018, 0.8, "nothing-wrong"), (0.014, 0.01, 0.8, "unknown")])
 @pytest.mark.parametrize("gives_way", [False, True])
-def test_what_an_arm_with_its_load_leaves_is_no_alarm(rest: float, floor: float, verdict: str, gives_way: bool) -> None:
-    """A payload slows reversals down: joint 3 leaves more than before, and no more than the same arm in order does with it."""
-    nominal, other = left(0.01, 0.01, rest), SimpleNamespace(joint=3) if gives_way else None
+def test_what_an_arm_with_its_load_leaves_is_no_alarm(rest: float, floor: float, share: float, verdict: str,
+                                                      gives_way: bool) -> None:
+    """A payload slows reversals down: joint 3 leaves more than before, and no more than the same arm in order does with it.
+    Something that gives way is to be looked for only if it explains most of what is left, and that stands above the floor."""
+    nominal, data = left(0.01, 0.01, rest), SimpleNamespace(joint=np.full(4, 2))
+    nominal.residual, nominal.data = np.ones(4), data
+    other = SimpleNamespace(joint=3, gain=np.array([4.0 * share])) if gives_way else None
+    verdict = "nothing-wrong" if rest < 1.6 * floor and not gives_way else verdict
     step: Any = SimpleNamespace(before=nominal, best=None, other=other)
     done = pruned.Settled(Found(nominal, (step,), nominal), Ruling("unknown", (), "something stands above the floor"), ())
     assert pruned.unnamed(done, np.array([0.01, 0.01, floor])).ruling.verdict == verdict

@@ -282,6 +282,7 @@ def test_one_for_two_is_what_could_have_been_accepted(possible: bool, error: flo
                   SimpleNamespace(best=tried(1), before=SimpleNamespace(model=plain, weight=None, rss=before)))
     monkeypatch.setattr(search_module, "held_out", lambda *args: 1.0)
     monkeypatch.setattr(search_module, "refine", lambda *args: SimpleNamespace(rss=1.01))
+    monkeypatch.setattr(search_module, "_first_order_missed", lambda *args: 0.0)
     monkeypatch.setattr(search_module, "_step", lambda *args: SimpleNamespace(best=None if gives_way else args[-1]))
     found = search_module._one_for_two(cast("Case", SimpleNamespace(data=None)), steps, cast("Any", ((None, None),)))
     assert (found is not None and found[2] is rival) is (taken and before == 2.0)
@@ -304,7 +305,7 @@ def test_a_search_that_takes_one_for_two_comes_to_an_end(monkeypatch: pytest.Mon
         assert len(taken) < 20
         return step(*args)
 
-    for tolerance in ("_PARSIMONY", "_MISSED"):
+    for tolerance in ("_PARSIMONY", "_MISSED", "_NEAR"):
         monkeypatch.setattr(search_module, tolerance, 1e6)
     monkeypatch.setattr(search_module, "_step", counted)
     found = search(Case(prepared.data, prepared.judge, model, fit.weight, every, None), 4)
