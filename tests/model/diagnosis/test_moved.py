@@ -14,9 +14,11 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis import diagnose as diagnose_module
 from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.payload import Payload
@@ -73,6 +75,31 @@ def test_without_a_change_the_base_parameters_have_not_moved() -> None:
     found = diagnose(Logs((pushed(1, OFFSET), pushed(2, OFFSET)), (),
                           (pushed(4, OFFSET, "reference"), pushed(5, OFFSET, "reference"))), SETTINGS)
     assert found.verdict == "nothing-wrong"
+
+
+def sprung(seed: int, stiffness: float, role: str = "identify") -> ExperimentLog:
+    """A spring at joint 2, at rest at -1.5 rad."""
+    path = turning_little(seed)
+    log = recorded(arm(), path, 8.0, np.random.default_rng([6, seed]), name=f"{role}-{seed}", experiment="excitation", role=role,
+                   period=10.0)
+    more = np.zeros_like(log.tau)
+    more[:, 1] = stiffness * (path(log.t).q[:, 1] + 1.5)
+    tau = log.tau + quantised(more, torque_step(log.robot))
+    return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=tau)})
+
+
+@pytest.mark.parametrize(("amplitude", "moved"), [(0.0, True), (0.5, False), (1.0, False)])
+def test_what_a_spring_shares_with_weight_is_no_load(amplitude: float, moved: bool) -> None:
+    """Fitted beside base parameters that are free, a spring leaves them a part of what it does, here half of it; with those of the
+    reference it takes all of it. Without a spring they have moved."""
+    logs = Logs((sprung(1, 2.0), sprung(2, 2.0)), (), (sprung(4, 0.0, "reference"), sprung(5, 0.0, "reference")))
+    prepared = prepare(logs, SETTINGS)
+    assert prepared.reference is not None
+    since = since_reference(prepared, prepared.reference, SETTINGS)
+    spring, size = Spring(2, degree=1), 2.0 * np.array([1.0, 1.5])  # slope and constant
+    model = since.case.model.with_effect(spring, amplitude * size) if amplitude else since.case.model
+    found = since.absorbed(refine(model, since.case.data, since.case.weight, steps=0), ())
+    assert (found is not None) is moved
 
 
 def loaded(seed: int, mass: float, role: str = "identify") -> ExperimentLog:
