@@ -26,14 +26,15 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.clean import clean
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.drive_noise import white
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import settled
-from pipelines.model.diagnosis.search import Found, clean, provisional, search
+from pipelines.model.diagnosis.search import Found, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.twin import white
 from pipelines.model.diagnosis.verdict import rule
 from pipelines.stage import Request, run_stage
 

@@ -7,6 +7,7 @@ from typing import Final, Literal
 
 from pipelines.log.experiment import Array
 from pipelines.log.model_file import Source
+from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.wide import Wide
 
 __all__ = ["FORMAT", "FORMAT_VERSION", "Calibration", "CauseBound", "Conditions", "Floors", "Origin"]
@@ -77,5 +78,10 @@ class Calibration:
     wide: Wide | None  # of causes that act on several joints
     floors: tuple[Floors, ...]  # spectra
     following: Array | None = None  # (joints,) the most that any replica's residual follows the joint's own motion; None: not known
+    wander: Array | None = None  # (joints,) [N m] of the drives' zeros; None: half of the noise, as it was taken for then
     format: Literal["rrrid-calibration"] = field(default=FORMAT, kw_only=True)
     format_version: Literal[1] = field(default=FORMAT_VERSION, kw_only=True)
+
+    @property
+    def drives(self) -> DriveNoise:
+        return DriveNoise(self.noise, 0.5 * self.noise if self.wander is None else self.wander)

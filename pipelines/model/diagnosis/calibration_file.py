@@ -120,6 +120,8 @@ def _fault(made: Calibration) -> str:
         return "a floor, or conditions, that are no numbers"  # the noise of the drives is unknown without a twin
     if made.following is not None and not (made.following.shape == (joints,) and (made.following >= 0.0).all()):
         return "how far an arm in order follows its motion, that is no number or of other joints"
+    if made.wander is not None and not (made.wander.shape == (joints,) and (made.wander >= 0.0).all()):
+        return "a wander of the drives that is no number or of other joints"
     if made.wide is None:
         return "" if stored else "causes of the whole arm are missing"
     return _fault_of_sums(made.wide, joints, sum(one.joint is None for one in made.causes))

@@ -19,6 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.result import Diagnosis, Finding
@@ -36,13 +38,15 @@ def wrong_law(found: Diagnosis, most: int) -> bool:
 
     Of what is wrong: where the same law of friction was found at two joints or more, or one that bends where dry friction changes
     its sign; or is left at two above its threshold by a search that took as many causes as it may, `most`. What has no name in the
-    end may be what the law that was found leaves of the curve. Of what has changed: only where it has no name, for a curve was the
+    end may be what the law that was found leaves of the curve; or what the curve leaves of other motion, where nothing was found.
+    Of what has changed: only where it has no name, for a curve was the
     same before; but other motion shows more of it.
     """
     if found.question == "what has changed":
         return found.verdict == "unknown"
     laws = [one for one in found.findings if find_effect(one.cause).friction]
-    tried = found.verdict == "unknown" and any(one.accepted and find_effect(one.cause).friction for one in found.ledger)
+    accepted = [one for one in found.ledger if one.accepted]
+    tried = found.verdict == "unknown" and (not accepted or any(find_effect(one.cause).friction for one in accepted))
     last = max((one.step for one in found.ledger), default=0)
     left = [(one.cause, one.joint) for one in found.ledger if last > most and one.step == last and one.gain > one.threshold]
     return (tried or of_one_law([(one.cause, one.joint) for one in laws]) or of_one_law(left)
@@ -56,9 +60,15 @@ def of_one_law(causes: Iterable[tuple[str, int | None]]) -> bool:
 
 
 def shows(prepared: Prepared, other: Prepared) -> bool:
-    """Whether the `loosened` laws, `other`, leave clearly less of some joint."""
-    less, most = (fit_nominal(one.data, one.columns)[1].rms for one in (other, prepared))
-    return bool((less < _LESS * most).any())
+    """Whether the `loosened` laws, `other`, leave clearly less of some joint, fitted or held out."""
+    return any(bool((less < _LESS * most).any()) for less, most in zip(_left(other), _left(prepared), strict=True))
+
+
+def _left(prepared: Prepared) -> list[Array]:
+    """(joints,) [N m] what the nominal model leaves of the fitted logs, and of those held out where there are any."""
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    judge = prepared.judge
+    return [fit.rms, *([] if judge is None else [judge.rms(judge.y - Exact.start(columns, fit).torque(judge))])]
 
 
 def plainer_of(found: Diagnosis, again: Diagnosis) -> Diagnosis:

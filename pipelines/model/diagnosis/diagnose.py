@@ -28,6 +28,7 @@ from pipelines.model.diagnosis.compliance import Compliance
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.floored import Floored, floored_by
+from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
@@ -227,7 +228,7 @@ def _alike(effect: Effect, found: Iterable[Finding]) -> Finding | None:
     return next((one for one in found if one.cause in effect.twins or effect.name in find_effect(one.cause).twins), None)
 
 
-def _with_load(found: Found, case: Case, now: Prepared, before: Array, noise: Array | None, seed: int) -> Array:
+def _with_load(found: Found, case: Case, now: Prepared, before: Array, noise: DriveNoise | None, seed: int) -> Array:
     """(joints,) [N m] floor of the later logs, whose arm is heavier: it reverses more slowly; `before` where nobody can tell."""
     arm = acted(found.nominal.model.arm, case.beside)
     own = None if noise is None else motion_floor(found.nominal.model, arm, noise, now.motions, case.data, now, before, seed)

@@ -25,6 +25,7 @@ from pipelines.model.diagnosis.candidates import Family, families, place_of, who
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.chance import BY_CHANCE
+from pipelines.model.diagnosis.drive_noise import white
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding
 from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
@@ -41,7 +42,6 @@ from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Moved, since_reference
 from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.twin import white
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.logs import Motions

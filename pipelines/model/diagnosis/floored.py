@@ -16,13 +16,15 @@ from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origi
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.clean import clean
+from pipelines.model.diagnosis.drive_noise import drive_noise, white
 from pipelines.model.diagnosis.evidence import floors_of
+from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.own_motion import following
 from pipelines.model.diagnosis.search import Explored
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.twin import drive_noise, make_twin, replayable, white
+from pipelines.model.diagnosis.twin import make_twin, replayable
 
 __all__ = ["Floored", "floored_by"]
 
@@ -35,7 +37,7 @@ class Floored:
     origin: str
     thresholds: Thresholds | None
     calibration: Calibration | None
-    noise: Array | None  # (joints,) [N m] of the drives; None where nobody knows
+    noise: DriveNoise | None  # None where nobody knows
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -46,7 +48,7 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
     made = _calibrated(prepared, case, rough, chosen) if given is None else given
     if made is None:
         return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
-    return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.noise)
+    return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives)
 
 
 def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> Calibration | None:
@@ -67,6 +69,6 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
     found = Thresholds.of_twin(*weighted, case.families, model.nominal)
     return Calibration(
         origin_of("twin", [prepared.motions[place][0] for place in places], model.nominal, chosen), conditions_of(prepared), weight,
-        twin.rms, twin.noise, bounds_of(case.families, found.gain, found.own), found.wide,
+        twin.rms, twin.noise.white, bounds_of(case.families, found.gain, found.own), found.wide,
         floors_of(twin.data, twin.fits[0].left) if chosen.evidence else (),
-        following(*weighted).max(axis=1))
+        following(*weighted).max(axis=1), twin.noise.wander)

@@ -7,27 +7,36 @@ it, so that it is added there and not simulated.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["small_loads"]
+__all__ = ["DriveNoise", "small_loads"]
 
 _RIPPLE = 1e-3  # of the torque
 _COGGING = 2e-5  # of the largest rated torque
 _ORDERS = (6, 40)  # waves a turn
-_WANDER = 0.5  # of the drive's white noise
 _CORNER = (1.0, 5.0)  # [Hz]
 
 
-def small_loads(motion: Motion, arm: Arm, noise: Array, sample_time: float, drives: np.random.Generator,
+@dataclass(frozen=True, eq=False)
+class DriveNoise:
+    """What is random in the torque of the drives, root mean square. Arrays (joints,)."""
+
+    white: Array  # [N m] from sample to sample
+    wander: Array  # [N m] of the amplifier's zero, slow
+
+
+def small_loads(motion: Motion, arm: Arm, wander: Array, sample_time: float, drives: np.random.Generator,
                 rng: np.random.Generator) -> Array:
     """(samples, joints) [N m] of one replica in one log; its ripple is that of its drives and the same in all logs.
 
     Args:
-        noise: (joints,) [N m] white noise of the drives.
+        wander: (joints,) [N m] root mean square of the amplifier's wander.
         drives: what is drawn of it belongs to the drives: seeded alike for all logs of a replica.
         rng: for what happens in this log.
     """
@@ -39,14 +48,14 @@ def small_loads(motion: Motion, arm: Arm, noise: Array, sample_time: float, driv
     largest = float(np.max(rated[np.isfinite(rated)], initial=0.0)) or float(np.abs(tau).max())
     ripple = _RIPPLE * tau * np.sin(order[0] * motion.q + phase[0])
     cogging = _COGGING * largest * np.sin(order[1] * motion.q + phase[1])
-    return np.asarray(ripple + cogging + _wander(noise, len(tau), sample_time, rng))
+    return np.asarray(ripple + cogging + _wander(wander, len(tau), sample_time, rng))
 
 
-def _wander(noise: Array, samples: int, sample_time: float, rng: np.random.Generator) -> Array:
+def _wander(rms: Array, samples: int, sample_time: float, rng: np.random.Generator) -> Array:
     """(samples, joints): white noise through a first-order low-pass, by its spectrum."""
-    corner = rng.uniform(*_CORNER, len(noise))
+    corner = rng.uniform(*_CORNER, len(rms))
     left = np.exp(-2.0 * np.pi * corner * sample_time)
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(samples))
     response = np.sqrt(1.0 - left**2) / (1.0 - left * turn[:, None])
-    white = np.fft.rfft(rng.standard_normal((samples, len(noise))), axis=0)
-    return np.asarray(_WANDER * noise * np.fft.irfft(white * response, n=samples, axis=0))
+    white = np.fft.rfft(rng.standard_normal((samples, len(rms))), axis=0)
+    return np.asarray(rms * np.fft.irfft(white * response, n=samples, axis=0))

@@ -25,9 +25,11 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
+from pipelines.model.diagnosis.drive_noise import drive_noise
 from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.inputs import Prepared
-from pipelines.model.diagnosis.twin import drive_noise, imperfect, replayable, replica
+from pipelines.model.diagnosis.twin import imperfect, replayable, replica
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed
 from pipelines.model.simulation import Experiment, Noise, Plant, Simulated, choose_step, simulate_together
@@ -37,14 +39,14 @@ __all__ = ["motion_floor", "noise_in"]
 Indices = npt.NDArray[np.intp]
 
 
-def motion_floor(model: Exact, arm: Arm, noise: Array, motions: Motions, data: Data, prepared: Prepared, before: Array,
+def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, data: Data, prepared: Prepared, before: Array,
                  seed: int) -> Array | None:
     """(joints,) [N m] root mean square; None where a log has no controller, or the arm in order cannot be simulated.
 
     Args:
         model: whose rigid body and friction the arm in order has.
         arm: with all that is known of the machine, whose torque its drives carry.
-        noise: (joints,) [N m] white noise of the drives.
+        noise: of the drives.
         motions: the logs, held out or fitted; `data` their rows.
         before: (joints,) [N m] what the reference logs leave, where there are any.
     """
@@ -95,7 +97,7 @@ class _InOrder:
 
     bare: Exact
     arm: Arm
-    noise: Array  # (joints,) [N m]
+    noise: DriveNoise
     recipe: Recipe
     seed: int
 
@@ -117,14 +119,14 @@ class _InOrder:
 
     @property
     def _drives(self) -> Noise:
-        return Noise(self.noise, np.zeros_like(self.noise))
+        return Noise(self.noise.white, np.zeros_like(self.noise.white))
 
 
-def noise_in(model: Exact, data: Data, left: Array, motions: Motions, recipe: Recipe, seed: int) -> Array | None:
-    """`drive_noise` (joints,) [N m] in the first log whose controller is known; None where there is none, or no simulation."""
+def noise_in(model: Exact, data: Data, left: Array, motions: Motions, recipe: Recipe, seed: int) -> DriveNoise | None:
+    """`drive_noise` in the first log whose controller is known; None where there is none, or no simulation."""
     places = replayable([log for log, _ in motions])
     try:
         found = drive_noise(model, data, left, motions, recipe, places[0], seed) if places else None
-        return None if found is None or not np.isfinite(found).all() else found
+        return None if found is None or not np.isfinite(found.white + found.wander).all() else found
     except InputRejected:  # D15, D17
         return None

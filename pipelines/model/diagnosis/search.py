@@ -28,6 +28,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
+from pipelines.model.diagnosis.unnameable import unnameable
 
 __all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "greatest", "provisional", "search"]
 
@@ -36,7 +37,6 @@ _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
 _LEAST = 2e-3  # of the squared residual: no cause is fitted for less
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
 _WORTH = 0.05  # of the squared residual of its joint
-_MORE = 1.05  # times what the best takes away
 _PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
 _MISSED, _NEAR = 0.1, 0.5  # of what the second of two takes away: one in their place may miss so much; to first order
@@ -266,22 +266,10 @@ def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, 
         refused |= {id(one.screened) for one in tried if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
         tried = [one for one in tried if id(one.screened) not in refused]
     best = (chosen or _fewest(tried)) if more else None
-    other = _other(gate.passed, best, explored.tried, now, case.nameable)
+    other = unnameable(gate.passed, best, explored.tried, now, case)
     best = None if other is not None else best
     trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number, refused)
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
-
-
-def _other(passing: Sequence[Screened], best: Tried | None, tried: Sequence[Tried], now: Refined,
-           nameable: Sequence[str]) -> Screened | None:
-    """What gives way explains more than all that the residual can name, to first order even; what was not fitted exactly counts
-    with what it explains to first order."""
-    there = [one for one in passing if one.family.shapes[0].evidence not in nameable]
-    most = max(there, key=lambda one: one.gain[0], default=None)
-    fitted = {id(one.screened) for one in tried}
-    untried = [float(one.gain[0]) for one in passing if one.family.shapes[0].evidence in nameable and id(one) not in fitted]
-    taken = max([0.0 if best is None else now.rss - best.done.rss, *untried])
-    return most if most is not None and most.gain[0] > _MORE * taken else None
 
 
 def _fewest(tried: Sequence[Tried]) -> Tried | None:

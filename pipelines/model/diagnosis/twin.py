@@ -1,6 +1,5 @@
 """The twin: the fitted model run through the same experiments, controller, quantisation and noise, and then analysed alike.
 
-    noise = drive_noise(...)                       of the drives, from what the log shows at rest from everything else
     twin = make_twin(model, weight, data, ...)     replicas of every log whose controller is known
     twin.weighted(weight)                          residuals (replicas, rows) of the log's own rows
 
@@ -17,26 +16,19 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.imperfections import small_loads
+from pipelines.model.diagnosis.imperfections import DriveNoise, small_loads
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, law_slopes, rows_of
 from pipelines.model.estimation.logs import Motions, Recipe
-from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Noise, Plant, Simulated, choose_step, simulate, simulate_together
+from pipelines.model.simulation import Experiment, Noise, Simulated, simulate_together
 
-__all__ = ["Twin", "drive_noise", "imperfect", "make_twin", "replayable", "replica", "white"]
+__all__ = ["Twin", "imperfect", "make_twin", "replayable", "replica"]
 
-_WINDOW = 0.4  # [s] in which the noise is looked at
-_QUIET = 0.3  # of the windows are taken for quiet
 _NUISANCE = 20040509
-_BOUNDS = (0.25, 2.0)  # of the guess's power: counting of the encoders hides what is less
-_FEWEST = 4  # rows of a window
-_SMOOTH = 5  # rows of the moving average whose remainder is noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +37,7 @@ class Twin:
 
     fits: tuple[Fit, ...]  # of each replica
     places: tuple[int, ...]  # which of the logs
-    noise: Array  # (joints,) [N m] of the drives
+    noise: DriveNoise
 
     @property
     def data(self) -> Data:
@@ -80,55 +72,7 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
     return tuple(found)
 
 
-def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe: Recipe, place: int, seed: int) -> Array:
-    """(joints,) [N m] white torque noise of the drives: as much as makes a replica as rough as log number `place`.
-
-    Rough: quick changes of the residual in its quietest windows, where neither reversals nor any fault are. Two replicas,
-    without noise and with a guess of it, tell what of it is counting of the encoders and how noise shows.
-
-    Args:
-        left: (rows,) [N m] the residual, as far as possible without what a fault makes.
-    """
-    mine = list(data.split(left))[place]
-    step = float(np.median(np.diff(data.logs[place].t)))
-    log = motions[place][0]
-    rough = _roughness(mine, step)
-    guess = rough * np.sqrt(step / log.sample_time)
-
-    experiment = Experiment.of_log(log)
-    steps = choose_step(Plant.of(model.nominal), experiment).per_sample  # fine enough for the noisy one too
-
-    def of_replica(drawn: tuple[Array, int]) -> Array:
-        level, own = drawn
-        done = simulate(model.nominal, experiment, Noise(level, np.zeros_like(guess)), (own,), steps=steps)
-        copy, found = _analysed(motions[place], done, 0, recipe, model.columns, data, place)
-        return _roughness(next(found.data.split(found.left)), float(np.median(np.diff(copy.logs[0].t))))
-
-    still, shaken = np.square(shared_out(of_replica, ((np.zeros_like(guess), seed), (guess, seed + 1))))
-    share = (np.square(rough) - still) / np.maximum(shaken - still, 1e-6 * np.square(rough) + 1e-300)
-    return np.asarray(guess * np.sqrt(np.clip(share, *_BOUNDS)))
-
-
-def white(data: Data, left: Array) -> Array:
-    """(joints,) [N m] of the residual that is white noise, from its quick changes: a floor that no model can be below."""
-    share = np.sqrt(1.0 - 1.0 / _SMOOTH)
-    each = [_roughness(x, float(np.median(np.diff(one.t)))) / share for one, x in zip(data.logs, data.split(left), strict=True)]
-    return np.asarray(np.sqrt(np.nanmean(np.square(each), axis=0)))
-
-
-def _roughness(x: Array, step: float) -> Array:
-    """(joints,) of x (joints, rows): standard deviation of what a moving average leaves, in the quietest windows; NaN of fewer rows
-    than a window has."""
-    if x.shape[1] < _SMOOTH + _FEWEST:
-        return np.full(len(x), np.nan)
-    kernel = np.ones(_SMOOTH) / _SMOOTH
-    rest = np.array([row[_SMOOTH // 2:len(row) - _SMOOTH // 2] - np.convolve(row, kernel, mode="valid") for row in x])
-    size = min(max(_FEWEST, round(_WINDOW / step)), rest.shape[1])
-    windows = rest[:, :rest.shape[1] // size * size].reshape(len(rest), -1, size)
-    return np.asarray(np.sqrt(np.quantile(windows.var(axis=2), _QUIET, axis=1)))
-
-
-def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe: Recipe, noise: Array, replicas: int,
+def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe: Recipe, noise: DriveNoise, replicas: int,
               seed: int) -> Twin | None:
     """Replicas of every log that can be simulated; None where there is none.
 
@@ -139,7 +83,7 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
     if not places or replicas < 1:
         return None
     columns = model.columns
-    drawn = Noise(noise, np.zeros_like(noise))
+    drawn = Noise(noise.white, np.zeros_like(noise.white))
     seeds = range(seed, seed + replicas)
     every = simulate_together(model.nominal, [Experiment.of_log(motions[place][0]) for place in places], drawn, seeds)
     runs = dict(zip(places, every, strict=True))
@@ -154,20 +98,14 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
     return Twin(tuple(found), places, noise)
 
 
-def imperfect(arm: Arm, noise: Array, own: Data, seed: int) -> Callable[[int, Motion], Array]:
+def imperfect(arm: Arm, noise: DriveNoise, own: Data, seed: int) -> Callable[[int, Motion], Array]:
     """Small loads (samples, joints) [N m] of a replica in each of its logs `own`, drawn by `seed`."""
     def loads(log: int, motion: Motion) -> Array:
         step = own.logs[log - own.first].log.sample_time
-        return small_loads(motion, arm, noise, step, np.random.default_rng([_NUISANCE, seed]),
+        return small_loads(motion, arm, noise.wander, step, np.random.default_rng([_NUISANCE, seed]),
                            np.random.default_rng([_NUISANCE, seed, log]))
 
     return loads
-
-
-def _analysed(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int, recipe: Recipe, columns: Columns, data: Data,
-              place: int) -> tuple[Data, Fit]:
-    own = gather((replica(real, done, k, recipe),), columns, recipe, (data.logs[place].equations.rows,))
-    return own, fit_columns(own, rows_of(own, columns))
 
 
 def replica(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int,

@@ -19,6 +19,7 @@ from pipelines.model.rigid.body import Array
 __all__ = ["Gaps", "followed"]
 
 _LENGTH, _EARLY = 600, 400  # samples of a stretch, and before it
+_FEW, _SHORT = 4, 300  # gaps whose arrays cost hardly more than a call; samples of a stretch then
 _SEAM, _TICK = 1e-12, 1e-3  # of the gap, by which two stretches may differ; [s] in which a speed counts as a way
 
 
@@ -37,10 +38,11 @@ def followed(t: Array, mass: Array, force: Array, gaps: Gaps) -> Array:
 
     Over a sample, trapezoids; flank and film implicit.
     """
-    samples, count = len(t), max(1, -(-(len(t) - 1) // _LENGTH))
+    length = _SHORT if len(gaps.half) <= _FEW else _LENGTH
+    samples, count = len(t), max(1, -(-(len(t) - 1) // length))
     h, m, f = (np.append(x, 0.0) for x in (np.diff(t), 0.5 * (mass[1:] + mass[:-1]), 0.5 * (force[1:] + force[:-1])))
-    early = np.arange(count) * _LENGTH - _EARLY
-    steps = early + np.arange(_LENGTH + _EARLY)[:, None]  # (steps, stretches)
+    early = np.arange(count) * length - _EARLY
+    steps = early + np.arange(length + _EARLY)[:, None]  # (steps, stretches)
     within = np.where((steps >= 0) & (steps < samples - 1), steps, samples - 1)
     inertia = np.where(m[within] > 0.0, m[within], 1.0)  # outside the log no time goes by
     x, v, seams = _moved(h[within], inertia, f[within], _start(force[np.maximum(early, 0)], gaps), gaps)

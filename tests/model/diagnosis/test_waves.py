@@ -11,12 +11,12 @@ import pytest
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.clean import clean
+from pipelines.model.diagnosis.drive_noise import white
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.search import provisional
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.twin import white
 from pipelines.model.diagnosis.waves import without_waves
 from pipelines.model.rigid.body import Motion
 from tests.diagnose.sessions import but
