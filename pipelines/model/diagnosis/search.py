@@ -24,6 +24,7 @@ from pipelines.model.diagnosis.curves import with_curves_anew
 from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole, plainer
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import fit_columns
+from pipelines.model.diagnosis.parsimony import PARSIMONY, fewest
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
@@ -37,8 +38,6 @@ _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
 _LEAST = 2e-3  # of the squared residual: no cause is fitted for less
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
 _WORTH = 0.05  # of the squared residual of its joint
-_PARSIMONY = 0.02  # of what the best takes away
-_WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
 _MISSED, _NEAR = 0.1, 0.5  # of what the second of two takes away: one in their place may miss so much; to first order
 _SETTLED = 0.02  # of a weight
 _ROUNDS = 3  # of weights
@@ -92,7 +91,7 @@ def provisional(case: Case) -> tuple[Explored, ...]:
         screened = _screened(case, now)
         one = _explored(case, now, screened, screened)
         found.append(one)
-        best = _fewest(one.tried)
+        best = fewest(one.tried)
         if best is None or _share(best.screened, now) < _LARGE:
             break
         now = _reweighted(best.done)
@@ -101,7 +100,7 @@ def provisional(case: Case) -> tuple[Explored, ...]:
 
 def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:
     """Of what `provisional` found, the causes that explain much of what their joint leaves, and their joints."""
-    found = [(one, best) for one in rough if (best := _fewest(one.tried)) is not None]
+    found = [(one, best) for one in rough if (best := fewest(one.tried)) is not None]
     return [(best.effect.name, best.effect.joint) for one, best in found if _share(best.screened, one.before) >= _LARGE]
 
 
@@ -135,7 +134,7 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
             joined.add(best.effect.name)
             now, rough = _reweighted(best.done), ()
             continue
-        follows = number < len(rough) and same and step.best is _fewest(rough[number - 1].tried)
+        follows = number < len(rough) and same and step.best is fewest(rough[number - 1].tried)
         now = rough[number].before if follows else _reweighted(step.best.done)
     return Found(nominal, tuple(steps), now)
 
@@ -172,7 +171,7 @@ def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explor
             effects = (*rival.done.model.effects, *last.before.model.effects[place + 1:])
             alone = refine(replace(last.before.model, effects=effects), case.data, last.before.weight)
             missed = (alone.rss - last.best.done.rss) / gain
-            if held_out(alone, case) > (1.0 + _PARSIMONY) * error or missed > _MISSED:
+            if held_out(alone, case) > (1.0 + PARSIMONY) * error or missed > _MISSED:
                 continue
             instead = _step(case, *asked[place], place + 1, True, rival)
             if instead.best is rival:
@@ -200,7 +199,7 @@ def gives_way(explored: Explored) -> bool:
 
 def gap_first(explored: Explored) -> bool:
     """Whether the best of those fitted exactly is a gap."""
-    best = _fewest(explored.tried)
+    best = fewest(explored.tried)
     return best is not None and best.effect.evidence == "reversals"
 
 
@@ -233,13 +232,13 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     error = held_out(now, case) if great else np.nan
     done = {id(one.screened): one for one in there}
     tried = [done.get(id(one)) or fitted(case, now, one, error) for one in great]
-    best = _fewest(sorted(tried, key=lambda one: one.rank))
+    best = fewest(sorted(tried, key=lambda one: one.rank))
     plain = None if best is None else plainer(case, now, tried, best, error)
     if plain is not None:
         best, tried = plain, [plain if one.screened is plain.screened else one for one in tried]
     lasting = best
     if best is not None and best.log is not None:  # an event may be refused yet
-        lasting = _fewest(sorted((one for one in tried if one.log is None), key=lambda one: one.rank))
+        lasting = fewest(sorted((one for one in tried if one.log is None), key=lambda one: one.rank))
     tried = [best_form(case, now, one, error) if one in (best, lasting) else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
 
@@ -265,25 +264,11 @@ def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, 
     if not case.floored:
         refused |= {id(one.screened) for one in tried if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
         tried = [one for one in tried if id(one.screened) not in refused]
-    best = (chosen or _fewest(tried)) if more else None
+    best = (chosen or fewest(tried)) if more else None
     other = unnameable(gate.passed, best, explored.tried, now, case)
     best = None if other is not None else best
     trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number, refused)
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
-
-
-def _fewest(tried: Sequence[Tried]) -> Tried | None:
-    """Of those at the joint of the best that leave nearly as little, one whose further number is worth it, else the one with
-    fewest; where the best is of the arm, of those at any joint; none where the best leaves no less."""
-    possible = [one for one in tried if one.error < 1.0 and one.possible]
-    if not possible:
-        return None
-    least = possible[0].rank
-    joint = possible[0].screened.joint
-    own = slice(None) if joint is None else slice(joint - 1, joint)
-    near = [one for one in possible if one.rank - least <= _PARSIMONY * (1.0 - least) and joint in (None, one.screened.joint)
-            and (one.done.rms[own] <= _WORSE * possible[0].done.rms[own]).all()]
-    return min(near, key=lambda one: (not one.sure, one.done.model.effects[-1].count, one.rank))
 
 
 def _reweighted(done: Refined) -> Refined:

@@ -44,14 +44,14 @@ def misled(difference: float, monkeypatch: pytest.MonkeyPatch) -> tuple[Found, C
     model = Exact.start(columns, fit)
     every = tuple(one for one in families(columns.laws, whole_motion(prepared.data), model.arm)
                   if one.cause in ("torque_offset", "asymmetric_friction", "quadratic_drag") and one.joint == 1)
-    usual, asked = search_module._fewest, []
+    usual, asked = search_module.fewest, []
 
     def offset_first(tried: Sequence[Tried]) -> Tried | None:
         asked.append(tried)
         offset = [one for one in tried if one.effect.name == "torque_offset"]
         return offset[0] if len(asked) <= 2 and offset else usual(tried)
 
-    monkeypatch.setattr(search_module, "_fewest", offset_first)
+    monkeypatch.setattr(search_module, "fewest", offset_first)
     case = Case(prepared.data, prepared.judge, model, fit.weight, every, None)
     return search(case, 3), case
 
