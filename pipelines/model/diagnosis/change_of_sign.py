@@ -39,18 +39,18 @@ def wrong_law(found: Diagnosis, most: int) -> bool:
     Of what is wrong: where the same law of friction was found at two joints or more, or one that bends where dry friction changes
     its sign; or is left at two above its threshold by a search that took as many causes as it may, `most`. What has no name in the
     end may be what the law that was found leaves of the curve; or what the curve leaves of other motion, where nothing was found.
-    Of what has changed: only where it has no name, for a curve was the
-    same before; but other motion shows more of it.
+    Of what has changed: only where it has no name, or a law bends there, for a curve was the same before; but other motion
+    shows more of it.
     """
-    if found.question == "what has changed":
-        return found.verdict == "unknown"
     laws = [one for one in found.findings if find_effect(one.cause).friction]
+    turning = any(_turning(one, found) for one in laws)
+    if found.question == "what has changed":
+        return turning or found.verdict == "unknown"
     accepted = [one for one in found.ledger if one.accepted]
     tried = found.verdict == "unknown" and (not accepted or any(find_effect(one.cause).friction for one in accepted))
     last = max((one.step for one in found.ledger), default=0)
     left = [(one.cause, one.joint) for one in found.ledger if last > most and one.step == last and one.gain > one.threshold]
-    return (tried or of_one_law([(one.cause, one.joint) for one in laws]) or of_one_law(left)
-            or any(_turning(one, found) for one in laws))
+    return turning or tried or of_one_law([(one.cause, one.joint) for one in laws]) or of_one_law(left)
 
 
 def of_one_law(causes: Iterable[tuple[str, int | None]]) -> bool:

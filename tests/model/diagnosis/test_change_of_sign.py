@@ -162,12 +162,13 @@ def test_of_two_diagnoses_the_one_that_finds_less_holds_and_an_answer_before_non
     assert plainer_of(two, unknown) is unknown
 
 
+@pytest.mark.parametrize("question", ["what is wrong", "what has changed"])
 @pytest.mark.parametrize(("speed", "asked"), [(0.02, True), (0.3, False)])
-def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(speed: float, asked: bool) -> None:
+def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(speed: float, asked: bool, question: str) -> None:
     """Two widths of tanh are the curve by which it does; thirty are another law."""
     law = Acting.of(Coulomb(1), {"level": 1.0, "sharpness": 100.0})
     finding = SimpleNamespace(cause="concave_friction", joint=1, parameters={"speed": Value(speed, 0.001, "rad/s")})
-    found = SimpleNamespace(verdict="cause", findings=(finding,), question="what is wrong", ledger=(),
+    found = SimpleNamespace(verdict="cause", findings=(finding,), question=question, ledger=(),
                             nominal=SimpleNamespace(friction=(law,)))
     assert wrong_law_of(cast("Diagnosis", found)) is asked
 
