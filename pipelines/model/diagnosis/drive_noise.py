@@ -72,16 +72,22 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
 
     still, shaken = shared_out(simulated, ((np.zeros_like(guess), seed), (guess, seed + 1)))
     least = np.sqrt(_LEAST) * guess
+    share = _share(rough, still, shaken)
     for _ in range(_ROUNDS):
-        share = (rough - still.rough) / np.maximum(shaken.rough - still.rough, 1e-6 * rough + 1e-300)
         if not (share > _REACH).any():
             break
         shaken = simulated((np.maximum(shaken.simulated * np.sqrt(np.clip(share, 0.0, _FARTHEST)), least), seed + 1))
+        share = _share(rough, still, shaken)
     level = np.maximum(shaken.simulated * np.sqrt(np.clip(share, 0.0, _REACH)), least)
     quick = still.power + np.square(level / np.maximum(shaken.simulated, 1e-300)) * (shaken.power - still.power)
     power = np.mean(np.square(mine), axis=1, where=own.weighed)
     more = (power - quick - shaken.drives) / np.maximum(shaken.wander, 1e-300)
     return DriveNoise(level, np.minimum(np.sqrt(np.maximum(more, 0.0)), _WANDER * level))
+
+
+def _share(rough: Array, still: _Replica, shaken: _Replica) -> Array:
+    """(joints,) of the power of a replica's noise that makes it as rough as the log, whose squared roughness is `rough` [N m^2]."""
+    return np.asarray((rough - still.rough) / np.maximum(shaken.rough - still.rough, 1e-6 * rough + 1e-300))
 
 
 def _seen(model: Exact, fit: Fit, level: Array, seed: int) -> _Replica:
