@@ -265,7 +265,7 @@ def _level(v: Array, breakaway: float, speed: float) -> Array:
 
 def _recursion(kept: Array, added: Array) -> Array:
     """(steps + 1,) x_(k+1) = kept_k x_k + added_k from 0, worked out in many stretches side by side that are then joined."""
-    long = -(-len(kept) // _SIDE_BY_SIDE)
+    long = max(1, -(-len(kept) // _SIDE_BY_SIDE))
     a, b = np.ones(_SIDE_BY_SIDE * long), np.zeros(_SIDE_BY_SIDE * long)
     a[:len(kept)], b[:len(kept)] = kept, added
     a, b = (np.ascontiguousarray(x.reshape(_SIDE_BY_SIDE, long).T) for x in (a, b))
