@@ -1,7 +1,7 @@
 """What a fault does to the arm it is in: to the loads, to what the drives make of a command, to what encoders and log say.
 
     acting = Acting(Fault("cogging", 1, 0.4, 14.3), law, sample_time, rng)
-    made = acting.driven(command, v)            once a sample
+    made = acting.driven(command)               once a sample
     load = acting.load(now)                     at every stage of the integrator
     acting.after(applied, v)                    once a sample
     seen, logged = acting.seen(q), acting.logged(commands)
@@ -33,7 +33,9 @@ class Fault:
     kind: str
     joint: int = 0
     size: float = 0.0
-    number: float = 0.0  # order [1/rad or 1/m] of what goes with the angle; of what comes from another joint: which
+    # Order [1/rad or 1/m] of what goes with the angle, phase [rad] of an encoder's; of what comes from another joint: which; where
+    # a spring rests [rad or m]; speed of concave friction [rad/s or m/s]; where a tilt or a push points [rad].
+    number: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
