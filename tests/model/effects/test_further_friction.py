@@ -57,6 +57,13 @@ def test_presliding_solves_its_differential_equation(distance: float, time: floa
     assert np.abs(found - expected).max() < (missed + 1e-4) * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("breakaway", [0.0, 0.6])
+def test_presliding_of_one_sample_is_relaxed(breakaway: float) -> None:
+    here = swinging(samples=2)
+    motion = Motion(here.t[:1], here.q[:1], here.dq[:1], here.ddq[:1])
+    assert not Presliding(2, breakaway=breakaway).columns(motion, synthetic_arm()).any()
+
+
 def test_presliding_starts_again_from_where_it_was() -> None:
     """A pause changes nothing: bristles stay bent."""
     motion, arm = swinging(), synthetic_arm()
