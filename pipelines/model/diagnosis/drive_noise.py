@@ -62,11 +62,11 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     rough = np.square(_roughness(mine, step))
     guess = np.sqrt(rough * step / log.sample_time)
     experiment = Experiment.of_log(log)
-    steps = choose_step(Plant.of(model.nominal), experiment).per_sample  # fine enough for the noisy one too
+    chosen = choose_step(Plant.of(model.nominal), experiment)  # fine enough for the noisy one too
 
     def simulated(drawn: tuple[Array, int]) -> _Replica:
         level, number = drawn
-        done = simulate(model.nominal, experiment, Noise(level, np.zeros_like(guess)), (number,), steps=steps)
+        done = simulate(model.nominal, experiment, Noise(level, np.zeros_like(guess)), (number,), step=chosen)
         rows = gather((replica(motions[place], done, 0, recipe),), model.columns, recipe, (own.equations.rows,))
         return _seen(model, fit_columns(rows, rows_of(rows, model.columns)), level, seed)
 

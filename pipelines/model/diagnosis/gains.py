@@ -196,8 +196,8 @@ def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
 def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array]]:
     """Simulated and measured positions of each log (samples, joints) [rad]."""
     first = [_first(log, seconds) for log, _ in motions]
-    steps = choose_step(Plant.of(arm), first[0]).per_sample  # one controller and arm: what suffices for a log suffices for the next
-    done = simulate_together(arm, first, steps={one.sample_time: steps for one in first})
+    step = choose_step(Plant.of(arm), first[0])  # one controller and arm: what suffices for a log suffices for the next
+    done = simulate_together(arm, first, steps={one.sample_time: step for one in first})
     return [(one.q[0], log.q[:one.q.shape[1]]) for one, (log, _) in zip(done, motions, strict=True)]
 
 

@@ -32,7 +32,7 @@ from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.twin import imperfect, replayable, replica
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed
-from pipelines.model.simulation import Experiment, Noise, Plant, Simulated, choose_step, simulate_together
+from pipelines.model.simulation import Experiment, Noise, Plant, Simulated, Step, choose_step, simulate_together
 
 __all__ = ["motion_floor", "noise_in"]
 
@@ -101,12 +101,12 @@ class _InOrder:
     recipe: Recipe
     seed: int
 
-    def steps(self, logs: Sequence[ExperimentLog]) -> dict[float, int]:
-        """Steps of the integrator a sample, for each sample time: what suffices for an arm in a log suffices in the next."""
+    def steps(self, logs: Sequence[ExperimentLog]) -> dict[float, Step]:
+        """Those of the integrator, for each sample time: what suffices for an arm in a log suffices in the next."""
         plant, first = Plant.of(self.bare.nominal), {log.sample_time: log for log in reversed(logs)}
-        return {time: choose_step(plant, Experiment.of_log(log), self._drives).per_sample for time, log in first.items()}
+        return {time: choose_step(plant, Experiment.of_log(log), self._drives) for time, log in first.items()}
 
-    def powers(self, pieces: Sequence[_Piece], steps: Mapping[float, int]) -> list[tuple[Array, Indices]]:
+    def powers(self, pieces: Sequence[_Piece], steps: Mapping[float, Step]) -> list[tuple[Array, Indices]]:
         """Of each log (joints,) [N m^2] sum of squares of what the model leaves of its own replica, and of how many rows."""
         experiments = [Experiment.of_log(one.log) for one in pieces]
         done = simulate_together(self.bare.nominal, experiments, self._drives, (self.seed,), steps)

@@ -24,13 +24,13 @@ __all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choo
 
 
 def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds: Iterable[int] = (0,), p: Array | None = None,
-             steps: int | None = None) -> Simulated:
+             step: Step | None = None) -> Simulated:
     """What `arm` would have logged in `experiment`, once for each seed.
 
     Args:
         noise: of drives and encoders; none where left out.
         p: (replicas, parameters) base parameters of each replica, where they differ.
-        steps: of the integrator, a sample; by default as few as `choose_step` allows.
+        step: of the integrator; by default as long as `choose_step` allows.
 
     Raises:
         InputRejected: D17, the arm runs away, or no step is small enough.
@@ -40,15 +40,16 @@ def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds
     if p is not None and len(p) != len(seeds):
         raise ValueError(f"p has {len(p)} rows for {len(seeds)} seeds")
     plant = Plant.of(arm, p)
-    return run(plant, experiment, choose_step(plant, experiment, noise).per_sample if steps is None else steps, noise, seeds)
+    step = choose_step(plant, experiment, noise) if step is None else step
+    return run(plant, experiment, step.per_sample, noise, seeds, step.exact)
 
 
 def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None, seeds: Iterable[int] = (0,),
-                      steps: Mapping[float, int] | None = None) -> list[Simulated]:
+                      steps: Mapping[float, Step] | None = None) -> list[Simulated]:
     """`simulate` of several experiments, side by side as far as their sample times agree; the step is fine enough for all.
 
     Args:
-        steps: of the integrator, a sample, for each sample time [s]; by default as few as `choose_step` allows.
+        steps: of the integrator, for each sample time [s]; by default as long as `choose_step` allows.
 
     Raises:
         InputRejected: D17, the arm runs away, or no step is small enough.
@@ -57,6 +58,7 @@ def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise 
     for time in dict.fromkeys(one.sample_time for one in experiments):
         places = [k for k, one in enumerate(experiments) if one.sample_time == time]
         some = [experiments[k] for k in places]
-        count = max(choose_step(plant, one, noise).per_sample for one in some) if steps is None else steps[time]
-        found |= dict(zip(places, run_together(plant, some, count, noise, drawn), strict=True))
+        chosen = [choose_step(plant, one, noise) for one in some] if steps is None else [steps[time]]
+        count, exact = max(one.per_sample for one in chosen), any(one.exact for one in chosen)
+        found |= dict(zip(places, run_together(plant, some, count, noise, drawn, exact), strict=True))
     return [found[k] for k in range(len(experiments))]

@@ -2,6 +2,9 @@
 
 The error is measured, not guessed: stretches of the experiment are run with m steps a sample and with 2m of Runge-Kutta, without
 noise and without quantisation, whose flips would hide it; two runs with different noise say what may be wrong.
+
+A body that is held costs less a step, and takes off less of the error where steps that are short together share it. Where that is
+too much, or nothing is random and nothing counts, m steps that hold nothing do.
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ _STRETCH = 0.25  # [s] length of a stretch that is tried
 _SHARE = 0.1  # of the noise difference that the step may cause
 _CANDIDATES = (1, 2, 4, 8, 16, 32, 64)  # steps a sample
 _AMPLE = 8  # steps a sample, where noise is what matters
-_GAIN = 4.0  # what halving the step takes off the error at least: of order 2 is what holds the body, of order 4 what does not
+_GAIN = 4.0  # what halving the step takes off the error at least: of order 2 is a body held over each, of order 4 what holds none
 _UNHEARD = 1e-9  # [rad] tolerance where nothing is random and nothing counts steps
 
 
@@ -37,6 +40,7 @@ class Step:
     error: Array  # [rad] rms, largest of the stretches, measured by halving: an upper bound
     noise: Array  # [rad] rms difference of two runs with different noise
     allowed: Array  # [rad]
+    exact: bool  # of a serial arm: the rigid body is nowhere held
 
 
 def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None) -> Step:
@@ -53,15 +57,19 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two counts that have nothing to do with each other
     allowed = np.maximum(_SHARE * np.maximum(random, counted), _UNHEARD)
     calm = [_without_steps(stretch) for stretch in stretches]
-    held = HeldBody.fits(one.prepared(1))
-    coarse = _positions(one, calm, _CANDIDATES[0], exact=False)
+    held, coarse = HeldBody.fits(one.prepared(1)), None
     for steps, finer in zip(_CANDIDATES, (*_CANDIDATES[1:], 2 * _CANDIDATES[-1]), strict=True):
         fine = _positions(one, calm, finer, exact=True)
-        error = _rms(coarse, fine)
-        for count, left in ((steps, error), (finer, error / _GAIN)):
-            if (left <= allowed).all():
-                return Step(count, left, random, allowed)
-        coarse = _positions(one, calm, finer, exact=False) if held else fine
+        for exact in (False, True) if held else (True,):
+            known = coarse if exact else None
+            error = _rms(_positions(one, calm, steps, exact) if known is None else known, fine)
+            tried = [(steps, error), (finer, error / _GAIN)]
+            if not exact and HeldBody.together(experiment.sample_time, finer) > 1:  # it is held for as long as before
+                del tried[1]
+            for count, left in tried:
+                if (left <= allowed).all():
+                    return Step(count, left, random, allowed, exact)
+        coarse = fine
     raise InputRejected("D17", f"with {_CANDIDATES[-1]} steps a sample the simulation still is {error.max():.2g} rad off",
                         remedy="friction that changes sign within a very small speed needs a lower sharpness")
 

@@ -130,7 +130,8 @@ def _closed_loop(log: ExperimentLog, bare: ExperimentLog, plant: Plant, experime
                  settings: object, draw: bool) -> Imitation:
     noise = _noise(how, log.n_joints)
     step = choose_step(plant, experiment, noise) if how.steps is None else None
-    done = run(plant, experiment, step.per_sample if step else how.steps or 1, noise, range(how.seed, how.seed + how.replicas))
+    done = run(plant, experiment, step.per_sample if step else how.steps or 1, noise, range(how.seed, how.seed + how.replicas),
+               step is not None and step.exact)
     files = tuple(file if k == 0 else f"{file}-{k + 1}" for k in range(how.replicas))
     logs = tuple(_simulated_log(bare, done, k, settings) for k in range(how.replicas))
     about = _About(log, files, "closed-loop", "", how.replicas, done.steps, step, None, logs)

@@ -83,9 +83,14 @@ class HeldBody(RungeKutta):
         if not isinstance(plant.rigid, ManyChains):
             raise TypeError("the rigid body of this arm is not held")
         self._held = self._body = plant.rigid
-        self._together = next(count for count in range(steps, 0, -1)
-                              if steps % count == 0 and (count == 1 or count * self._h <= _LONGEST))
+        self._together = self.together(sample_time, steps)
         self._last: tuple[Array, Array] | None = None  # acceleration and command
+
+    @staticmethod
+    def together(sample_time: float, steps: int) -> int:
+        """How many of the steps of a sample share one rigid body."""
+        return next(count for count in range(steps, 0, -1)
+                    if steps % count == 0 and (count == 1 or count * sample_time / steps <= _LONGEST))
 
     @staticmethod
     def fits(plant: MovingPlant) -> bool:

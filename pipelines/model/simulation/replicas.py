@@ -55,13 +55,14 @@ class Simulated:
     steps: int  # of the integrator, a sample
 
 
-def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = None, seeds: Iterable[int] = (0,)) -> Simulated:
-    """One replica for each seed, with `steps` steps of the integrator a sample.
+def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = None, seeds: Iterable[int] = (0,),
+        exact: bool = False) -> Simulated:
+    """One replica for each seed, with `steps` steps of the integrator a sample; `exact` as in `run_together`.
 
     Raises:
         InputRejected: D15, the model's inertia matrix is singular or worse; D17, the simulated arm runs away.
     """
-    return run_together(plant, (experiment,), steps, noise, seeds)[0]
+    return run_together(plant, (experiment,), steps, noise, seeds, exact)[0]
 
 
 def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, noise: Noise | None = None,
@@ -69,7 +70,7 @@ def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, no
     """`run` of several experiments at once, which costs hardly more than the longest alone. They have one sample time.
 
     Args:
-        exact: with a rigid body that is nowhere held, to judge by.
+        exact: with a rigid body that is nowhere held.
 
     Raises:
         InputRejected: D15, the model's inertia matrix is singular or worse; D17, the simulated arm runs away.

@@ -67,9 +67,9 @@ def simulated_cases(log: ExperimentLog, arm: Arm, left: Array, cases: Sequence[i
     bare = replace(told, controller=replace(told.controller, law="pd", feedforward=None, model=None), feedforward_arm=None)
     plant = Plant.of(arm)
     plant = replace(plant, hooks=(*plant.hooks, _replayed(left, bare)))
-    steps = choose_step(plant, bare).per_sample
+    step = choose_step(plant, bare)
     ahead, owners = _ahead(bare, arm, cases, draws)
-    done = run(plant, replace(bare, v=_with(bare.v, ahead)), steps, None, range(len(owners)))
+    done = run(plant, replace(bare, v=_with(bare.v, ahead)), step.per_sample, None, range(len(owners)), step.exact)
     return {case: _case(case, log, done, [k for k, owner in enumerate(owners) if owner == case]) for case in cases}
 
 

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.log.experiment import Controller
 from pipelines.model.rigid.body import Array
+from pipelines.model.simulation import Experiment, Noise, choose_step
 from pipelines.model.simulation.integrate import HeldBody
 from pipelines.model.simulation.plant import Plant
-from tests.model.simulation.arms import TS, rrr, serial
+from tests.model.simulation.arms import TS, Case, rrr, serial
 from tests.model.simulation.pinocchio_loop import Loop
 from tests.model.simulation.test_forward_dynamics import follow, offsets
 
@@ -44,6 +46,27 @@ def test_short_steps_share_one_body(shared: Path, tmp_path: Path) -> None:
     torque = np.zeros((SAMPLES, 6))
     two, eight = missed("tx40", shared, tmp_path, torque, 2, 8)
     assert eight == pytest.approx(two, rel=0.05)
+
+
+def swinging(case: Case, samples: int) -> Experiment:
+    """Every joint under PD, its natural frequency 40 rad/s; encoders that do not count."""
+    w, t = 2.0 * np.pi * np.linspace(0.5, 1.5, case.n), TS * np.arange(samples)[:, None]
+    q, dq, ddq = 0.6 * (1.0 - np.cos(w * t)), 0.6 * w * np.sin(w * t), 0.6 * w * w * np.cos(w * t)
+    inertia = np.diag(case.arm.body.mass_matrix(q[:1], case.arm.p)[0])
+    pd = Controller("pd", 1600.0 * inertia, 56.0 * inertia, velocity="backward-difference")
+    none = np.zeros(case.n)
+    return Experiment(sample_time=TS, start_time=0.0, controller=pd, q_ref=q, dq_ref=dq, ddq_ref=ddq, q0=q[0], dq0=dq[0], tau0=none,
+                      resolution=none)
+
+
+@pytest.mark.parametrize(("noise", "exact"), [(0.0, True), (0.01, True), (1.0, False)])
+def test_nothing_is_held_where_that_would_be_told(noise: float, exact: bool, shared: Path, tmp_path: Path) -> None:
+    """1e-9 rad where nothing is random: shorter steps that share a body come no closer to it, one step that holds nothing does."""
+    case = serial("tx40", shared, tmp_path)
+    step = choose_step(Plant.of(case.arm), swinging(case, 400), Noise(np.full(6, noise), np.zeros(6)))
+    assert (step.error <= step.allowed).all()
+    assert step.exact is exact
+    assert step.per_sample <= 2
 
 
 def test_an_arm_in_closed_form_is_not_held() -> None:
