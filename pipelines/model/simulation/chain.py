@@ -61,6 +61,11 @@ class ManyChains:
         except np.linalg.LinAlgError:
             self._inverse = np.full_like(self._inverse, np.nan)
 
+    def take_held(self, other: ManyChains) -> None:
+        """Keep what `other` holds, of these replicas and others behind them."""
+        count = len(self._inverse)
+        self._inverse, self._bias = other._inverse[:count].copy(), other._bias[:, :count].copy()
+
     def held_acceleration(self, torque: Array, out: Array) -> None:
         """`acceleration` with D, c and h as they were last held."""
         out[:] = self.gained(torque - self._bias)

@@ -96,6 +96,13 @@ class HeldBody(RungeKutta):
     def fits(plant: MovingPlant) -> bool:
         return isinstance(plant.rigid, ManyChains)
 
+    def go_on_from(self, before: HeldBody) -> None:
+        """Remember what `before`, of these replicas and others behind them, has last done."""
+        if before._last is not None:
+            ddq, command = (x[:, :self._plant.replicas].copy() for x in before._last)
+            self._last = ddq, command
+            self._body.take_held(before._body)
+
     def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:
         n, half = self._n, 0.5 * self._h * self._together
         for k in range(self._steps):

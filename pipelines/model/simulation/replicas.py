@@ -81,12 +81,16 @@ def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, no
     for lane in alone:
         lane.run_alone(steps, drawn)
     active, k = sorted((lane for lane in every if lane not in alone), key=lambda lane: -lane.experiment.n_samples), 0
+    before: RungeKutta | OneRRR | None = None
     while active:
         own = plant if plant.p.ndim == 1 else replace(plant, p=np.tile(plant.p, (len(active), 1)))
         moving = own.prepared(len(drawn) * len(active))
         last = active[-1].experiment.n_samples
-        _advance(moving, _integrator(moving, active[0].experiment.sample_time, steps, exact), active, k, last)
-        active, k = [lane for lane in active if lane.experiment.n_samples > last], last
+        integrator = _integrator(moving, active[0].experiment.sample_time, steps, exact)
+        if isinstance(integrator, HeldBody) and isinstance(before, HeldBody):
+            integrator.go_on_from(before)
+        _advance(moving, integrator, active, k, last)
+        active, k, before = [lane for lane in active if lane.experiment.n_samples > last], last, integrator
     return [lane.simulated(steps) for lane in every]
 
 

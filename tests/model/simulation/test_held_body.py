@@ -12,6 +12,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.simulation import Experiment, Noise, choose_step
 from pipelines.model.simulation.integrate import HeldBody
 from pipelines.model.simulation.plant import Plant
+from pipelines.model.simulation.replicas import run_together
 from tests.model.simulation.arms import TS, Case, rrr, serial
 from tests.model.simulation.pinocchio_loop import Loop
 from tests.model.simulation.test_forward_dynamics import follow, offsets
@@ -67,6 +68,14 @@ def test_nothing_is_held_where_that_would_be_told(noise: float, exact: bool, sha
     assert (step.error <= step.allowed).all()
     assert step.exact is exact
     assert step.per_sample <= 2
+
+
+def test_a_replica_does_the_same_alone_and_beside_a_shorter_run(shared: Path, tmp_path: Path) -> None:
+    case = serial("tx40", shared, tmp_path)
+    plant, noise = Plant.of(case.arm), Noise(np.full(6, 0.1), np.zeros(6))
+    both = run_together(plant, [swinging(case, 120), swinging(case, 60)], 2, noise, (1, 2))
+    alone = run_together(plant, [swinging(case, 120)], 2, noise, (2,))
+    np.testing.assert_allclose(both[0].true_q[1], alone[0].true_q[0], rtol=0.0, atol=1e-14)
 
 
 def test_an_arm_in_closed_form_is_not_held() -> None:
