@@ -24,6 +24,7 @@ from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, rows_of
 from pipelines.model.diagnosis.twin import imperfect, replica
+from pipelines.model.diagnosis.waves import without_waves
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.simulation import Experiment, Noise, Plant, choose_step, simulate
 
@@ -46,9 +47,8 @@ class _Replica:
 
     simulated: Array  # [N m] that noise
     rough: Array  # squared roughness
-    power: Array
-    drives: Array  # power of the ripple that any drive has, which is not simulated
-    wander: Array  # power of a wander of one N m
+    power: Array  # mean square, without waves along an angle
+    wandering: Array  # the same with as much wander as there may be
 
 
 def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe: Recipe, place: int, seed: int) -> DriveNoise:
@@ -79,10 +79,10 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
         shaken = simulated((np.maximum(shaken.simulated * np.sqrt(np.clip(share, 0.0, _FARTHEST)), least), seed + 1))
         share = _share(rough, still, shaken)
     level = np.maximum(shaken.simulated * np.sqrt(np.clip(share, 0.0, _REACH)), least)
-    quick = still.power + np.square(level / np.maximum(shaken.simulated, 1e-300)) * (shaken.power - still.power)
-    power = np.mean(np.square(mine), axis=1, where=own.weighed)
-    more = (power - quick - shaken.drives) / np.maximum(shaken.wander, 1e-300)
-    return DriveNoise(level, np.minimum(np.sqrt(np.maximum(more, 0.0)), _WANDER * level))
+    times = np.square(level / np.maximum(shaken.simulated, 1e-300))
+    quick, most = still.power + times * (shaken.power - still.power), times * (shaken.wandering - shaken.power)
+    power = _power(Data((own,)), mine.ravel())
+    return DriveNoise(level, _WANDER * level * np.sqrt(np.clip((power - quick) / np.maximum(most, 1e-300), 0.0, 1.0)))
 
 
 def _share(rough: Array, still: _Replica, shaken: _Replica) -> Array:
@@ -91,16 +91,20 @@ def _share(rough: Array, still: _Replica, shaken: _Replica) -> Array:
 
 
 def _seen(model: Exact, fit: Fit, level: Array, seed: int) -> _Replica:
-    rows, none = fit.data, np.zeros(fit.data.n_joints)
-    drives, both = (rows.lay_each(imperfect(model.nominal, DriveNoise(none, rms), rows, seed)) for rms in (none, none + 1.0))
+    rows = fit.data
 
-    def shown(load: Array) -> Array:
-        """Of a load (rows,) [N m] what the fit does not take."""
-        weighted = load * fit.weights
-        return np.square(rows.rms((weighted - (fit.basis @ weighted) @ fit.basis) / fit.weights))
+    def left(wander: Array) -> Array:
+        """(rows,) [N m] with what any drive in order has, which is not simulated."""
+        load = rows.lay_each(imperfect(model.nominal, DriveNoise(level, wander), rows, seed)) * fit.weights
+        return np.asarray(fit.left + (load - (fit.basis @ load) @ fit.basis) / fit.weights)
 
     rough = np.square(_roughness(next(rows.split(fit.left)), float(np.median(np.diff(rows.logs[0].t)))))
-    return _Replica(level, rough, np.square(fit.rms), shown(drives), shown(both - drives))
+    return _Replica(level, rough, _power(rows, left(0.0 * level)), _power(rows, left(_WANDER * level)))
+
+
+def _power(data: Data, left: Array) -> Array:
+    """(joints,) [N m^2]; waves are taken out of what the log has left too, which takes some of what is slow with them."""
+    return np.square(data.rms(without_waves(data, left)))
 
 
 def white(data: Data, left: Array) -> Array:
