@@ -23,6 +23,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.parsimony import different
 from pipelines.model.diagnosis.result import Diagnosis, Finding
 from pipelines.model.effects import find_effect
 
@@ -49,7 +50,8 @@ def wrong_law(found: Diagnosis, most: int) -> bool:
     accepted = [one for one in found.ledger if one.accepted]
     tried = found.verdict == "unknown" and (not accepted or any(find_effect(one.cause).friction for one in accepted))
     last = max((one.step for one in found.ledger), default=0)
-    left = [(one.cause, one.joint) for one in found.ledger if last > most and one.step == last and one.gain > one.threshold]
+    ended = different((one.cause, one.joint) for one in accepted) >= most
+    left = [(one.cause, one.joint) for one in found.ledger if ended and one.step == last and one.gain > one.threshold]
     return turning or tried or of_one_law([(one.cause, one.joint) for one in laws]) or of_one_law(left)
 
 

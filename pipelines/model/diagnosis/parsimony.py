@@ -1,16 +1,18 @@
 """Of causes that explain nearly the same, the plainest.
 
-    best = fewest(tried)        of hypotheses fitted exactly, best first
+    best = fewest(tried)            of hypotheses fitted exactly, best first
+    count = different(places)       how many causes there are
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 
 from pipelines.model.diagnosis.ledger import Tried
 
-__all__ = ["PARSIMONY", "fewest"]
+__all__ = ["PARSIMONY", "different", "fewest"]
 
 PARSIMONY = 0.02  # of what the best takes away
 _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the noise tells such causes apart
@@ -43,3 +45,9 @@ def _as_good(plain: Tried, best: Tried) -> bool:
     rows = best.done.data.rows
     price = further * math.log(rows) / rows
     return plain.done.rss - best.done.rss < price * best.done.rss and plain.error - best.error < price * best.error
+
+
+def different(places: Iterable[tuple[str, int | None]]) -> int:
+    """How many causes these are, by name and joint: one that is there at several joints counts once, two at one joint twice."""
+    there = Counter(places)
+    return sum(max(count for (name, _), count in there.items() if name == wanted) for wanted in {name for name, _ in there})

@@ -12,7 +12,6 @@ or with one more that is worth it.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +23,7 @@ from pipelines.model.diagnosis.curves import with_curves_anew
 from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole, plainer
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import fit_columns
-from pipelines.model.diagnosis.parsimony import PARSIMONY, fewest
+from pipelines.model.diagnosis.parsimony import PARSIMONY, different, fewest
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
@@ -120,7 +119,8 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         explored = rough[number - 1] if same else _explored(case, now, screened, gate.passed)
         if same and not case.floored:
             explored = _explored(case, now, screened, gate.passed, explored.tried)
-        step = _step(case, explored, gate, number, _different(now) < most)
+        found = different((one.effect.name, one.effect.joint) for one in now.model.effects)
+        step = _step(case, explored, gate, number, found < most)
         steps.append(step)
         asked.append((explored, gate))
         if step.best is None:
@@ -137,13 +137,6 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         follows = number < len(rough) and same and step.best is fewest(rough[number - 1].tried)
         now = rough[number].before if follows else _reweighted(step.best.done)
     return Found(nominal, tuple(steps), now)
-
-
-def _different(now: Refined) -> int:
-    """How many causes a model has: one that is there at several joints counts once, two at one joint twice."""
-    places = Counter((one.effect.name, one.effect.joint) for one in now.model.effects)
-    names = {name for name, _ in places}
-    return sum(max(count for (name, _), count in places.items() if name == wanted) for wanted in names)
 
 
 def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explored, _Gate]]) -> tuple[int, Step, Tried] | None:

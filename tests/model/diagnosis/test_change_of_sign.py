@@ -112,11 +112,11 @@ def wrong_law_of(found: Diagnosis) -> bool:
 def told(verdict: str, causes: Sequence[str], question: str = "what is wrong", tried: Sequence[str] = (),
          left: Sequence[str] = ()) -> Diagnosis:
     """What `wrong_law` reads of a diagnosis: causes and their joints, named, only tried, and left above thresholds at last."""
-    findings, taken, above = ([SimpleNamespace(cause=name, joint=int(joint), parameters={}, accepted=names is tried, gain=0.2,
+    findings, taken, above = ([SimpleNamespace(cause=name, joint=int(joint), parameters={}, accepted=names is not left, gain=0.2,
                                                threshold=0.1, step=5 if names is left else 1)
                                for name, _, joint in (one.partition(":") for one in names)] for names in (causes, tried, left))
     end = SimpleNamespace(cause="spring", joint=1, accepted=False, gain=0.01, threshold=0.1, step=5)
-    ledger = [*taken, *above, end]
+    ledger = [*findings, *taken, *above, end]
     return cast("Diagnosis", SimpleNamespace(verdict=verdict, findings=findings, question=question, nominal=None, ledger=ledger))
 
 
@@ -138,11 +138,12 @@ def test_what_was_found_at_some_of_many_joints_is_asked_again() -> None:
 
 
 def test_what_a_search_for_a_few_causes_leaves_at_several_joints_is_asked_again() -> None:
-    """Three joints that are late and one law of friction make four; the friction of the others is left above its thresholds."""
-    named = ("time_delay:1", "time_delay:2", "drive_lag:3", "presliding:3")
+    """Two joints that are late count once; with three more they make four, and the friction of others is left above thresholds."""
+    named = ("time_delay:1", "time_delay:2", "drive_lag:3", "presliding:3", "spring:1")
     assert wrong_law_of(told("cause", named, left=("concave_friction:1", "concave_friction:2")))
     assert not wrong_law_of(told("cause", named, left=("concave_friction:1", "cogging:2", "cogging:3")))
-    assert not wrong_law(told("cause", named[:3], left=("concave_friction:1", "concave_friction:2")), 5)
+    assert not wrong_law_of(told("cause", named[:4], left=("concave_friction:1", "concave_friction:2")))
+    assert not wrong_law(told("cause", named, left=("concave_friction:1", "concave_friction:2")), 5)
 
 
 def test_what_has_changed_without_a_name_is_asked_again() -> None:
