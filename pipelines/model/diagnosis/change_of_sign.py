@@ -75,9 +75,12 @@ def _left(prepared: Prepared) -> list[Array]:
 
 def plainer_of(found: Diagnosis, again: Diagnosis) -> Diagnosis:
     """The one that finds less, and of as much the one whose curve is fitted, `again`, even where that is without a name: what
-    was `found` are names that the curve may have given. Where `found` has no name, an answer."""
+    was `found` are names that the curve may have given. Where `found` has no name, an answer; where it is what has changed, a
+    name, for the curve was the same before."""
     if found.verdict == "unknown":
         return found if again.verdict == "unknown" else again
+    if again.verdict == "unknown" and found.question == "what has changed":
+        return found
     return min(again, found, key=lambda one: len(one.findings))
 
 

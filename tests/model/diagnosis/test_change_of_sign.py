@@ -161,6 +161,9 @@ def test_of_two_diagnoses_the_one_that_finds_less_holds_and_an_answer_before_non
     assert plainer_of(unknown, two) is two
     assert plainer_of(unknown, well) is well
     assert plainer_of(two, unknown) is unknown
+    changed = told("cause", ("cogging:3", "stribeck:3"), "what has changed")
+    assert plainer_of(changed, unknown) is changed
+    assert plainer_of(changed, one) is one
 
 
 @pytest.mark.parametrize("question", ["what is wrong", "what has changed"])
