@@ -43,9 +43,9 @@ def unnameable(passing: Sequence[Screened], best: Tried | None, tried: Sequence[
 
 def _repeated(one: Screened, now: Refined, case: Case) -> bool:
     """Whether it takes enough off the held-out logs, to first order: chance takes as much as it may off those it was fitted to."""
-    share = float(one.gain[0]) / max(now.rss, 1e-300)
     if case.judge is None:
         return True
+    share = float(one.gain[0]) / max(now.rss, 1e-300)
     table = laid_whole(case.data, one.shape[0], now.model.arm)
     beta = fit_columns(case.data, np.concatenate([now.slopes, table]), now.left, now.weight).beta
     slopes, _ = slopes_of(now.model, case.judge, rigid_rows(case.judge, now.model.columns))
