@@ -33,6 +33,7 @@ from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.own_motion import put_right
 from pipelines.model.diagnosis.pruned import settled, unlike_motion, unnamed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
@@ -133,8 +134,9 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     case = replace(case, thresholds=floored.thresholds)
     found = search(case, chosen.most, rough)
     known = floored.thresholds is not None
-    done = settled(found, rule(found, floored.rms, known), case, prepared, floored.rms, known)
     usual = None if floored.calibration is None else following_of(floored.calibration, prepared, calibration is not None)
+    mended = usual is not None and put_right(found.nominal.fit, found.final.fit, usual)
+    done = settled(found, rule(found, floored.rms, known, mended), case, prepared, floored.rms, known)
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 
 

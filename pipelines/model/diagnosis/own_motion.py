@@ -22,7 +22,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["following", "standing_out"]
+__all__ = ["following", "put_right", "standing_out"]
 
 _TIMES = 3.0  # the most that any replica shows: of 78 joints of arms in order none showed more than 1.6 times that
 _LEAST = 0.1  # less is of no use to anybody
@@ -50,6 +50,15 @@ def following(fit: Fit, residuals: Array) -> Array:
 def standing_out(share: Array, usual: Array) -> list[int]:
     """Joints, from 0, of which `share` (joints,) is far above the most, `usual` (joints,), that arms in order show."""
     return np.flatnonzero(share > np.maximum(_TIMES * usual, _LEAST)).tolist()
+
+
+def put_right(before: Fit, after: Fit, usual: Array) -> bool:
+    """Whether what `before` leaves of some joint follows the joint's motion, and nothing that `after` leaves does: what was found
+    explains it, however little it is. `usual` as in `standing_out`."""
+    def out(fit: Fit) -> list[int]:
+        return standing_out(following(fit, fit.residual[None])[:, 0], usual)
+
+    return bool(out(before)) and not out(after)
 
 
 def _columns(motion: Motion, joint: int, turning: bool) -> Array:

@@ -117,7 +117,7 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
         screened = rough[number - 1].screened if same else _screened(case, now)
         gate = _gate(case, now, screened)
         explored = rough[number - 1] if same else _explored(case, now, screened, gate.passed)
-        if same and not case.floored:
+        if same and (not case.floored or _others(case, explored, gate)):
             explored = _explored(case, now, screened, gate.passed, explored.tried)
         found = different((one.effect.name, one.effect.joint) for one in now.model.effects)
         step = _step(case, explored, gate, number, found < most)
@@ -213,15 +213,7 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     Args:
         there: those that are fitted already.
     """
-    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
-    able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
-            or (case.again and one.shape[0].again(case.data.logs[0].motion))]
-    order = sorted((one for one in able if one.gain[0] >= _LEAST * now.rss), key=lambda one: -one.gain[0])
-    able = [one for one in order if one.family.shapes[0].evidence in case.nameable and one.stands_out]
-    asked = {id(one) for one in wanted}
-    if not case.floored:  # what is not borne out, however great, is no rival of what is
-        able = [one for one in able if id(one) in asked]
-    great = [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0] and id(one) in asked]
+    great = _great(case, now, screened, wanted)
     error = held_out(now, case) if great else np.nan
     done = {id(one.screened): one for one in there}
     tried = [done.get(id(one)) or fitted(case, now, one, error) for one in great]
@@ -234,6 +226,24 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
         lasting = fewest(sorted((one for one in tried if one.log is None), key=lambda one: one.rank))
     tried = [best_form(case, now, one, error) if one in (best, lasting) else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
+
+
+def _great(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened]) -> list[Screened]:
+    """Of those wanted the greatest: what is below its threshold or not borne out, however great, is no rival of what is not."""
+    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
+    asked = {id(one) for one in wanted}
+    able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
+            or (case.again and one.shape[0].again(case.data.logs[0].motion))]
+    able = [one for one in able if one.gain[0] >= _LEAST * now.rss and one.stands_out and id(one) in asked
+            and one.family.shapes[0].evidence in case.nameable]
+    able = sorted(able, key=lambda one: -one.gain[0])
+    return [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
+
+
+def _others(case: Case, explored: Explored, gate: _Gate) -> bool:
+    """Whether others than were explored are the greatest of those that pass."""
+    tried = {id(one.screened) for one in explored.tried}
+    return any(id(one) not in tried for one in _great(case, explored.before, explored.screened, gate.passed))
 
 
 def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:

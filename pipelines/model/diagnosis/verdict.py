@@ -69,14 +69,15 @@ def too_little(nominal: Array, final: Array, floor: Array) -> bool:
     return bool((nominal > _CLEAR * floor).any()) and explained(nominal, final, nominal, floor) < _HALF
 
 
-def rule(found: Found, floor: Array, known: bool = True) -> Ruling:
+def rule(found: Found, floor: Array, known: bool = True, mended: bool = False) -> Ruling:
     """Which causes are named.
 
     Args:
         known: whether the floor is that of an arm in order, twin or reference; else it is only the noise, which the models of
             recorded arms never come down to, and what pays on held-out time is named.
+        mended: whether something else than the floor tells that what was found explains what was wrong, however little it is.
     """
-    return _ruled(found, floor, known, [step for step in found.steps if step.best is not None])
+    return _ruled(found, floor, known, [step for step in found.steps if step.best is not None], mended=mended)
 
 
 def without_steps(found: Found, floor: Array, known: bool, named: bool = False) -> Ruling:
@@ -84,7 +85,8 @@ def without_steps(found: Found, floor: Array, known: bool, named: bool = False) 
     return _ruled(replace(found, final=found.nominal), floor, known, [], known and not named)
 
 
-def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_share: bool | None = None) -> Ruling:
+def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_share: bool | None = None,
+           mended: bool = False) -> Ruling:
     """`any_share`: whether something that gives way counts however little it explains; by default where the floor is known."""
     every = known if any_share is None else any_share
     other = next((step.other for step in found.steps if step.other is not None and (every or _much(step.other, found))), None)
@@ -106,8 +108,9 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
         doubts |= {k: _TRIFLE for k, step in enumerate(accepted)
                    if _most_taken(step, found, floor) < _SHAPE and not _one_more(step, accepted[:k])}
         return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
-    if too_little(found.nominal.rms, found.final.rms, floor):
-        if not (found.nominal.rms > _ABOVE * floor).any():  # without that explanation nothing would be wrong
+    near = not (found.nominal.rms > _ABOVE * floor).any()
+    if too_little(found.nominal.rms, found.final.rms, floor) and not (near and mended):
+        if near:  # without that explanation nothing would be wrong
             return Ruling("nothing-wrong", (), "", dict.fromkeys(range(len(accepted)), _LITTLE))
         return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import Fit, fit_nominal
-from pipelines.model.diagnosis.own_motion import following, standing_out
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
+from pipelines.model.diagnosis.own_motion import following, put_right, standing_out
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
@@ -52,3 +52,14 @@ def test_a_fault_without_a_name_stands_out_at_its_joint(healthy: Fit) -> None:
     fit = fit_nominal(prepared.data, prepared.columns)[1]
     assert standing_out(following(fit, fit.residual[None])[:, 0], usual) == [1]
     assert standing_out(following(healthy, healthy.residual[None])[:, 0], usual) == []
+
+
+def test_what_explains_it_puts_it_right(healthy: Fit) -> None:
+    usual = following(healthy, drawn(healthy)).max(axis=1)
+    prepared = prepare(Logs((hidden(1, stiffening), hidden(2, stiffening))), DiagnosisSettings())
+    fit = fit_nominal(prepared.data, prepared.columns)[1]
+    own, other = (fit_columns(fit.data, np.concatenate([fit.table, fit.data.lay(torque)[None]]))
+                  for torque in (stiffening, lambda motion: np.roll(stiffening(motion), 1, axis=1)))
+    assert put_right(fit, own, usual)
+    assert not put_right(fit, other, usual)
+    assert not put_right(healthy, own, usual)

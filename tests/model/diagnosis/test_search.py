@@ -22,9 +22,9 @@ from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.screen import screen, screen_family
-from pipelines.model.diagnosis.search import Step, search
+from pipelines.model.diagnosis.search import Step, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.thresholds import without_twin
+from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden, wave
@@ -177,6 +177,20 @@ def test_what_no_arm_could_have_moved_with_is_not_taken(waving: Case) -> None:
     trial = next(one for one in ledger([best.screened], [best.screened], without_twin([best.screened], 1e-9, np.ones(3)),
                                        [replace(best, believable=False)], None, best.done, 1))
     assert "could not have moved" in trial.reason
+
+
+def test_what_does_not_pass_is_no_rival_of_what_does(waving: Case) -> None:
+    """However great: a cause that gains a hundredth of another is fitted where that other stays below its threshold."""
+    rough = provisional(waving)
+    screened = rough[0].screened
+    most = max(one.gain[0] for one in screened)
+    small = max((one for one in screened if one.gain[0] < 0.1 * most), key=lambda one: one.gain[0])
+    gain = np.array([0.5 * one.gain[0] if one is small else np.inf for one in screened])
+    weight = rough[0].before.weight
+    given = Thresholds(gain, np.zeros(len(gain)), "a test", weight, tuple(one.joint for one in screened))
+    first = search(replace(waving, thresholds=given), 1, rough).steps[0]
+    assert small not in [one.screened for one in rough[0].tried]
+    assert [one.screened for one in first.rivals] == [small]
 
 
 @pytest.mark.parametrize("sure", [True, False])

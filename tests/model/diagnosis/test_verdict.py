@@ -65,6 +65,14 @@ def test_a_poor_explanation_of_what_would_be_no_alarm_without_it_is_none() -> No
     assert 0 in ruling.doubts
 
 
+def test_a_little_that_something_else_bears_out_is_named_near_the_floor_only() -> None:
+    """Where what is left followed the joint's motion and does not any more, it need not explain half of an uncertain excess."""
+    near, after = left(0.0125, 0.01, 0.0107), left(0.0125, 0.01, 0.0102)
+    assert rule(found(near, after), FLOOR, mended=True).named == (0,)
+    high, little = left(0.05, 0.01, 0.01), left(0.045, 0.01, 0.01)
+    assert rule(found(high, little), FLOOR, mended=True).verdict == "unknown"
+
+
 def test_what_may_be_the_floor_need_not_be_explained() -> None:
     """Ten replicas know the floor to about a tenth: joint 1 is no excess that the cause at joint 3 ought to take away."""
     assert rule(found(left(0.0115, 0.0097, 0.0105), left(0.0115, 0.0097, 0.0098)), FLOOR).named == (0,)
