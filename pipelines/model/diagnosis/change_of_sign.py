@@ -27,10 +27,10 @@ from pipelines.model.diagnosis.parsimony import different
 from pipelines.model.diagnosis.result import Diagnosis, Finding
 from pipelines.model.effects import find_effect
 
-__all__ = ["SEVERAL", "loosened", "of_one_law", "plainer_of", "shows", "wrong_law"]
+__all__ = ["LESS", "SEVERAL", "loosened", "of_one_law", "plainer_of", "shows", "wrong_law"]
 
 SEVERAL = 2  # joints
-_LESS = 0.95
+LESS = 0.95
 _WIDTHS = 10.0  # by then tanh and the root have come to their level, within half a per cent
 
 
@@ -63,7 +63,7 @@ def of_one_law(causes: Iterable[tuple[str, int | None]]) -> bool:
 
 def shows(prepared: Prepared, other: Prepared) -> bool:
     """Whether the `loosened` laws, `other`, leave clearly less of some joint, fitted or held out."""
-    return any(bool((less < _LESS * most).any()) for less, most in zip(_left(other), _left(prepared), strict=True))
+    return any(bool((less < LESS * most).any()) for less, most in zip(_left(other), _left(prepared), strict=True))
 
 
 def _left(prepared: Prepared) -> list[Array]:

@@ -25,6 +25,7 @@ from pipelines.model.diagnosis.candidates import Family, families, place_of, who
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.chance import BY_CHANCE
+from pipelines.model.diagnosis.change_of_sign import LESS, loosened, shows
 from pipelines.model.diagnosis.drive_noise import white
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding
@@ -96,6 +97,22 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
     prepared = memory.prepared(logs, chosen, arm)
+    found = _extended(prepared, wanted, chosen, say, memory)
+    other = loosened(prepared)
+    if other is prepared or not shows(prepared, other):
+        return found
+    say("fitting by which curve friction changes its sign")
+    return _better(found, _extended(other, wanted, chosen, say, memory))
+
+
+def _better(found: Extended, again: Extended) -> Extended:
+    """`again`, with the curve of friction fitted, where that leaves clearly less of some joint held out, and of none clearly more."""
+    ratio = again.after.validate / np.maximum(found.after.validate, 1e-300)
+    return again if (ratio < LESS).any() and (ratio < 1.0 / LESS).all() else found
+
+
+def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSettings, say: Callable[[str], None],
+              memory: Memory) -> Extended:
     if any(one.effect.evidence == "reversals" for one in wanted):
         prepared = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
     first = _responding(prepared, wanted, chosen)

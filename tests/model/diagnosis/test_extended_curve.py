@@ -1,0 +1,39 @@
+"""An extension that somebody asks for knows as much of how dry friction changes its sign as a diagnosis does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.extend import Wanted, extend
+from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.effects import find_effect
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import hidden, wave
+from tests.model.estimation.experiments import COULOMB
+
+
+def waving(motion: Motion, rooted: bool) -> Array:
+    """A wave at joint 2; friction that changes its sign as v/√(v² + ε²) does, by about as much as tanh, or as the logs have it."""
+    x = 100.0 * motion.dq
+    return wave(motion) + rooted * np.array(COULOMB) * (x / np.sqrt(1.0 + x**2) - np.tanh(x))
+
+
+@pytest.mark.parametrize("rooted", [True, False])
+def test_an_extension_fits_the_curve_where_that_leaves_less(rooted: bool) -> None:
+    def logs(load: bool) -> Logs:
+        def torque(motion: Motion) -> Array:
+            return waving(motion, rooted) if load else rooted * (waving(motion, True) - wave(motion))
+
+        return Logs((hidden(1, torque), hidden(2, torque)), (hidden(3, torque, "validate"),))
+
+    said: list[str] = []
+    found = extend(logs(True), [Wanted(find_effect("cogging")(joint=2), {"order": 11.0})], tell=said.append)
+    assert found.arm is not None
+    assert found.findings[0].parameters["amplitude"].value == pytest.approx(0.1, rel=0.03)
+    assert any("changes its sign" in words for words in said) is rooted
+    plain = {one.values.get("roundness") for one in found.arm.friction if "roundness" in one.values} == {1.0}
+    assert plain is not rooted
+    in_order = extend(logs(False), [], tell=said.append).before.validate  # without the wave, by the same curve
+    assert (found.after.validate < 1.1 * in_order).all()
