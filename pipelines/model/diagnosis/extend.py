@@ -106,7 +106,7 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
 
 
 def _better(found: Extended, again: Extended) -> Extended:
-    """`again`, with the curve of friction fitted, where that leaves clearly less of some joint held out, and of none clearly more."""
+    """`again`, with the curve of friction fitted, where that leaves clearly less of some joint held out and of none more."""
     ratio = again.after.validate / np.maximum(found.after.validate, 1e-300)
     return again if (ratio < LESS).any() and (ratio < 1.0 / LESS).all() else found
 
