@@ -38,7 +38,7 @@ from pipelines.model.diagnosis.pruned import settled, unlike_motion, unnamed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
-from pipelines.model.diagnosis.search import Explored, Found, gap_first, gives_way, greatest, provisional, search
+from pipelines.model.diagnosis.search import Explored, Found, gap_first, gives_way, glance, greatest, provisional, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
@@ -112,15 +112,15 @@ def _looked_at(prepared: Prepared, chosen: DiagnosisSettings, say: Tell, calibra
     if prepared.reference is not None:
         return _Seen(first, case, prepared, ())
     say("looking for the greatest causes")
-    rough = provisional(case)
-    if first.stiff is not None and not first.stiff.named and gives_way(rough[0]):
+    seen = glance(case)
+    if first.stiff is not None and not first.stiff.named and gives_way(seen):
         say("looking for a gap below the frequencies at which it rings")
         slow = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
         there = _nameable(_case(slow, chosen), first.stiff)
-        seen = provisional(there)
-        if gap_first(seen[0]):
-            return _Seen(replace(first, held=Held(there, slow)), there, slow, seen)
-    return _Seen(first, case, prepared, rough)
+        rough = provisional(there)
+        if gap_first(rough[0]):
+            return _Seen(replace(first, held=Held(there, slow)), there, slow, rough)
+    return _Seen(first, case, prepared, provisional(case, seen))
 
 
 def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None, memory: Memory) -> Diagnosis:

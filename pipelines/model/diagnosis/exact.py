@@ -19,7 +19,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.nominal import Fit, effect_rows, law_rows, nominal_arm, rigid_rows
+from pipelines.model.diagnosis.nominal import Fit, effect_rows, law_rows, nominal_arm, rigid_rows, several_rows
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 
@@ -109,11 +109,15 @@ class Exact:
             return len(self.effects)
         return max((k + 1 for k, one in enumerate(self.effects) if not one.effect.adds), default=0)
 
-    def torque(self, data: Data) -> Array:
-        """(rows,)"""
-        core = self.core
-        parts = [self.added(data, one) for one in self.effects[core:]]
-        return np.asarray(sum(parts, self.core_torque(data, core)))
+    def torque(self, data: Data, laid: Sequence[Array] | None = None) -> Array:
+        """(rows,); `laid` as in `laid`, where it is known."""
+        core, parts = self.core, self.laid(data) if laid is None else laid
+        added = [one.effect.amplitudes(one.values) @ part for one, part in zip(self.effects[core:], parts, strict=True)]
+        return np.asarray(sum(added, self.core_torque(data, core)))
+
+    def laid(self, data: Data) -> list[Array]:
+        """Columns (k, rows) of each of the effects that just add."""
+        return [self.columns_of(data, one) for one in self.effects[self.core:]]
 
     def core_torque(self, data: Data, core: int) -> Array:
         """(rows,) of the nominal model and the first `core` effects."""
@@ -130,13 +134,17 @@ class Exact:
             first += count
         return np.asarray(torque)
 
-    def added(self, data: Data, one: Named) -> Array:
-        """(rows,) what an effect adds, beside the nominal model, in the logs it belongs to."""
-        return np.asarray(one.effect.amplitudes(one.values) @ self.columns_of(data, one))
+    def added(self, data: Data, *several: Named) -> list[Array]:
+        """(rows,) what an effect adds beside the nominal model, in the logs it belongs to, each with other numbers."""
+        rows = several_rows(data, [one.effect.at(one.values) for one in several], self.nominal)
+        return [np.asarray(one.effect.amplitudes(one.values) @ self._of_log(data, one, own))
+                for one, own in zip(several, rows, strict=True)]
 
     def columns_of(self, data: Data, one: Named) -> Array:
         """(k, rows) the same of each of its amplitudes."""
-        columns = effect_rows(data, one.effect.at(one.values), self.nominal)
+        return self._of_log(data, one, effect_rows(data, one.effect.at(one.values), self.nominal))
+
+    def _of_log(self, data: Data, one: Named, columns: Array) -> Array:
         return columns if one.log is None else np.where(data.log_of == one.log - data.first, columns, 0.0)
 
     def moved(self, shift: Array, names: list[tuple[int, int, str]]) -> Exact:

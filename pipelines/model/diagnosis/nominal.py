@@ -8,6 +8,7 @@ Kostić et al. 2004, eq. (12)-(15). What else the fit may have, effects found so
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -22,7 +23,7 @@ from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
 
 __all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_slopes", "nominal_arm", "orthonormal", "polish",
-           "rigid_rows", "rows_of"]
+           "rigid_rows", "rows_of", "several_rows"]
 
 _RANK = 1e-12  # of the largest: smaller eigenvalues of the Gram matrix of unit columns are rounding
 _ROUNDS = 6  # of weights
@@ -144,6 +145,14 @@ def effect_rows(data: Data, effect: Effect, arm: ArmModel) -> Array:
     if effect.from_motion:
         return data.lay_kept(effect, lambda motion: effect.columns(motion, arm))
     return data.lay(lambda motion: effect.columns(motion, arm))
+
+
+def several_rows(data: Data, shapes: Sequence[Effect], arm: ArmModel) -> list[Array]:
+    """The same of several shapes of an effect, each (k, rows)."""
+    if not shapes or shapes[0].from_motion:
+        return [effect_rows(data, shape, arm) for shape in shapes]
+    laid = data.lay(lambda motion: np.concatenate(shapes[0].several(shapes, motion, arm), axis=2))
+    return np.split(laid, len(shapes))
 
 
 def fit_nominal(data: Data, columns: Columns) -> tuple[Columns, Fit]:

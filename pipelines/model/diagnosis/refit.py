@@ -86,16 +86,18 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
     weights = weight[data.joint]
     rigid = rigid_rows(data, model.columns)
     model = replace(model, beta=dissipating(model.beta, model.columns.laws))
-    left = y - model.torque(data)
+    laid = model.laid(data)
+    left = y - model.torque(data, laid)
     now = float(np.sum(np.square(left * weights)))
-    slopes, names = slopes_of(model, data, rigid)
+    slopes, names = slopes_of(model, data, rigid, laid)
     for _ in range(steps):
         better = False
         for ridge in _RIDGES:
             shift = _within(model, names, slopes * weights, left * weights, ridge)
             for share in _SHARES:
                 there = model.moved(share * shift, names)
-                other = y - there.torque(data)
+                laid = there.laid(data)
+                other = y - there.torque(data, laid)
                 power = float(np.sum(np.square(other * weights)))
                 if power < now:
                     better = True
@@ -105,7 +107,7 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
         if not better:
             break
         gained, model, left, now = 1.0 - power / now, there, other, power
-        slopes, names = slopes_of(model, data, rigid)
+        slopes, names = slopes_of(model, data, rigid, laid)
         if gained < _GAIN:
             break
     return Refined(model, data, weight, left, slopes, tuple(names))

@@ -30,7 +30,7 @@ from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.diagnosis.unnameable import unnameable
 
-__all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "greatest", "provisional", "search"]
+__all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "glance", "greatest", "provisional", "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
@@ -83,18 +83,28 @@ class Found:
     final: Refined
 
 
-def provisional(case: Case) -> tuple[Explored, ...]:
-    """The causes that explain the most of what a joint leaves, right or wrong, until none explains a third of it."""
-    now, found = refine(case.model, case.data, case.weight), []
-    for _ in range(_GREAT):
-        screened = _screened(case, now)
+def glance(case: Case) -> Explored:
+    """Every cause on what the nominal model leaves, to first order; none is fitted."""
+    now = refine(case.model, case.data, case.weight)
+    return Explored(now, _screened(case, now), ())
+
+
+def provisional(case: Case, seen: Explored | None = None) -> tuple[Explored, ...]:
+    """The causes that explain the most of what a joint leaves, right or wrong, until none explains a third of it.
+
+    Args:
+        seen: at a `glance`.
+    """
+    first = seen or glance(case)
+    now, screened, found = first.before, first.screened, list[Explored]()
+    while True:
         one = _explored(case, now, screened, screened)
         found.append(one)
         best = fewest(one.tried)
-        if best is None or _share(best.screened, now) < _LARGE:
-            break
+        if len(found) == _GREAT or best is None or _share(best.screened, now) < _LARGE:
+            return tuple(found)
         now = _reweighted(best.done)
-    return tuple(found)
+        screened = _screened(case, now)
 
 
 def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:

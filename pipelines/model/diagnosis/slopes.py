@@ -8,6 +8,7 @@ effect are differences of the torque.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,8 +27,12 @@ Which = tuple[int, int, str]  # 0 a law, 1 an effect; its place; the number of a
 _DIFFERENCE = 1e-3  # of a number
 
 
-def slopes_of(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[Which]]:
-    """(numbers, rows) slopes of the torque by every number, those of `rigid` columns first; and which they are behind the base."""
+def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | None = None) -> tuple[Array, list[Which]]:
+    """(numbers, rows) slopes of the torque by every number, those of `rigid` columns first; and which they are behind the base.
+
+    Args:
+        laid: as `model.laid(data)` makes it, where it is known.
+    """
     if any(one.effect.passing for one in model.effects):
         return _slopes_through(model, data)
     laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
@@ -38,29 +43,32 @@ def slopes_of(model: Exact, data: Data, rigid: Array) -> tuple[Array, list[Which
     whole = any(one.effect.misread or one.effect.in_drive for one in model.effects)
     if whole:  # friction is felt where the joint truly is, and comes late
         more = [_of_law(model, data, here, one) for one in names]
+    columns = model.laid(data) if laid is None else laid
     for place, one in enumerate(model.effects):
-        own = model.columns_of(data, one) if place >= core else None
+        own = columns[place - core] if place >= core else None
         alone = here if own is None else one.effect.amplitudes(one.values) @ own
-        for name, step in _steps(one):
-            names.append((1, place, name))
-            if own is not None and name.isdigit():  # it is linear in its amplitudes
-                more.append(own[int(name)][None])
-                continue
-            moved = number_moved(one, name, step)
-            if own is not None:
-                there = model.added(data, moved)
-            else:
-                effects = (*model.effects[:place], moved, *model.effects[place + 1:core])
-                there = replace(model, effects=effects).core_torque(data, core)
-            more.append((there - alone)[None] / step)
+        steps = [(name, step) for name, step in _steps(one) if own is None or not name.isdigit()]
+        if own is not None:  # it is linear in its amplitudes
+            amplitudes = [name for name, _ in _steps(one) if name.isdigit()]
+            names += [(1, place, name) for name in amplitudes]
+            more += [own[int(name)][None] for name in amplitudes]
+        there = _with(model, data, place, core, [number_moved(one, name, step) for name, step in steps])
+        names += [(1, place, name) for name, _ in steps]
+        more += [(torque - alone)[None] / step for torque, (_, step) in zip(there, steps, strict=True)]
         for name in () if whole else one.tied:  # it moves with the friction at its joint
             law = (0, law_of(model.columns.laws, one.effect, name), name)
-            moved = number_moved(one, name, _DIFFERENCE)
             if law in names:
-                there = model.added(data, moved) if own is not None else replace(
-                    model, effects=(*model.effects[:place], moved, *model.effects[place + 1:core])).core_torque(data, core)
-                more[names.index(law)] = more[names.index(law)] + (there - alone)[None] / _DIFFERENCE
+                torque = _with(model, data, place, core, [number_moved(one, name, _DIFFERENCE)])[0]
+                more[names.index(law)] = more[names.index(law)] + (torque - alone)[None] / _DIFFERENCE
     return np.concatenate([rigid, *laws, *more]), names
+
+
+def _with(model: Exact, data: Data, place: int, core: int, moved: Sequence[Named]) -> list[Array]:
+    """(rows,) of an effect with each of these numbers: of what just adds its torque, else that of the whole core."""
+    if place >= core:
+        return model.added(data, *moved)
+    return [replace(model, effects=(*model.effects[:place], one, *model.effects[place + 1:core])).core_torque(data, core)
+            for one in moved]
 
 
 def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:

@@ -65,18 +65,16 @@ class Backlash(Effect):
         return super().possible(values) and values["gap"] > _TIGHT
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
-        """All gaps of one motor are followed at once."""
+        """All gaps are followed at once; those of one motor share its forces."""
         tau, felt = _rigid(arm, motion), _felt(arm, motion.q, self._index)
-        found: dict[Self, Array] = {}
-        for motor in dict.fromkeys(one.motor_inertia for one in shapes):
-            some = [one for one in shapes if one.motor_inertia == motor]
-            mass = np.maximum(felt - motor, _LINK * felt)
-            k, d = _flank(float(np.mean(mass)), motor)
-            force = motor * self.own(motion.ddq) - tau[:, self._index]
-            half, film = np.array([[0.5 * one.gap, one.film] for one in some]).T
-            for one, x in zip(some, followed(motion.t, mass, force, Gaps(half, film, k, d)), strict=True):
-                found[one] = one._torque(motion, arm, tau, x)
-        return [found[one] for one in shapes]
+        motors = list(dict.fromkeys(one.motor_inertia for one in shapes))
+        motor = np.array(motors if len(motors) == 1 else [one.motor_inertia for one in shapes])[:, None]
+        mass = np.maximum(felt - motor, _LINK * felt)
+        force = motor * self.own(motion.ddq) - tau[:, self._index]
+        flanks = {one: _flank(float(np.mean(np.maximum(felt - one, _LINK * felt))), one) for one in motors}
+        half, film, k, d = np.array([[0.5 * one.gap, one.film, *flanks[one.motor_inertia]] for one in shapes]).T
+        link = followed(motion.t, mass, force, Gaps(half, film, k, d))
+        return [one._torque(motion, arm, tau, x) for one, x in zip(shapes, link, strict=True)]
 
     def _torque(self, motion: Motion, arm: ArmModel, tau: Array, x: Array) -> Array:
         """Column of a link that is x (samples,) ahead of its motor; `tau` is the rigid torque."""

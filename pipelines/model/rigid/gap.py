@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.model.rigid.body import Array
 
@@ -29,44 +30,55 @@ class Gaps:
 
     half: Array  # [rad] (gaps,) half the play
     film: Array  # [N m s/rad] (gaps,) drag of the lubricant
-    stiffness: float  # k [N m/rad] of a flank
-    damping: float  # d [N m s/rad]
+    stiffness: Array  # k [N m/rad] (gaps,) of a flank
+    damping: Array  # d [N m s/rad] (gaps,)
 
 
 def followed(t: Array, mass: Array, force: Array, gaps: Gaps) -> Array:
-    """x (gaps, samples) [rad] of the link against its motor; t, mass [kg m^2] and force [N m] are (samples,).
+    """x (gaps, samples) [rad] of the link against its motor; t (samples,), mass [kg m^2] and force [N m] (gaps, samples), or
+    (1, samples) where they are those of all gaps.
 
     Over a sample, trapezoids; flank and film implicit.
     """
     length = _SHORT if len(gaps.half) <= _FEW else _LENGTH
     samples, count = len(t), max(1, -(-(len(t) - 1) // length))
-    h, m, f = (np.append(x, 0.0) for x in (np.diff(t), 0.5 * (mass[1:] + mass[:-1]), 0.5 * (force[1:] + force[:-1])))
+    h = np.append(np.diff(t), 0.0)
+    m, f = (np.append(0.5 * (x[:, 1:] + x[:, :-1]), np.zeros((len(x), 1)), axis=1) for x in (mass, force))
     early = np.arange(count) * length - _EARLY
     steps = early + np.arange(length + _EARLY)[:, None]  # (steps, stretches)
     within = np.where((steps >= 0) & (steps < samples - 1), steps, samples - 1)
-    inertia = np.where(m[within] > 0.0, m[within], 1.0)  # outside the log no time goes by
-    x, v, seams = _moved(h[within], inertia, f[within], _start(force[np.maximum(early, 0)], gaps), gaps)
+    inertia = np.where(m > 0.0, m, 1.0)  # outside the log no time goes by
+    start = _start(force[:, np.maximum(early, 0)], gaps)
+    x, v, seams = _moved(h[within], _stretched(inertia, within), _stretched(f, within), start, gaps)
     for gap in range(len(gaps.half)):
         place, speed = x[-1, gap, 0], v[gap, 0]
         for k in range(1, count):
             if abs(place - x[_EARLY, gap, k]) + _TICK * abs(speed - seams[gap, k]) > _SEAM * gaps.half[gap]:
-                own = within[_EARLY:, k]
-                x[_EARLY:, gap, k], v[gap, k] = _step_by_step(h[own], m[own], f[own], (float(place), float(speed)), gaps, gap)
+                own, before = within[_EARLY:, k], (float(place), float(speed))
+                inert, pull = m[gap % len(m), own], f[gap % len(f), own]
+                x[_EARLY:, gap, k], v[gap, k] = _step_by_step(h[own], inert, pull, before, gaps, gap)
             place, speed = x[-1, gap, k], v[gap, k]
     return np.concatenate([x[_EARLY, :, :1], x[_EARLY + 1:].transpose(1, 2, 0).reshape(len(gaps.half), -1)], axis=1)[:, :samples]
 
 
+def _stretched(x: Array, within: npt.NDArray[np.intp]) -> Array:
+    """x (gaps, samples) at `within` (steps, stretches), as (steps, gaps, stretches)."""
+    return np.ascontiguousarray(x[:, within].transpose(1, 0, 2))
+
+
 def _start(force: Array, gaps: Gaps) -> Array:
     """x (gaps, stretches) settled on the flank that the force presses on."""
-    return np.asarray(gaps.half[:, None] * np.sign(force) + force / gaps.stiffness)
+    return np.asarray(gaps.half[:, None] * np.sign(force) + force / gaps.stiffness[:, None])
 
 
 def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, Array, Array]:
-    """x (steps + 1, gaps, stretches), v (gaps, stretches) at the end, and where a stretch begins; h, m, f (steps, stretches)."""
-    k, d, half = gaps.stiffness, gaps.damping, gaps.half[:, None]
+    """x (steps + 1, gaps, stretches), v (gaps, stretches) at the end, and where a stretch begins; h (steps, stretches), m and f
+    (steps, gaps, stretches), or one for all gaps."""
+    k, d, half = gaps.stiffness[:, None], gaps.damping[:, None], gaps.half[:, None]
+    h = h[:, None]
     out, v = np.empty((len(h) + 1, *x.shape)), np.zeros_like(x)
     out[0], seams = x, v
-    drag, more = 0.5 * h[:, None] * gaps.film[:, None], 0.5 * h * d + 0.25 * h * h * k
+    drag, more = 0.5 * h * gaps.film[:, None], 0.5 * h * d + 0.25 * h * h * k
     given, push, half_step = h * f, h * k, 0.5 * h
     for i in range(len(h)):
         over = x - np.minimum(np.maximum(x, -half), half)
@@ -83,7 +95,7 @@ def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, A
 
 def _step_by_step(h: Array, m: Array, f: Array, start: tuple[float, float], gaps: Gaps, gap: int) -> tuple[Array, float]:
     """x (samples,) of one gap from where the stretch before ended, and the speed at the end."""
-    k, d, half, film = gaps.stiffness, gaps.damping, float(gaps.half[gap]), float(gaps.film[gap])
+    k, d, half, film = (float(x[gap]) for x in (gaps.stiffness, gaps.damping, gaps.half, gaps.film))
     x, v = start
     found = [x]
     for step, inertia, pull in zip(h.tolist(), m.tolist(), f.tolist(), strict=True):
