@@ -26,6 +26,7 @@ from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.change_of_sign import SEVERAL, loosened, of_one_law, plainer_of, shows, wrong_law
 from pipelines.model.diagnosis.compliance import Compliance
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.doubted import unlike_motion, unnamed
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.floored import Floored, floored_by
 from pipelines.model.diagnosis.imperfections import DriveNoise
@@ -34,7 +35,7 @@ from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.own_motion import put_right
-from pipelines.model.diagnosis.pruned import settled, unlike_motion, unnamed
+from pipelines.model.diagnosis.pruned import settled
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected

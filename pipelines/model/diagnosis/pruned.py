@@ -22,21 +22,17 @@ from pipelines.model.diagnosis.gains import Simulation, farther, simulation_erro
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mistaken import imitated
-from pipelines.model.diagnosis.own_motion import following, standing_out
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
-from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, at_floor, held_out_high, seen_in, too_little, without_steps
+from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, held_out_high, seen_in, too_little, without_steps
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Settled", "at_odds", "settled", "unlike_held_out", "unlike_motion", "unnamed", "vague"]
+__all__ = ["Settled", "at_odds", "settled", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
 _ALIKE = 0.25  # of what a cause took away, that one for which it could be mistaken takes as well: weaker ones are no rivals
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
-# Times the floor of the held-out logs. The right cause, a spring turned farther than it was fitted, has been seen to leave 5.1, a
-# wrong one 16; of 114 arms in order none left more than 1.9.
-_WRONG, _STRANGE = 8.0, 2.5
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
 _SHAPE = "it only mends the shape of what was found before it at the joint"
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
@@ -92,42 +88,6 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     alone = _elsewhere(alone, found, case, floor, known)
     reason = f"{alone.reason}: {next(iter(doubts.values()), '')}" if alone.verdict == "unknown" else alone.reason
     return Settled(replace(found, final=found.nominal), replace(alone, reason=reason, doubts=doubts), ())
-
-
-def unnamed(done: Settled, floor: Array) -> Settled:
-    """The same where the base parameters tell what has changed: what is left near the floor, and has no name, is no alarm then."""
-    alone = without_steps(done.found, floor, True, named=True)
-    if alone.verdict == "unknown" and not at_floor(done.found.nominal.rms, floor):
-        return done
-    return replace(done, ruling=Ruling("nothing-wrong", (), "", done.ruling.doubts), simulated=())
-
-
-def unlike_held_out(done: Settled, rms: Array, floor: Array, moved: bool = False) -> Settled:
-    """"unknown" where the model leaves, (joints,) [N m], many times the `floor` of the very logs held out: what was found is
-    something else, or what is wrong does not show in the fitted logs; `moved`: there is a cause that the base parameters show."""
-    verdict = done.ruling.verdict
-    high = held_out_high(rms, floor, _WRONG if verdict == "cause" or moved else _STRANGE)
-    if verdict == "unknown" or not high:
-        return done
-    model = "what explains the fitted logs" if verdict == "cause" else "the nominal model, which the fitted logs bear out,"
-    times = f"{float((rms / np.maximum(floor, 1e-12)).max()):.2g} times what an arm in order leaves there"
-    doubts = dict(done.ruling.doubts) | dict.fromkeys(done.ruling.named, "it does not explain the held-out logs")
-    ruling = Ruling("unknown", (), f"{model} leaves, of {high} in those held out, {times}", doubts)
-    return Settled(replace(done.found, final=done.found.nominal), ruling, ())
-
-
-def unlike_motion(done: Settled, usual: Array) -> Settled:
-    """"unknown" where nothing was found, and what the nominal model leaves of a joint follows from the motion of that joint far
-    more than in an arm in order, (joints,) `usual`: a cause without a name here."""
-    if done.ruling.verdict != "nothing-wrong":
-        return done
-    nominal = done.found.nominal
-    joints = standing_out(following(nominal.fit, nominal.residual[None])[:, 0], usual)
-    if not joints:
-        return done
-    where = " and of ".join(f"joint {j + 1}" for j in joints)
-    reason = f"what is left of {where} follows from the joint's own motion, which noise does not, and no cause explains it"
-    return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
 
 
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:

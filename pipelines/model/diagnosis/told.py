@@ -16,6 +16,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.beside import Judged, acted, judged
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import untold
+from pipelines.model.diagnosis.doubted import unlike_held_out
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.floored import Floored
@@ -24,7 +25,7 @@ from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.motion_floor import motion_floor
-from pipelines.model.diagnosis.pruned import Settled, unlike_held_out
+from pipelines.model.diagnosis.pruned import Settled
 from pipelines.model.diagnosis.responding import Responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, ResidualRms, Threshold
 from pipelines.model.diagnosis.search import Step
@@ -89,7 +90,8 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: Floored
                        floored.rms, chosen.seed)
     if own is None:
         return done, responded, None
-    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, moved)
+    plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
+    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved)
     return believed, responded if believed is done else judged(held, believed.found.final), own
 
 

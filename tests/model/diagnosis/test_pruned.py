@@ -12,28 +12,8 @@ from pipelines.model.diagnosis import chance, pruned
 from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
-from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
-
-FLOOR = np.array([0.01, 0.01, 0.01])
-
-
-def left(*rms: float) -> Any:
-    return SimpleNamespace(rms=np.array(rms))
-
-
-def searched(nominal: Any, *causes: tuple[Effect, Any]) -> Any:
-    """A search that accepted these causes, with what each left."""
-    before, steps = nominal, []
-    for effect, after in causes:
-        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=after, effect=effect)))
-        before = after
-    model = SimpleNamespace(effects=tuple(SimpleNamespace(effect=effect, log=None) for effect, _ in causes))
-    return SimpleNamespace(nominal=nominal, steps=steps, final=SimpleNamespace(rms=before.rms, model=model))
-
-
-def effect(name: str, joint: int) -> Effect:
-    return find_effect(name)(joint=joint)
+from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 
 
 def twins() -> tuple[str, str]:
@@ -144,23 +124,6 @@ def test_what_gained_no_more_than_chance_is_asked_again_beside_what_was_found_af
     assert pruned._asked_again(found, [], [0, 1], among()) == ([], ())
 
 
-@pytest.mark.parametrize(("rest", "floor", "share", "verdict"), [
-    (0.018, 0.018, 0.0, "nothing-wrong"), (0.018, 0.01, 0.0, "unknown"), (0.014, 0.01, 0.0, "nothing-wrong"),
-    (0.018, 0.018, 0.8, "nothing-wrong"), (0.014, 0.01, 0.8, "unknown")])
-@pytest.mark.parametrize("gives_way", [False, True])
-def test_what_an_arm_with_its_load_leaves_is_no_alarm(rest: float, floor: float, share: float, verdict: str,
-                                                      gives_way: bool) -> None:
-    """A payload slows reversals down: joint 3 leaves more than before, and no more than the same arm in order does with it.
-    Something that gives way is to be looked for only if it explains most of what is left, and that stands above the floor."""
-    nominal, data = left(0.01, 0.01, rest), SimpleNamespace(joint=np.full(4, 2))
-    nominal.residual, nominal.data = np.ones(4), data
-    other = SimpleNamespace(joint=3, gain=np.array([4.0 * share])) if gives_way else None
-    verdict = "nothing-wrong" if rest < 1.6 * floor and not gives_way else verdict
-    step: Any = SimpleNamespace(before=nominal, best=None, other=other)
-    done = pruned.Settled(Found(nominal, (step,), nominal), Ruling("unknown", (), "something stands above the floor"), ())
-    assert pruned.unnamed(done, np.array([0.01, 0.01, floor])).ruling.verdict == verdict
-
-
 def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """With it the later one would only mend its shape: one of two names has to go, and the later one was surer."""
     one, other = twins()
@@ -208,36 +171,6 @@ def test_what_is_sure_and_little_is_no_name(rest: float, high: float, gain: floa
     monkeypatch.setattr(chance, "surely_less", lambda *_: whole)
     step: Any = SimpleNamespace(trials=(SimpleNamespace(accepted=True, gain=gain, threshold=1.0),))
     assert chance.no_name(step, seen_at(1.0), after, 0, None, 10) is lucky
-
-
-@pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])
-def test_what_leaves_many_floors_of_the_held_out_logs_is_something_else(held_out: float, verdict: str) -> None:
-    """A slow wave over half a turn passes for a spring there, and not beyond."""
-    nominal, final = left(2.0, 0.01, 0.01), left(0.01, 0.01, 0.01)
-    found = searched(nominal, (effect("cogging", 1), final))
-    done = pruned.Settled(Found(nominal, tuple(found.steps), final), Ruling("cause", (0,), ""), ())
-    believed = pruned.unlike_held_out(done, np.array([held_out, 0.01, 0.01]), FLOOR)
-    assert believed.ruling.verdict == verdict
-    assert believed.found.final is (final if verdict == "cause" else nominal)
-    assert ("joint 1" in believed.ruling.reason and "16 times" in believed.ruling.reason) is (verdict == "unknown")
-
-
-@pytest.mark.parametrize(("held_out", "verdict"), [(0.019, "nothing-wrong"), (0.028, "unknown")])
-def test_what_shows_in_held_out_logs_alone_is_not_in_order(held_out: float, verdict: str) -> None:
-    """Within one excitation gravity takes in an offset; elsewhere it does not."""
-    nominal = left(0.01, 0.01, 0.01)
-    done = pruned.Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
-    believed = pruned.unlike_held_out(done, np.array([0.01, held_out, 0.01]), FLOOR)
-    assert believed.ruling.verdict == verdict
-    assert ("joint 2" in believed.ruling.reason) is (verdict == "unknown")
-
-
-def test_a_joint_without_rows_is_no_number_in_the_sentence() -> None:
-    """Neither residual nor floor: joint 3 did not move fast enough to count."""
-    nominal = left(0.01, 0.01, 0.0)
-    done = pruned.Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
-    believed = pruned.unlike_held_out(done, np.array([0.01, 0.05, 0.0]), np.array([0.01, 0.01, 0.0]))
-    assert "joint 2 in those held out, 5 times" in believed.ruling.reason
 
 
 @pytest.mark.parametrize("ruled", [(0, 1), (1,)])  # by the search's outcome the first may have been refused before

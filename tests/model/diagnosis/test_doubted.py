@@ -1,0 +1,72 @@
+"""What was found is held against held-out logs, and against base parameters that moved; on made-up numbers."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis.doubted import unlike_held_out, unnamed
+from pipelines.model.diagnosis.pruned import Settled
+from pipelines.model.diagnosis.search import Found
+from pipelines.model.diagnosis.verdict import Ruling
+from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
+
+
+@pytest.mark.parametrize(("rest", "floor", "share", "verdict"), [
+    (0.018, 0.018, 0.0, "nothing-wrong"), (0.018, 0.01, 0.0, "unknown"), (0.014, 0.01, 0.0, "nothing-wrong"),
+    (0.018, 0.018, 0.8, "nothing-wrong"), (0.014, 0.01, 0.8, "unknown")])
+@pytest.mark.parametrize("gives_way", [False, True])
+def test_what_an_arm_with_its_load_leaves_is_no_alarm(rest: float, floor: float, share: float, verdict: str,
+                                                      gives_way: bool) -> None:
+    """A payload slows reversals down: joint 3 leaves more than before, and no more than the same arm in order does with it.
+    Something that gives way is to be looked for only if it explains most of what is left, and that stands above the floor."""
+    nominal, data = left(0.01, 0.01, rest), SimpleNamespace(joint=np.full(4, 2))
+    nominal.residual, nominal.data = np.ones(4), data
+    other = SimpleNamespace(joint=3, gain=np.array([4.0 * share])) if gives_way else None
+    verdict = "nothing-wrong" if rest < 1.6 * floor and not gives_way else verdict
+    step: Any = SimpleNamespace(before=nominal, best=None, other=other)
+    done = Settled(Found(nominal, (step,), nominal), Ruling("unknown", (), "something stands above the floor"), ())
+    assert unnamed(done, np.array([0.01, 0.01, floor])).ruling.verdict == verdict
+
+
+@pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])
+def test_what_leaves_many_floors_of_the_held_out_logs_is_something_else(held_out: float, verdict: str) -> None:
+    """A slow wave over half a turn passes for a spring there, and not beyond."""
+    nominal, final = left(2.0, 0.01, 0.01), left(0.01, 0.01, 0.01)
+    found = searched(nominal, (effect("cogging", 1), final))
+    done = Settled(Found(nominal, tuple(found.steps), final), Ruling("cause", (0,), ""), ())
+    believed = unlike_held_out(done, np.array([held_out, 0.01, 0.01]), FLOOR, np.array([0.9, 0.01, 0.01]))
+    assert believed.ruling.verdict == verdict
+    assert believed.found.final is (final if verdict == "cause" else nominal)
+    assert ("joint 1" in believed.ruling.reason and "16 times" in believed.ruling.reason) is (verdict == "unknown")
+
+
+def test_a_law_carried_far_beyond_where_it_was_fitted_keeps_its_name() -> None:
+    """Of 3 N m it leaves 0.17, which are 17 floors: a spring that hardens was fitted to a part of its way."""
+    nominal, final = left(0.02, 0.01, 0.01), left(0.01, 0.01, 0.01)
+    found = searched(nominal, (effect("spring", 1), final))
+    done = Settled(Found(nominal, tuple(found.steps), final), Ruling("cause", (0,), ""), ())
+    for before, verdict in ((3.0, "cause"), (1.0, "unknown")):
+        believed = unlike_held_out(done, np.array([0.17, 0.01, 0.01]), FLOOR, np.array([before, 0.01, 0.01]))
+        assert believed.ruling.verdict == verdict
+
+
+@pytest.mark.parametrize(("held_out", "verdict"), [(0.019, "nothing-wrong"), (0.028, "unknown")])
+def test_what_shows_in_held_out_logs_alone_is_not_in_order(held_out: float, verdict: str) -> None:
+    """Within one excitation gravity takes in an offset; elsewhere it does not."""
+    nominal = left(0.01, 0.01, 0.01)
+    done = Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
+    believed = unlike_held_out(done, np.array([0.01, held_out, 0.01]), FLOOR, np.array([0.01, held_out, 0.01]))
+    assert believed.ruling.verdict == verdict
+    assert ("joint 2" in believed.ruling.reason) is (verdict == "unknown")
+
+
+def test_a_joint_without_rows_is_no_number_in_the_sentence() -> None:
+    """Neither residual nor floor: joint 3 did not move fast enough to count."""
+    nominal = left(0.01, 0.01, 0.0)
+    done = Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
+    believed = unlike_held_out(done, np.array([0.01, 0.05, 0.0]), np.array([0.01, 0.01, 0.0]), np.array([0.01, 0.05, 0.0]))
+    assert "joint 2 in those held out, 5 times" in believed.ruling.reason
