@@ -17,6 +17,7 @@ __all__ = ["encoder_scale", "position_columns", "torque_columns"]
 _BAD, _GOOD, _MUCH_BETTER = 0.15, 0.3, 0.35  # relative residuals, and the ratio of two
 # A wrong scale can hide well, but the right one then is far better.
 _SCALE_BAD, _SHARED_BAD, _SCALE_BETTER = 0.02, 0.01, 0.25
+_WORSE = 1.03  # times what a row left before: chance
 _SCALES = {"0.5": 0.5, "2": 2.0, "0.1": 0.1, "10": 10.0, "pi/180 (degrees)": np.pi / 180, "180/pi": 180 / np.pi,
            "2 pi (turns)": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi, "-1": -1.0}
 
@@ -101,27 +102,37 @@ def encoder_scale(e: Evidence) -> list[Check]:
     Then with parameters of its own for each row, where a joint's angle bends the arm: that holds whatever the torques' scales.
     """
     motion, told = e.thinned().motion, e.telling
+
+    def alone(**other: Array) -> Array:
+        return np.diag(quick_residual(e.body, motion, **other))[told]
+
     # The direction of a joint that bends nothing is that of its torque: S14 tells.
     magnitudes = {name: factor for name, factor in _SCALES.items() if factor > 0}
-    return (_scaled(e, lambda **other: shared_residual(e.body, motion, **other)[told], _SHARED_BAD, magnitudes)
-            or _scaled(e, lambda **other: np.diag(quick_residual(e.body, motion, **other))[told], _SCALE_BAD, _SCALES))
+    return (_scaled(e, lambda **other: shared_residual(e.body, motion, **other)[told], alone, _SHARED_BAD, magnitudes)
+            or _scaled(e, alone, alone, _SCALE_BAD, _SCALES))
 
 
-def _scaled(e: Evidence, residual: Callable[..., Array], bad: float, scales: Mapping[str, float]) -> list[Check]:
-    """The angle and the scale that leave least, where the log as it is leaves more than `bad` and far more than that."""
-    motion = e.thinned().motion
-    before = _rms(residual())
+def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Array], bad: float,
+            scales: Mapping[str, float]) -> list[Check]:
+    """The angle and the scale that leave least, where the log as it is leaves more than `bad` and far more than that.
+
+    By the right scale no row fits worse `alone`, with its own parameters: a joint that hears of another drive may fit far better
+    with an angle scaled down, but the other joints' rows, which are in order, do not.
+    """
+    motion, before, rows = e.thinned().motion, _rms(residual()), alone()
     if before < bad:
         return []
-    best: tuple[float, int, str] | None = None
+    found: list[tuple[float, int, str]] = []
     for joint in e.telling.tolist():
         for name, factor in scales.items():
             scale = np.where(np.arange(e.n_joints) == joint, factor, 1.0)
-            left = _rms(residual(q=motion.q * scale, dq=motion.dq * scale, ddq=motion.ddq * scale))
-            if best is None or left < best[0]:
-                best = (left, joint, name)
-    if best is None or best[0] > _GOOD or best[0] > _SCALE_BETTER * before:
+            other = {"q": motion.q * scale, "dq": motion.dq * scale, "ddq": motion.ddq * scale}
+            left = _rms(residual(**other))
+            if left <= min(_GOOD, _SCALE_BETTER * before) and (alone(**other) <= _WORSE * rows).all():
+                found.append((left, joint, name))
+    if not found:
         return []
+    best = min(found)
     return [e.subject.say("S15", "warn",
                           f"q of joint {best[1] + 1} fits if multiplied by {best[2]}, residual {before:.2g} -> {best[0]:.2g}",
                           signal="q", joint=best[1], gate=True,

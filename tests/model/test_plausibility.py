@@ -120,6 +120,17 @@ def test_a_scale_of_two_is_told_of_every_joint(seed: int, level: float, factor: 
             joint, factor, [f"q of joint {joint + 1} fits if multiplied by {1 / factor:g}"])
 
 
+@pytest.mark.parametrize(("seed", "hz"), [(9, 0.1), (34, 0.05), (38, 0.1)])
+@pytest.mark.parametrize("share", [0.1, -0.1])
+def test_another_drive_in_a_joint_is_no_wrong_scale(seed: int, hz: float, share: float) -> None:
+    """A tenth of joint 2's torque in joint 3 is as much as its own, and fits with an angle that hardly moves; the others do not."""
+    motion = fourier(np.random.default_rng(2000 + seed), hz, harmonics=4, level=0.3)
+    log = healthy_without_reference(make_log(motion, seed=seed, duration=8.0))
+    mixed = log.tau + share * log.tau[:, [1]] * [0.0, 0.0, 1.0]
+    found = [c.message for c in plausibility(Subject(with_signal(log, tau=mixed))) if c.code == "RRID-S15" and c.level != "ok"]
+    assert found == []
+
+
 def test_a_locked_joint_hides_parameters_and_they_are_named() -> None:
     """With joint 1 at rest nothing of its inertia shows: p7 is its own, p1, p2, p5, p6 turn with it."""
     log = make_log(one_joint(fourier(np.random.default_rng(1)), 2))

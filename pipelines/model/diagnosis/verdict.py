@@ -64,9 +64,10 @@ def explained(before: Array, after: Array, nominal: Array, floor: Array) -> floa
 
 
 def too_little(nominal: Array, final: Array, floor: Array) -> bool:
-    """Whether a model leaves more than half of what the nominal one leaves above the floor, where that surely stands above it; each
-    (joints,) [N m] rms."""
-    return bool((nominal > _CLEAR * floor).any()) and explained(nominal, final, nominal, floor) < _HALF
+    """Whether a model leaves more than half of what the nominal one leaves above the floor, of joints that surely stand above it;
+    each (joints,) [N m] rms."""
+    sure = nominal > _CLEAR * floor
+    return bool(sure.any()) and explained(nominal[sure], final[sure], nominal[sure], floor[sure]) < _HALF
 
 
 def rule(found: Found, floor: Array, known: bool = True, mended: bool = False) -> Ruling:
