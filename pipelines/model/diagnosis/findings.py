@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.beside import Part
-from pipelines.model.diagnosis.chain import gains, with_some
+from pipelines.model.diagnosis.chain import with_some, worth
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.gains import Simulation, worse_log
@@ -46,10 +46,20 @@ def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prep
     steps = [found.steps[k] for k in ruling.named]
     models = _in_steps(found, ruling.named, steps)
     taken = [explained(before.rms, after.rms, nominal, floor) for before, after in models]
-    order = sorted(range(len(steps)), key=lambda place: -taken[place])
-    worth = gains(found, ruling.named, order, simulated, prepared, beside, blocks) if order else []
-    return once_each(_finding(found, steps[place], best, place, models[place], covariance, taken[place], floor, gain, draw)
-                     for place, gain in zip(order, worth, strict=True) if (best := steps[place].best) is not None)
+    order = _told([(best.effect.name, best.effect.joint) for step in steps if (best := step.best) is not None], taken)
+    told = worth(found, ruling.named, order, simulated, prepared, beside, blocks) if order else []
+    return once_each(
+        _finding(found, steps[place], best, place, models[place] if len(places) == 1 else (one.before, one.after), covariance,
+                 taken[place], floor, one.gain, draw)
+        for places, one in zip(order, told, strict=True) for place in places if (best := steps[place].best) is not None)
+
+
+def _told(causes: Sequence[tuple[str, int | None]], taken: Sequence[float]) -> list[list[int]]:
+    """Places of each cause at its joint, the strongest first: the waves of one gear are one cause."""
+    places: dict[tuple[str, int | None], list[int]] = {}
+    for place in sorted(range(len(causes)), key=lambda place: -taken[place]):
+        places.setdefault(causes[place], []).append(place)
+    return sorted(places.values(), key=lambda own: -sum(taken[place] for place in own))
 
 
 def _in_steps(found: Found, named: Sequence[int], steps: Sequence[Step]) -> list[tuple[Refined, Refined]]:

@@ -21,7 +21,7 @@ _NUMBERED = re.compile(r"(.+?)_(\d+)$")
 def once_each(found: Iterable[Finding]) -> tuple[Finding, ...]:
     """The strongest part of each cause of a joint with the numbers of the others, counted on: order, order_2, …, order_4, …
 
-    Gain and proof are those of that part; what is explained adds up, and torque of different waves by its squares.
+    Gain and proof of all its parts are the same; what is explained adds up, and torque of different waves by its squares.
     """
     out: dict[tuple[str, int | None], Finding] = {}
     for one in found:

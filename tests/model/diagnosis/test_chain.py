@@ -37,14 +37,15 @@ def simulated_anew(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     ((0, 1), (0, 1), ["then nominal", "then 1", "then 2"]),  # as they were found
     ((0,), (0,), ["simulated nominal", "simulated final"]),  # the last was dropped, and the weights are still its
     ((1,), (0,), ["simulated nominal", "simulated final"]),  # the first
-    ((0, 1), (1, 0), ["then nominal", "simulated with [1]", "then 2"])])  # told in another order: only what lies between is another
-def test_a_gain_is_that_of_the_arm_that_is_told(named: tuple[int, ...], order: tuple[int, ...], chained: list[str],
+    ((0, 1), (1, 0), ["then nominal", "simulated with [1]", "then 2"]),  # told in another order: only what lies between is another
+    ((0, 1), ((0, 1),), ["then nominal", "then 2"])])  # two waves of one gear
+def test_a_gain_is_that_of_the_arm_that_is_told(named: tuple[int, ...], order: tuple[Any, ...], chained: list[str],
                                                simulated_anew: list[str]) -> None:
     """What was simulated after each step of the search serves only where the final model is the search's own."""
     steps = [SimpleNamespace(before=left(name)) for name in ("nominal", "after 1", "after 2")]
     found: Any = SimpleNamespace(nominal=left("nominal"), steps=steps, final=left("final"))
     runs: Any = ["then nominal", "then 1", "then 2"]
     prepared: Any = SimpleNamespace(judging=(), motions=(), judge=None)
-    worth: Any = chain.gains(found, named, list(order), runs, prepared, (), 10)
+    told = chain.worth(found, named, [[k] if isinstance(k, int) else list(k) for k in order], runs, prepared, (), 10)
     assert [f"simulated {arm}" for arm in simulated_anew] == [one for one in chained if one.startswith("simulated")]
-    assert worth == list(pairwise(chained))
+    assert [one.gain for one in told] == list(pairwise(chained))

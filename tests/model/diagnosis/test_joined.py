@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.model.diagnosis.findings import _told
 from pipelines.model.diagnosis.joined import once_each
 from pipelines.model.diagnosis.result import Finding, Gain, Rival, TorqueGain, Value
 
@@ -25,3 +26,9 @@ def test_waves_of_one_joint_are_one_finding_and_counted_on() -> None:
     assert (one.explained, one.torque_rms) == pytest.approx((0.7, 5e-3))
     assert [rival.cause for rival in one.rivals] == ["spring"]
     assert two is elsewhere
+
+
+def test_waves_of_one_joint_are_told_together_in_the_place_of_their_sum() -> None:
+    """The lag takes more than any wave, and the two waves together more than the lag."""
+    causes = [("torque_lag", 1), ("cogging", 1), ("spring", 2), ("cogging", 1), ("cogging", 2)]
+    assert _told(causes, [0.3, 0.2, 0.1, 0.25, 0.05]) == [[3, 1], [0], [2], [4]]
