@@ -54,7 +54,12 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
             more += [own[int(name)][None] for name in amplitudes]
         there = _with(model, data, place, core, [number_moved(one, name, step) for name, step in steps])
         names += [(1, place, name) for name, _ in steps]
-        more += [(torque - alone)[None] / step for torque, (_, step) in zip(there, steps, strict=True)]
+        for (name, step), torque in zip(steps, there, strict=True):
+            if _is_nothing(one, name):  # of what the arm does not feel either way no slope is left, and not the curvature
+                other = _with(model, data, place, core, [number_moved(one, name, -step)])[0]
+                more.append((torque - other)[None] / (2.0 * step))
+            else:
+                more.append((torque - alone)[None] / step)
         for name in () if whole else one.tied:  # it moves with the friction at its joint
             law = (0, law_of(model.columns.laws, one.effect, name), name)
             if law in names:
@@ -69,6 +74,11 @@ def _with(model: Exact, data: Data, place: int, core: int, moved: Sequence[Named
         return model.added(data, *moved)
     return [replace(model, effects=(*model.effects[:place], one, *model.effects[place + 1:core])).core_torque(data, core)
             for one in moved]
+
+
+def _is_nothing(one: Named, name: str) -> bool:
+    """Whether a number is an amplitude that is 0."""
+    return name.isdigit() and one.amplitudes[int(name)] == 0.0
 
 
 def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:

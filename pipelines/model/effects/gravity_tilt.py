@@ -14,6 +14,7 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["GravityTilt"]
 
+_ROUNDING = 1e-9  # of the torque by the other axis
 _UPRIGHT = 1e-6  # sine of the angle between gravity and the first axis
 
 
@@ -46,6 +47,8 @@ class GravityTilt(Effect):
         table = np.zeros((*motion.q.shape, 4))
         for k, axis in enumerate((first, second)):
             table[:, :, k] = gravity_torque(arm.body, motion.q, phi, size * axis)
+        felt = np.abs(table[:, :, :2]).max(axis=(0, 1), initial=0.0)
+        table[:, :, :2] *= felt > _ROUNDING * felt.max()  # an arm in one plane feels no weight across it
         if _upright(arm):
             table[:, 0, 2:] = _waist(motion)
         return table

@@ -1,0 +1,27 @@
+"""Slopes of a model's torque by its numbers, against what geometry gives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal, rigid_rows
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.slopes import slopes_of
+from pipelines.model.effects.gravity_tilt import GravityTilt
+from tests.model.diagnosis.arms import hidden
+
+ANGLE = 0.08  # [rad]
+
+
+def test_across_a_tilt_the_slope_is_that_of_its_sine_and_has_nothing_of_the_curvature() -> None:
+    """Gravity g (cos α down + sin α (x, y)/α) with α = |(x, y)|: at y = 0 its slope by y is sin α/α of that of a level arm. Half the
+    step's part of the curvature, 4e-6 of the weight, would be all there is for an arm in one plane, and no number of it."""
+    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit).with_effect(GravityTilt(), np.array([ANGLE, 0.0, 0.0, 0.0]))
+    slopes, names = slopes_of(model, prepared.data, rigid_rows(prepared.data, columns))
+    found = slopes[len(model.beta) + names.index((1, 0, "1"))]
+    level = prepared.data.lay(lambda motion: GravityTilt().columns(motion, model.nominal)[..., 1:2])[0]
+    np.testing.assert_allclose(found, np.sin(ANGLE) / ANGLE * level, atol=1e-7 * np.abs(level).max())
