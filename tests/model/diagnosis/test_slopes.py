@@ -16,7 +16,7 @@ ANGLE = 0.08  # [rad]
 
 
 def test_across_a_tilt_the_slope_is_that_of_its_sine_and_has_nothing_of_the_curvature() -> None:
-    """Gravity g (cos α down + sin α (x, y)/α) with α = |(x, y)|: at y = 0 its slope by y is sin α/α of that of a level arm. Half the
+    """Gravity g (cos α down + sin α (x, y)/α) with α = |(x, y)|: at y = 0 its slope by y is sin α/α of a level arm's. Half the
     step's part of the curvature, 4e-6 of the weight, would be all there is for an arm in one plane, and no number of it."""
     prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
