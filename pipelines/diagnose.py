@@ -11,11 +11,11 @@ before any physics is blamed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
-from pipelines.errors import UsageError, did_you_mean
+from pipelines.errors import Check, UsageError, did_you_mean
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
@@ -24,6 +24,7 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.gates import logs_of_roles
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.outcome import Result
+from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.simulated import with_simulation
 from pipelines.model.effects import effect_names
@@ -125,12 +126,22 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                                settings.decimate, settings.min_speed, settings.seed)
     found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)
     given.tell("simulating what was found")
-    found = with_simulation(found, (*chosen.validate, *chosen.identify))
+    found = _beside_clocks(with_simulation(found, (*chosen.validate, *chosen.identify)), said)
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
                   without=settings.without, doctor=said, memory=memory,
                   calibrated_with=() if given.calibration is None else tuple(one.name for one in given.calibration.origin.logs))
+
+
+def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
+    """Logs whose torque is late alike, before and after, show nothing that has changed: that they are late has to be said."""
+    late = next((check for check in said if check.code == "RRID-T06"), None)
+    if found.verdict != "nothing-wrong" or late is None:
+        return found
+    words = f"in {Path(late.where.partition(',')[0]).name} {late.message}"
+    return replace(found, reason=f"{found.reason}; {words}" if found.reason else words,
+                   summary=f"{found.summary.rstrip('.')}; but {words}.")
 
 
 def _refuse_strange(settings: Settings) -> None:
