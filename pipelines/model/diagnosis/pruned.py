@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.gains import Simulation, farther, simulation_erro
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mistaken import imitated
+from pipelines.model.diagnosis.momentary import ONLY_THEN, only_then
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, held_out_high, seen_in, too_little, without_steps
@@ -54,7 +55,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    doubts = {k: at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
+    doubts = {k: ONLY_THEN if only_then(found.final, k) else
+              at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
         doubts |= {k: BY_CHANCE for k in ruling.named
