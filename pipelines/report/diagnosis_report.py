@@ -4,52 +4,51 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from pipelines.model.diagnosis.outcome import Result
-from pipelines.model.diagnosis.responding import BELOW
-from pipelines.model.diagnosis.result import Finding, Gain, Trial
+from pipelines.model.diagnosis.result import Finding, Trial
+from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
+from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_picture import picture_sections
-from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_words import (
-    cause_at,
+    as_sentence,
     floor_words,
     held_out_floor,
     held_out_words,
     in_order,
-    meaning_of,
     named,
     per_joint,
-    spoken,
+    three_digits,
+    tip_change,
     title_of,
     together,
-    told_value,
     told_values,
-    unit_or_dash,
+    torque_of,
     without_keys,
 )
 from pipelines.report.diagnosis_words import torque_errors as errors_table
-from pipelines.report.joint_units import Units, units_in
+from pipelines.report.joint_units import units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_decimals, format_number, to_one_place
+from pipelines.report.style import format_number
 
-__all__ = ["diagnosis_report", "finding_section", "gain_table", "numbers_section"]
+__all__ = ["diagnosis_report"]
 
 _LEDGER = 40  # lines
 _OUT_OF_REACH = "A threshold above 100 % is told as a dash: an arm in order leaves so much of it that such logs cannot show it."
-_TURNING = Units()
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
 
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    units = units_in(result)
+    units, nominal = units_in(result), replace(result.residual_rms, floor=held_out_floor(result)[0])
     found = [section for number, one in enumerate(result.findings, 1)
-             for section in (finding_section(number, one, units=units), numbers_section(number, one, units))]
+             for section in (finding_section(number, one, nominal, units=units), numbers_section(number, one, units))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
@@ -61,43 +60,31 @@ def _verdict(result: Result) -> str:
     """One sentence; what to check stands in the first section."""
     if result.verdict == "nothing-wrong":
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
-        caveat = f" {_sentence(without_keys(result.reason))}" if result.reason else ""
+        caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         return f"Nothing{since}, as far as these logs can tell: what they could have shown stands below.{caveat}"
     if result.verdict == "unknown":
         return f"Something is wrong that has no name here: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
-    others = f"; and {', '.join(words for _, words in together((one.cause, one.joint) for one in more))}" if more else ""
-    size = f", {_size(first, units_in(result))}" if math.isfinite(first.torque_rms) else ""
-    tip = first.gain.tip_error_rms
-    moved = f"; for it the simulated tip is {format_number(1e3 * tip.before, 2)} mm off" if tip is not None else ""
+    others = f"; and {', '.join(words for _, words in together(more))}" if more else ""
+    size = f", {_size(first, result)}" if math.isfinite(first.torque_rms) else ""
+    change = tip_change(first.gain)
+    moved = f"; with it {change}" if change else ""
     rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
-    return f"{changed}{first.title}{_at(first.joint)}{size}{moved}{others}.{rest}"
+    return f"{changed}{first.title}{where(first)}{size}{moved}{others}.{rest}"
 
 
 def _advice(result: Result) -> tuple[str, ...]:
     """What to look at on the machine, cause by cause."""
-    causes = together((one.cause, one.joint) for one in result.findings)
-    return tuple(f"What to check{f' for {words}' if len(result.findings) > 1 else ''}: {_sentence(find_effect(cause).remedy)}"
+    causes = together(result.findings)
+    return tuple(f"What to check{f' for {words}' if len(result.findings) > 1 else ''}: {as_sentence(find_effect(cause).remedy)}"
                  for cause, words in causes)
 
 
-def _at(joint: int | None) -> str:
-    return "" if joint is None else f" at joint {joint}"
-
-
-def _size(one: Finding, units: Units) -> str:
+def _size(one: Finding, result: Result) -> str:
+    """Of its torque, and whether the model hid most of it."""
     rated = f" ({format_number(100.0 * one.of_rated, 2)} % of the rated torque)" if math.isfinite(one.of_rated) else ""
-    return f"{_torque(one, units)} rms of torque that the model does not have{rated}"
-
-
-def _torque(one: Finding, units: Units) -> str:
-    """Of its own joint, or of the largest."""
-    return f"{format_number(one.torque_rms, 2)} {units.at(one.joint).torque}"
-
-
-def _rounded(x: float) -> float | None:
-    return float(f"{x:.3g}") if math.isfinite(x) else None
+    return f"{torque_of(one, units_in(result))} rms of torque{rated}{taken_in(one, result.residual_rms.identify)}"
 
 
 def _reachable(threshold: float) -> float | None:
@@ -109,92 +96,6 @@ def _hundredths(x: float) -> float | None:
     return round(x, 2) if math.isfinite(x) else None
 
 
-def finding_section(number: int, one: Finding, offer: bool = True, floor: str = "the floor", units: Units = _TURNING) -> Section:
-    """What it is, what to check, what it is worth, and the figure that proves it.
-
-    Args:
-        offer: say how to extend the model by it.
-        floor: what its share is counted from.
-    """
-    kind = find_effect(one.cause)
-    text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}", _worth(one, floor)]
-    if math.isfinite(one.torque_rms):
-        text.append(f"Over the logs that were fitted its torque is {_torque(one, units)} rms; over other motion it may be more or "
-                    "less")
-    if one.origin == "frequency responses":
-        text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
-                    f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
-                    "torque worked out from the encoder is mostly noise")
-    if one.doubt:
-        text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
-    if offer and not one.doubt and not _happens_once(one):
-        text.append(f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it")
-    if one.rivals:
-        names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
-        text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
-    return Section(f"{number}. {one.title}{_at(one.joint)}", tuple(_sentence(t) for t in text),
-                   figures=tuple(proof_figures(number, one, units)))
-
-
-def numbers_section(number: int, one: Finding, units: Units = _TURNING) -> Section:
-    """What was identified and what it gains, joint by joint: behind the figure that proves it."""
-    beside = "the findings before it" if one.origin in ("residual", "reversals") else "all other findings"
-    return Section(f"{number}. In numbers", (), (_numbers(one), gain_table(
-        one.gain, f"Gain on held-out time, root mean square, beside {beside}.", units)))
-
-
-def _frequency(one: Finding) -> float:
-    found = one.parameters["frequency"].value
-    return found if isinstance(found, float) else math.nan
-
-
-def _happens_once(one: Finding) -> bool:
-    kind = find_effect(one.cause)
-    return any(q.shape and q.name in kind.per_log for q in kind.parameters)
-
-
-def _sentence(text: str) -> str:
-    """It begins large and ends in a full stop."""
-    text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
-
-
-def _worth(one: Finding, floor: str) -> str:
-    simulation = {"closed-loop": "simulated in closed loop, with the controller of the logs",
-                  "windowed": "simulated over short windows from smoothed states, for the logs do not know their controller",
-                  "none": "not simulated"}[one.gain.simulation]
-    tip = one.gain.tip_error_rms
-    said = ""
-    if tip is not None:
-        before, after = 1e3 * tip.before, 1e3 * tip.after
-        said = f" The simulated tip is {format_number(before, 3)} mm off without it and {format_number(after, 3)} mm with it"
-        said += f", {simulation}."
-    return (f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above {floor}; the refitted model could "
-            f"hide {format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{said}")
-
-
-def _numbers(one: Finding) -> Table:
-    rows = tuple((spoken(name), told_value(value), unit_or_dash(value.unit), meaning_of(one.cause, name))
-                 for name, value in in_order(one.cause, one.parameters))
-    return Table(("parameter", "value ± std", "unit", "what it is"), rows, "What was identified.")
-
-
-def gain_table(gain: Gain, caption: str, units: Units = _TURNING) -> Table:
-    """Joint by joint: torque and simulated position, without and with."""
-    torque, position = gain.validate_torque_rms, gain.simulated_position_rms
-    joints = len(torque.before)
-    errors = to_one_place([*map(float, torque.before), *map(float, torque.after)])
-    decimals = 1 + max((len(f"{x:.9g}".partition(".")[2]) for x in errors if x is not None), default=0)  # a change is smaller
-    rows = []
-    for j in range(joints):
-        low, high = (format_decimals(float(end), decimals) if math.isfinite(end) else "–" for end in torque.ci95[j])
-        rows.append((j + 1, *errors[j::joints], f"{low} to {high}",
-                     *((None, None) if position is None else (_rounded(1e3 * x[j]) for x in (position.before, position.after)))))
-    unit, small = units.torque, units.thousandths
-    return Table(("joint", f"torque error without [{unit}]", f"with [{unit}]", f"change, 95 % [{unit}]",
-                  f"simulated position error without [{small}]", f"with [{small}]"), tuple(rows), caption)
-
-
 def _unknown(result: Result) -> list[Section]:
     if result.verdict != "unknown":
         return []
@@ -202,7 +103,7 @@ def _unknown(result: Result) -> list[Section]:
     names = ", ".join(f"{named(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
     tried = f" The nearest explanations, none of them good enough: {names}." if near else ""
     return [Section("Why there is no name", (
-        _sentence(without_keys(result.reason)) + tried, *_follows(result),
+        as_sentence(without_keys(result.reason)) + tried, *_follows(result),
         "A wrong name costs more than none. What follows shows where and when the residual stands above its floor."))]
 
 
@@ -230,7 +131,7 @@ def _standing(result: Result) -> list[Section]:
     if not result.standing:
         return []
     rows = tuple((title_of(one.cause), one.joint, told_values(in_order(one.cause, one.parameters)),
-                  _rounded(100.0 * one.explained)) for one in result.standing)
+                  three_digits(100.0 * one.explained)) for one in result.standing)
     return [Section("What the reference logs show as well", ("It is part of this robot and no news; the extended model has it.",),
                     (Table(("effect", "joint", "parameters", "explains [%]"), rows),))]
 

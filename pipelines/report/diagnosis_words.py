@@ -9,15 +9,16 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.result import Diagnosis, ResidualRms, Value
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms, Value
+from pipelines.model.diagnosis.words import other_joint
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
-__all__ = ["cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "meaning_of", "named",
-           "per_joint", "spoken", "title_of", "together", "told_value", "told_values", "torque_errors", "unit_or_dash",
-           "without_keys"]
+__all__ = ["as_sentence", "cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words", "in_order", "meaning_of",
+           "named", "per_joint", "spoken", "three_digits", "tip_change", "tip_worth", "title_of", "together", "told_value",
+           "told_values", "torque_errors", "torque_of", "unit_or_dash", "without_keys"]
 
 _PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
 _COUNTED = {"_2": "second ", "_3": "third "}  # harmonics
@@ -33,6 +34,10 @@ _FLOORS = {
 _FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference logs", "repetition": "between repetitions",
                 "blocks": "noise of the residual"}
 
+_SIMULATED = {"closed-loop": "simulated in closed loop, with the controller of the logs",
+              "windowed": "simulated over short windows from smoothed states, for the logs do not know their controller",
+              "none": "not simulated"}
+_NO_TIP = 1e-9  # [m] no tip: nothing that is simulated and measured comes so near
 
 _TURNING = Units()
 _ORDER = 1.3  # times what an arm in order leaves: no further than that may an extended model be from it (issue 9)
@@ -60,19 +65,59 @@ def named(cause: str, joint: int | None) -> str:
     return words if joint is None else f"{words} at joint {joint}"
 
 
-def together(places: Iterable[tuple[str, int | None]]) -> list[tuple[str, str]]:
-    """(cause, words) of causes and joints, each cause once with all its joints: "Stribeck friction at joints 1 and 3"."""
-    joints: dict[str, list[int | None]] = {}
-    for cause, joint in places:
-        joints.setdefault(cause, []).append(joint)
+def together(found: Iterable[Finding | Rejected]) -> list[tuple[str, str]]:
+    """(cause, words) of each cause once with all its joints: "Stribeck friction at joints 1 and 3"."""
+    joints: dict[str, list[str]] = {}
+    for one in found:
+        other = other_joint(one.parameters) if isinstance(one, Finding) else ""
+        joints.setdefault(one.cause, []).append(f"{one.joint or ''}{f' ({other})' if other else ''}")
     return [(cause, _at_joints(cause, own)) for cause, own in joints.items()]
 
 
-def _at_joints(cause: str, joints: Sequence[int | None]) -> str:
-    if len(joints) < 2:
-        return named(cause, joints[0])
-    *first, last = map(str, joints)
+def _at_joints(cause: str, joints: Sequence[str]) -> str:
+    *first, last = joints
+    if not first:
+        return f"{named(cause, None)} at joint {last}" if last else named(cause, None)
     return f"{named(cause, None)} at joints {', '.join(first)} and {last}"
+
+
+def torque_of(one: Finding, units: Units) -> str:
+    """Of its own joint, or of the largest."""
+    return f"{format_number(one.torque_rms, 2)} {units.at(one.joint).torque}"
+
+
+def tip_change(gain: Gain) -> str:
+    """"the simulated tip is 1.17 mm off the measured one instead of 1.22 mm"; empty where no digit moves."""
+    before, after = _tip(gain)
+    return "" if before == after else f"the simulated tip is {after} mm off the measured one instead of {before} mm"
+
+
+def tip_worth(gain: Gain) -> str:
+    """The same as a sentence for the section of a finding, with how the tip was simulated, whether it moves or not."""
+    before, after = _tip(gain)
+    if not before:
+        return ""
+    off = f"{before} mm off without it and {after} mm with it" if before != after else f"{before} mm off without it as with it"
+    return f" The simulated tip is {off}, {_SIMULATED[gain.simulation]}."
+
+
+def _tip(gain: Gain) -> tuple[str, str]:
+    """[mm] before and after, as printed; empty where nothing was simulated or no arm is on the motor, so that no tip can be off."""
+    tip = gain.tip_error_rms
+    if tip is None or max(tip.before, tip.after) < _NO_TIP:
+        return "", ""
+    return format_number(1e3 * tip.before, 3), format_number(1e3 * tip.after, 3)
+
+
+def as_sentence(text: str) -> str:
+    """It begins large and ends in a full stop."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def three_digits(x: float) -> float | None:
+    """For a cell of a table."""
+    return float(f"{x:.3g}") if math.isfinite(x) else None
 
 
 def spoken(parameter: str) -> str:

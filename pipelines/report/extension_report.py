@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pipelines.model.diagnosis.outcome import Extension
-from pipelines.report.diagnosis_report import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_words import held_out_words, title_of, together, torque_errors, without_keys
+from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
+from pipelines.report.diagnosis_words import held_out_words, tip_change, title_of, together, torque_errors, without_keys
 from pipelines.report.joint_units import Units, units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number
 
 __all__ = ["extension_report"]
 
@@ -21,7 +20,8 @@ def extension_report(result: Extension) -> Report:
     tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
     units = units_in(result)
     sections = [section for number, one in enumerate(result.findings, 1)
-                for section in (finding_section(number, one, offer=False, floor="the noise", units=units),
+                for section in (finding_section(number, one, result.residual_rms, offer=False, floor="the noise",
+                                                units=units),
                                 numbers_section(number, one, units))]
     if result.rejected:
         rows = tuple((title_of(one.cause), one.joint, without_keys(one.reason)) for one in result.rejected)
@@ -36,16 +36,11 @@ def extension_report(result: Extension) -> Report:
 
 
 def _verdict(result: Extension) -> str:
-    refused, found = (", ".join(words for _, words in together((one.cause, one.joint) for one in some))
-                      for some in (result.rejected, result.findings))
+    refused, found = (", ".join(words for _, words in together(some)) for some in (result.rejected, result.findings))
     if not result.findings:
         return f"Not accepted: {refused}; no model was written. {_first_reason(result)}"
-    gain = result.gain
-    told = ""
-    if gain is not None and gain.tip_error_rms is not None:
-        tip = gain.tip_error_rms
-        after, before = (format_number(1e3 * x, 2) for x in (tip.after, tip.before))
-        told = f"; the simulated tip is {after} mm off instead of {before} mm"
+    change = "" if result.gain is None else tip_change(result.gain)
+    told = f"; with it {change}" if change else ""
     but = f" Not accepted: {refused}." if refused else ""
     return f"The model with {found} is better on held-out logs{told}.{but}"
 

@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain
 from pipelines.model.estimation.result import Result as Estimate
 from pipelines.report import style
-from pipelines.report.diagnosis_words import named, together
+from pipelines.report.diagnosis_words import together
 from pipelines.report.report import Figure, Section, Table, Tone
 from pipelines.report.run_result import Group
 from pipelines.report.style import format_number, to_one_place
@@ -64,7 +64,7 @@ def _of(result: Any, stage: str) -> Iterator[Line]:
     elif isinstance(result, Diagnosis):
         yield from _found(result, stage)
     elif isinstance(result, Extension) and result.gain is not None and result.findings and _whole(result.gain):
-        causes = ", ".join(words for _, words in together((one.cause, one.joint) for one in result.findings))
+        causes = ", ".join(words for _, words in together(result.findings))
         whole = _with(f"the model with {causes}, everything refitted", stage, result.gain)
         # the model that is written, as the key figures have it: a finding's own gain is that of the moment it was found
         now, was = (tuple(map(float, one.validate)) for one in (result.after_rms, result.residual_rms))
@@ -92,7 +92,7 @@ def _found(result: Diagnosis, stage: str) -> Iterator[Line]:
 
 
 def _it(one: Finding) -> str:
-    return named(one.cause, one.joint)
+    return together((one,))[0][1]
 
 
 def _before(one: Finding) -> tuple[float, ...]:

@@ -15,6 +15,7 @@ from pipelines.model.diagnosis.result import (
     Diagnosis,
     Finding,
     Gain,
+    Rejected,
     ResidualRms,
     Rival,
     Threshold,
@@ -23,7 +24,8 @@ from pipelines.model.diagnosis.result import (
     Value,
 )
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.report.diagnosis_report import diagnosis_report, finding_section, gain_table, numbers_section
+from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
+from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.diagnosis_words import held_out_floor, named, spoken, together, told_values, torque_errors, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
@@ -42,7 +44,7 @@ def found(cause: str) -> Finding:
 @pytest.mark.parametrize("cause", effect_names())
 def test_a_finding_is_told_in_words(cause: str) -> None:
     """Of every effect: no key in what is said of it but in the command that is typed; each number with what it is."""
-    said = " ".join(finding_section(1, found(cause)).text)
+    said = " ".join(finding_section(1, found(cause), ResidualRms(*(np.ones(3),) * 3)).text)
     assert "torque offset at joint 1" in said
     assert KEY.findall(COMMAND.sub("", said)) == []
     numbers = numbers_section(1, found(cause)).tables[0]
@@ -71,7 +73,8 @@ def test_a_stored_reason_is_read_without_keys() -> None:
 
 def test_one_cause_at_several_joints_is_told_once() -> None:
     """Three joints with Stribeck friction need no advice three times."""
-    found = [("stribeck", 1), ("payload", None), ("stribeck", 3), ("cogging", 2), ("stribeck", 2)]
+    places = (("stribeck", 1), ("payload", None), ("stribeck", 3), ("cogging", 2), ("stribeck", 2))
+    found = [Rejected(cause, joint, "") for cause, joint in places]
     assert [words for _, words in together(found)] == ["Stribeck friction at joints 1, 3 and 2", "a load at the tip",
                                                        "cogging at joint 2"]
 

@@ -11,7 +11,7 @@ from pipelines.log.model_file import ModelFile
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.result import BeforeAfter, Curve, Diagnosis, Evidence, Gain, ResidualRms, TorqueGain
 from pipelines.model.excitation.limits import Limit
-from pipelines.report.diagnosis_report import gain_table
+from pipelines.report.diagnosis_finding import gain_table
 from pipelines.report.diagnosis_words import torque_errors
 from pipelines.report.joint_units import Units, each, unit_of, units_in
 

@@ -193,7 +193,8 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
 
 def _nameless(told: Diagnosis, why: str) -> Diagnosis:
     turning = () if told.nominal is None else told.nominal.robot.revolute
-    return replace(told, verdict="unknown", reason=why, summary=sentence(Ruling("unknown", (), why), (), turning))
+    return replace(told, verdict="unknown", reason=why,
+                   summary=sentence(Ruling("unknown", (), why), (), turning, told.residual_rms.identify))
 
 
 def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared, case: Case,
@@ -216,7 +217,7 @@ def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared,
         return _nameless(told, _MOVED.format(moved.times)) if moved.far and not told.findings else told
     findings = strongest((one.finding, *told.findings))
     return replace(told, verdict="cause", findings=findings, reason="", extended=one.arm,
-                   summary=sentence(Ruling("cause", (), ""), findings, turning))
+                   summary=sentence(Ruling("cause", (), ""), findings, turning, told.residual_rms.identify))
 
 
 def _not_accepted(told: Diagnosis, cause: str, joint: int | None, why: str) -> Diagnosis:

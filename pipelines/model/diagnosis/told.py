@@ -32,6 +32,7 @@ from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Probed
 from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.diagnosis.words import taken_in, where
 
 __all__ = ["diagnosis_of", "sentence", "strongest"]
 
@@ -68,7 +69,7 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
     arm = extended_arm(replace(found, final=responded.final), ruling)
     standing = [one for one in case.beside if one not in first.held.acting]
     return Diagnosis(
-        ruling.verdict, sentence(ruling, named, arm.robot.revolute), named, (), rejected(found, ruling), limits,
+        ruling.verdict, sentence(ruling, named, arm.robot.revolute, plain.rms), named, (), rejected(found, ruling), limits,
         (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
@@ -106,20 +107,24 @@ def _limits(last: Step, case: Case, prepared: Prepared, probed: Probed | None,
     return detectable(last.screened, bounds, prepared.data.logs[0].log.robot.revolute, probe)
 
 
-def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool]) -> str:
-    """What a technician is told; `revolute` (joints,): which of them turn."""
+def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool], left: Array) -> str:
+    """What a technician is told.
+
+    Args:
+        revolute: (joints,) which of them turn.
+        left: (joints,) [N m] rms that the nominal model leaves of the logs it was fitted to.
+    """
     if ruling.verdict == "nothing-wrong":
         caveat = f": {ruling.reason}" if ruling.reason else ""
         return f"Nothing is wrong with this arm, as far as these logs can tell{caveat}."
     if ruling.verdict == "unknown":
         return f"Something is wrong that has no name here: {ruling.reason}."
     first = named[0]
-    where = "" if first.joint is None else f" at joint {first.joint}"
-    more = f", and {len(named) - 1} more" if len(named) > 1 else ""
+    more = f"; and {len(named) - 1} more" if len(named) > 1 else ""
     turns = revolute if first.joint is None else revolute[first.joint - 1:first.joint]
-    what = " or ".join(dict.fromkeys("N m of torque" if one else "N of force" for one in turns))
-    size = f": {first.torque_rms:.2g} {what} that the model does not have" if np.isfinite(first.torque_rms) else ""
-    return f"{first.title}{where}{size}{more}."
+    what = " or ".join(dict.fromkeys("N m rms of torque" if one else "N rms of force" for one in turns))
+    size = f": {first.torque_rms:.2g} {what}{taken_in(first, left)}" if np.isfinite(first.torque_rms) else ""
+    return f"{first.title}{where(first)}{size}{more}."
 
 
 def strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -21,7 +21,7 @@ from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.base_resonance import BaseResonance
-from pipelines.report.diagnosis_report import finding_section
+from pipelines.report.diagnosis_finding import finding_section
 from tests.diagnose.sessions import but, healthy_again, session
 
 SETTINGS = DiagnosisSettings(without=but("base_resonance", "torque_offset"), replicas=0, most=1, evidence=False, limits=False)
@@ -72,7 +72,7 @@ def test_what_does_harm_to_the_model_is_told_once() -> None:
     assert "base_resonance" not in [one.cause for one in found.rejected]
     assert found.extended is not None
     assert not found.extended.effects
-    section = finding_section(1, found.findings[0])
+    section = finding_section(1, found.findings[0], found.residual_rms)
     assert any("The extended model goes without it" in text for text in section.text)
     assert not any("rrrid extend" in text for text in section.text)
 

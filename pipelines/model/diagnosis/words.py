@@ -1,0 +1,42 @@
+"""Words of a finding that its sentence and its report share: where it is, and how much of it a model without it imitates.
+
+    where(finding)                 " at joint 2 (from joint 1)"
+    taken_in(finding, left)        ", most of which the nominal model had taken in"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.result import Finding, Value
+
+__all__ = ["other_joint", "taken_in", "where"]
+
+_OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
+
+
+def where(one: Finding) -> str:
+    """Its joint, and the other one that it has to do with; empty where it belongs to the whole arm."""
+    other = other_joint(one.parameters)
+    return ("" if one.joint is None else f" at joint {one.joint}") + (f" ({other})" if other else "")
+
+
+def other_joint(parameters: Mapping[str, Value]) -> str:
+    """"from joint 1"; empty where a cause has to do with no other joint."""
+    found = ((word, parameters[name].value) for name, word in _OTHER.items() if name in parameters)
+    return next((f"{word} joint {joint:g}" for word, joint in found if isinstance(joint, int | float)), "")
+
+
+def taken_in(one: Finding, left: Array) -> str:
+    """Said where friction and rigid body, fitted without the finding, imitate most of the power of its torque.
+
+    What they leave of its joint holds whatever of that torque they do not imitate.
+
+    Args:
+        left: (joints,) [N m] rms that the nominal model leaves of the logs it was fitted to.
+    """
+    rest = float(np.nanmax(left)) if one.joint is None else float(left[one.joint - 1])
+    return ", most of which the nominal model had taken in" if one.torque_rms**2 > 2.0 * rest**2 else ""

@@ -1,0 +1,123 @@
+"""What is told of one finding: what it is, what to check, what it is worth, the figure that proves it, and its numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipelines.model.diagnosis.responding import BELOW
+from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
+from pipelines.model.diagnosis.words import taken_in, where
+from pipelines.model.effects import find_effect
+from pipelines.report.diagnosis_proof import proof_figures
+from pipelines.report.diagnosis_words import (
+    as_sentence,
+    cause_at,
+    in_order,
+    meaning_of,
+    named,
+    spoken,
+    three_digits,
+    tip_worth,
+    told_value,
+    torque_of,
+    unit_or_dash,
+    without_keys,
+)
+from pipelines.report.joint_units import Units
+from pipelines.report.report import Section, Table
+from pipelines.report.style import format_decimals, format_number, to_one_place
+
+__all__ = ["finding_section", "gain_table", "numbers_section"]
+
+_TURNING = Units()
+_HIDDEN = 2.0  # times the share of the whole, from which the share at its own joint says something else
+
+
+def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool = True, floor: str = "the floor",
+                    units: Units = _TURNING) -> Section:
+    """What it is, what to check, what it is worth, and the figure that proves it.
+
+    Args:
+        nominal: what the model without any finding leaves, and the floor of the held-out logs.
+        offer: say how to extend the model by it.
+        floor: what its share is counted from.
+    """
+    kind = find_effect(one.cause)
+    text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
+            f"{_share(one, nominal, floor)}; the refitted model could hide "
+            f"{format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{tip_worth(one.gain)}"]
+    if math.isfinite(one.torque_rms):
+        text.append(f"Over the logs that were fitted its torque is {torque_of(one, units)} rms{taken_in(one, nominal.identify)}; "
+                    "over other motion it may be more or less")
+    if one.origin == "frequency responses":
+        text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
+                    f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
+                    "torque worked out from the encoder is mostly noise")
+    if one.doubt:
+        text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
+    if offer and not one.doubt and not _happens_once(one):
+        text.append(f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it")
+    if one.rivals:
+        names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
+        text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
+    return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
+                   figures=tuple(proof_figures(number, one, units)))
+
+
+def numbers_section(number: int, one: Finding, units: Units = _TURNING) -> Section:
+    """What was identified and what it gains, joint by joint: behind the figure that proves it."""
+    beside = "the findings before it" if one.origin in ("residual", "reversals") else "all other findings"
+    return Section(f"{number}. In numbers", (), (_numbers(one), gain_table(
+        one.gain, f"Gain on held-out time, root mean square, beside {beside}.", units)))
+
+
+def _frequency(one: Finding) -> float:
+    found = one.parameters["frequency"].value
+    return found if isinstance(found, float) else math.nan
+
+
+def _happens_once(one: Finding) -> bool:
+    kind = find_effect(one.cause)
+    return any(q.shape and q.name in kind.per_log for q in kind.parameters)
+
+
+def _share(one: Finding, nominal: ResidualRms, floor: str) -> str:
+    """Of what all joints leave above the floor; and of its own joint, where a larger one beside it hides the share."""
+    whole = f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above {floor}"
+    own = _own_share(one, nominal)
+    if not own > _HIDDEN * one.explained:
+        return whole
+    return f"{whole} at all joints together, but {format_number(100.0 * own, 2)} % of that of joint {one.joint}, held out"
+
+
+def _own_share(one: Finding, nominal: ResidualRms) -> float:
+    """Of the power that its own joint has above the floor on held-out time; NaN where it has none, or no joint of its own."""
+    if one.joint is None or one.origin == "base parameters":
+        return math.nan
+    torque, j = one.gain.validate_torque_rms, one.joint - 1
+    before, after, whole, floor = (float(x[j]) ** 2 for x in (torque.before, torque.after, nominal.validate, nominal.floor))
+    return float(np.clip((before - after) / (whole - floor), 0.0, 1.0)) if whole > floor else math.nan
+
+
+def _numbers(one: Finding) -> Table:
+    rows = tuple((spoken(name), told_value(value), unit_or_dash(value.unit), meaning_of(one.cause, name))
+                 for name, value in in_order(one.cause, one.parameters))
+    return Table(("parameter", "value ± std", "unit", "what it is"), rows, "What was identified.")
+
+
+def gain_table(gain: Gain, caption: str, units: Units = _TURNING) -> Table:
+    """Joint by joint: torque and simulated position, without and with."""
+    torque, position = gain.validate_torque_rms, gain.simulated_position_rms
+    joints = len(torque.before)
+    errors = to_one_place([*map(float, torque.before), *map(float, torque.after)])
+    decimals = 1 + max((len(f"{x:.9g}".partition(".")[2]) for x in errors if x is not None), default=0)  # a change is smaller
+    rows = []
+    for j in range(joints):
+        low, high = (format_decimals(float(end), decimals) if math.isfinite(end) else "–" for end in torque.ci95[j])
+        moved = (None, None) if position is None else (three_digits(1e3 * x[j]) for x in (position.before, position.after))
+        rows.append((j + 1, *errors[j::joints], f"{low} to {high}", *moved))
+    unit, small = units.torque, units.thousandths
+    return Table(("joint", f"torque error without [{unit}]", f"with [{unit}]", f"change, 95 % [{unit}]",
+                  f"simulated position error without [{small}]", f"with [{small}]"), tuple(rows), caption)

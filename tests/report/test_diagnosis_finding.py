@@ -1,0 +1,62 @@
+"""What is said of a finding is true of its numbers: what it does to the tip, how large it is, which joints it has to do with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms, TipError, TorqueGain, Value
+from pipelines.model.diagnosis.words import taken_in, where
+from pipelines.model.effects import find_effect
+from pipelines.report.diagnosis_finding import finding_section
+from pipelines.report.diagnosis_words import tip_change, tip_worth, together
+
+
+def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[str, float] | None = None) -> Finding:
+    """Of three joints, the last of which is much the smallest; it takes all that is wrong off that one."""
+    before, after = np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.005])
+    gain = Gain(TorqueGain(before, after, np.zeros((3, 2))), None, "closed-loop", None)
+    return Finding(cause, joint, find_effect(cause).title, {name: Value(x, None, "1") for name, x in (other or {}).items()}, 5e-4,
+                   0.9, (), None, gain, "residual", 0.03, float("nan"), None)
+
+
+NOMINAL = ResidualRms(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.02]), np.full(3, 0.005))
+
+
+@pytest.mark.parametrize(("before", "after", "said"), [
+    (1.2238e-3, 1.1691e-3, "the simulated tip is 1.17 mm off the measured one instead of 1.22 mm"),
+    (1.2238e-3, 1.2237e-3, ""), (0.0, 0.0, "")])
+def test_a_cause_is_not_blamed_for_all_that_the_tip_is_off(before: float, after: float, said: str) -> None:
+    """What it takes away is told; nothing where no printed digit moves, or where a motor carries no arm."""
+    gain = replace(finding().gain, tip_error_rms=TipError(before, after))
+    assert tip_change(gain) == said
+    assert ("tip" in tip_worth(gain)) == (before > 0.0)
+    assert ("as with it" in tip_worth(gain)) == (before > 0.0 and not said)
+
+
+@pytest.mark.parametrize(("torque", "left", "most"), [(4.6, 1.6, True), (0.29, 0.29, False), (0.2, 0.16, False)])
+def test_what_a_model_without_the_finding_imitates_is_said(torque: float, left: float, most: bool) -> None:
+    """A torque far larger than all that is left of its joint was mostly in the model already."""
+    one = replace(finding(joint=1), torque_rms=torque)
+    assert bool(taken_in(one, np.array([left, 9.0]))) == most
+    assert not taken_in(replace(one, joint=None), np.array([left, 9.0]))
+
+
+def test_the_other_joint_is_named() -> None:
+    """In title and list: crosstalk comes from a joint, a coupled motor turns with one."""
+    crossed, coupled = finding("torque_crosstalk", 2, {"from_joint": 1}), finding("transmission_coupling", 6, {"with_joint": 5.0})
+    assert (where(crossed), where(coupled), where(finding(joint=None))) == (
+        " at joint 2 (from joint 1)", " at joint 6 (with joint 5)", "")
+    assert finding_section(1, crossed, NOMINAL).title == "1. Torque of another joint at joint 2 (from joint 1)"
+    twice = (crossed, replace(crossed, joint=3, parameters={"from_joint": Value(2, None, "1")}), Rejected("cogging", 1, ""))
+    assert [words for _, words in together(twice)] == [
+        "torque of another joint at joints 2 (from joint 1) and 3 (from joint 2)", "cogging at joint 1"]
+
+
+def test_a_small_joint_is_not_hidden_by_a_large_one() -> None:
+    """All that is wrong with joint 3 is little of what is wrong with the arm; both are said, where they differ."""
+    said = " ".join(finding_section(1, finding(), NOMINAL).text)
+    assert "explains 0.05 % of what stands above the floor at all joints together, but 100 % of that of joint 3" in said
+    assert "all joints together" not in " ".join(finding_section(1, replace(finding(), explained=0.9), NOMINAL).text)
