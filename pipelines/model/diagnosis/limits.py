@@ -65,8 +65,7 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
         if possible and (hidden is None or hidden.found):
             found.append(told)
             continue
-        size = f"{told.smallest.value:.2g} {told.smallest.unit} of {told.parameter}"
-        why = (f"these logs would show no less than {size}, and such a cause has less"
+        why = ("these logs cannot show it: no arm has so much of it that they would"
                if hidden is None or hidden.found else "hidden in these logs it was found at no strength")
         beyond.append(NotTestable(effect.name, effect.joint, why, effect.experiment))
     return tuple(found), tuple(beyond)

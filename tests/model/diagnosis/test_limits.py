@@ -15,12 +15,14 @@ from pipelines.bench.fault import Fault
 from pipelines.bench.faults import make
 from pipelines.bench.machine import Machine, draw_machine
 from pipelines.bench.session import record
+from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.injection import _last_root, _raised
 from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.limits import _absorbed
+from pipelines.model.diagnosis.limits import _absorbed, detectable
 from pipelines.model.diagnosis.result import Detectable, Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects.rotor_inertia import RotorInertia
 from tests.diagnose.sessions import but
 
 FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
@@ -93,6 +95,18 @@ def test_a_cogging_limit_says_at_which_order() -> None:
     assert set(there.at) == {"order"}
     assert there.smallest.unit == "N m"
     assert 0.0 < there.visibility <= 1.0
+
+
+def test_what_no_arm_has_so_much_of_is_no_figure() -> None:
+    """A rotor of forty-nine tonnes and metres squared: that these logs cannot show it is all there is to say."""
+    family = Family("rotor_inertia", 1, (RotorInertia(joint=1),))
+    bounds: Any = SimpleNamespace(gain=np.ones(1), own=np.zeros(1))
+    for reach, seen in ((1e3, True), (2e-5, False)):
+        one: Any = SimpleNamespace(best_visibility=0.5, family=family, cause="rotor_inertia", joint=1, reach=reach, width=1)
+        found, beyond = detectable((one,), bounds, (True,))
+        assert [limit.smallest.value for limit in found] == ([1e-3] if seen else [])
+        assert [limit.reason for limit in beyond] == (
+            [] if seen else ["these logs cannot show it: no arm has so much of it that they would"])
 
 
 @pytest.mark.parametrize("seed", range(5))
