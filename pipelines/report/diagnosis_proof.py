@@ -11,7 +11,7 @@ from pipelines.model.diagnosis.result import Finding, Proof
 from pipelines.report import style
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure
-from pipelines.report.style import format_unit
+from pipelines.report.style import format_number, format_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["draw_proof", "draw_proof_in_time", "proof_figures"]
 
 _TURNING = Units()
+_LITTLE = 0.3  # of the means without the finding: less is little
+_MUCH = 0.8  # more is most of them
 
 
 def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterator[Figure]:
@@ -27,11 +29,22 @@ def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterato
     if proof is None:
         return
     torque = units.at(proof.joint).torque
-    yield Figure(f"proof-{number}", f"Residual of joint {proof.joint} over {proof.against}: where the finding holds, what is left "
-                 "without it follows what it predicts, and little is left with it.",
+    over = f"Residual of joint {proof.joint} over {proof.against}, means in bins"
+    yield Figure(f"proof-{number}", f"{over}: {_shown(proof, torque)}.",
                  lambda drawing: draw_proof(drawing.subplots(), proof, torque), (6.0, 3.2))
     yield Figure(f"proof-{number}-in-time", f"The same residual of joint {proof.joint} where the finding shows most, over time.",
                  lambda drawing: draw_proof_in_time(drawing.subplots(), proof, torque), (6.0, 2.6))
+
+
+def _shown(proof: Proof, torque: str) -> str:
+    """What the drawn means say: how large they are without and with the finding, and whether that is little."""
+    before, after = (float(np.sqrt(np.nanmean(np.square(means)))) for means in (proof.before, proof.after))
+    sizes = f"{format_number(before, 2)} {torque} rms without the finding, {format_number(after, 2)} {torque} with it"
+    if after <= _LITTLE * before:
+        return f"{sizes}; what is left without it follows what it predicts"
+    if after <= _MUCH * before:
+        return f"{sizes}; part of what is left without it follows what it predicts"
+    return f"{sizes}; averaged like this most of it stays, and the gain in numbers has to prove it"
 
 
 def draw_proof(axes: Axes, proof: Proof, torque: str = "N m") -> None:
