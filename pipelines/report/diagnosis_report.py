@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from pipelines.model.diagnosis.ledger import WEAKER
 from pipelines.model.diagnosis.outcome import Result
-from pipelines.model.diagnosis.result import Finding, Trial
+from pipelines.model.diagnosis.result import Finding, Rejected, Trial
 from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
@@ -141,7 +142,7 @@ def _others(result: Result) -> list[Section]:
     sections = []
     if result.rejected:
         why = tuple((title_of(one.cause), one.joint, without_keys(one.reason)) for one in result.rejected)
-        sections.append(Section("Rejected", ("They came close, and are not believed.",), (Table(("cause", "joint", "why"), why),)))
+        sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("cause", "joint", "why"), why),)))
     shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
@@ -157,6 +158,18 @@ def _others(result: Result) -> list[Section]:
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
             f"believed. {_OUT_OF_REACH}{_alike(len(result.residual_rms.identify))}", tones),)))
     return sections
+
+
+def _refused(rejected: Sequence[Rejected]) -> str:
+    """How close they came: most were not even tried, for others took more off the residual."""
+    weaker = sum(one.reason == WEAKER for one in rejected)
+    if not weaker:
+        return "They came close, and are not believed."
+    more = len(rejected) - weaker
+    rest = f" The other {more if more > 1 else 'one'} came close, and {'are' if more > 1 else 'is'} not believed." if more else ""
+    which = "Each of these" if not more else f"{weaker} of these are {WEAKER}: each" if weaker > 1 else f"One is {WEAKER}: it"
+    return (f"{which} takes more than its threshold off the residual in some search, but others take more and were tried "
+            f"instead.{rest}")
 
 
 def _alike(joints: int) -> str:

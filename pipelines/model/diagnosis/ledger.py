@@ -13,8 +13,9 @@ from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
-__all__ = ["UNBELIEVABLE", "Tried", "ledger"]
+__all__ = ["UNBELIEVABLE", "WEAKER", "Tried", "ledger"]
 
+WEAKER = "weaker than others"
 UNBELIEVABLE = "the arm could not have moved so with it"
 _REFUSED = "time held out does not bear it out"
 _SHOWN = 12  # lines of a step, of causes that stay below their thresholds
@@ -56,7 +57,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         reason = ("accepted" if accepted else "below its threshold" if gain <= thresholds.gain[k] else
                   "comes again at other moments" if not one.stands_out else
                   _REFUSED if id(one) in refused and fitted is None else
-                  "weaker than others" if fitted is None else
+                  WEAKER if fitted is None else
                   UNBELIEVABLE if not fitted.believable else
                   "impossible numbers" if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else
