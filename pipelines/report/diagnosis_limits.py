@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from pipelines.model.diagnosis.result import Detectable, Diagnosis
+from collections.abc import Mapping
+
+from pipelines.model.diagnosis.result import Detectable, Diagnosis, Value
 from pipelines.model.effects import find_effect
-from pipelines.report.diagnosis_words import spoken, title_of, told_value, told_values, unit_or_dash, without_keys
+from pipelines.report.diagnosis_words import spoken, title_of, told_value, unit_or_dash, without_keys
 from pipelines.report.report import Section, Table
-from pipelines.report.style import format_number
+from pipelines.report.style import format_number, format_unit
 
 __all__ = ["limits_sections"]
 
 _WAY = {"injected": "hidden", "analytic": "worked out"}  # how a detection limit was found
+_AT = {  # what of a cause's shape a technician can use; the rest is the form of its law
+    "order": "{size} waves a turn", "from_joint": "from joint {size}", "with_joint": "with joint {size}", "link": "of link {size}",
+    "speed": "speed {size} {unit}", "distance": "travel {size} {unit}", "time_constant": "time constant {size} {unit}",
+    "duration": "lasting {size} {unit}", "frequency": "{size} {unit}", "gap": "free play {size} {unit}",
+    "limit": "at {size} {unit}"}
 _FOUND = ("With 95 %, had it been there; nothing smaller can be excluded. Hidden: put into these logs and found; worked out: by a "
           "formula. Cannot be seen: nothing that is physically likely would show.")
 
@@ -30,6 +37,12 @@ def limits_sections(result: Diagnosis) -> list[Section]:
     return sections
 
 
+def _shape(at: Mapping[str, Value]) -> str:
+    """For which waves, joint, speed or time it is, in words."""
+    return ", ".join(_AT[name].format(size=format_number(value.value, 3), unit=format_unit(value.unit))
+                     for name, value in at.items() if name in _AT and isinstance(value.value, int | float))
+
+
 def _smallest(one: Detectable) -> tuple[str, ...]:
     """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
     value = one.smallest.value
@@ -37,4 +50,4 @@ def _smallest(one: Detectable) -> tuple[str, ...]:
     if isinstance(value, float) and expected and value >= min(expected):
         return "cannot be seen", "", "", ""
     told = format_number(value, 2) if isinstance(value, float) else told_value(one.smallest)
-    return told, unit_or_dash(one.smallest.unit), told_values(one.at.items()), _WAY[one.way]
+    return told, unit_or_dash(one.smallest.unit), _shape(one.at), _WAY[one.way]
