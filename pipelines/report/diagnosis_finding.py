@@ -89,7 +89,7 @@ def _share(one: Finding, nominal: ResidualRms, floor: str) -> str:
     own = _own_share(one, nominal)
     if not own > _HIDDEN * one.explained:
         return whole
-    return f"{whole} at all joints together, but {format_number(100.0 * own, 2)} % of that of joint {one.joint}, held out"
+    return f"{whole} at all joints together, and {format_number(100.0 * own, 2)} % of that of joint {one.joint}, held out"
 
 
 def _own_share(one: Finding, nominal: ResidualRms) -> float:

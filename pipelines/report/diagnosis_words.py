@@ -21,7 +21,8 @@ __all__ = ["as_sentence", "cause_at", "floor_name", "floor_words", "held_out_flo
            "told_values", "torque_errors", "torque_of", "unit_or_dash", "without_keys"]
 
 _PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
-_COUNTED = {"_2": "second ", "_3": "third "}  # harmonics
+_COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+_NUMBERED = re.compile(r"(.+)_([2-9]|[1-9][0-9]+)$")  # harmonics, and waves of further orders
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+))?\b")
 
 _FLOORS = {
@@ -122,14 +123,41 @@ def three_digits(x: float) -> float | None:
 
 def spoken(parameter: str) -> str:
     """A parameter's key in words: "second amplitude" for "amplitude_2", "gain error" for "gain_error"."""
-    count = _COUNTED.get(parameter[-2:], "")
-    return f"{count}{parameter.removesuffix(parameter[-2:]) if count else parameter}".replace("_", " ")
+    name, number = _split(parameter)
+    return (name if number < 2 else f"{_counted(number)} {name}").replace("_", " ")
+
+
+def _counted(number: int) -> str:
+    """"second", "third", … "11th", from 2 on."""
+    if number < len(_COUNTED) + 2:
+        return _COUNTED[number - 2]
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th") if number % 100 not in (11, 12, 13) else "th"
+    return f"{number}{ending}"
+
+
+def _split(parameter: str) -> tuple[str, int]:
+    """Name and number, 1 where it has none: ("order", 2) of "order_2"."""
+    found = _NUMBERED.match(parameter)
+    return (found[1], int(found[2])) if found else (parameter, 1)
+
+
+def _part(cause: str, parameter: str) -> tuple[str, int]:
+    """The effect's own parameter, and of the how manieth one at its joint it is: its numbers are counted on (`once_each`)."""
+    known = [q.name for q in find_effect(cause).parameters] if cause in effect_names() else []
+    name, number = _split(parameter)
+    numbers = max((_split(own)[1] for own in known), default=1)
+    first = (number - 1) % numbers + 1
+    own = name if first == 1 else f"{name}_{first}"
+    return (parameter, 1) if parameter in known or own not in known else (own, (number - 1) // numbers + 1)
 
 
 def meaning_of(cause: str, parameter: str) -> str:
     """What a parameter of an effect stands for, as the effect says; "" where it does not."""
     known = find_effect(cause).parameters if cause in effect_names() else ()
-    meaning = next((q.meaning for q in known if q.name == parameter), "")
+    own, which = _part(cause, parameter)
+    meaning = next((q.meaning for q in known if q.name == own), "")
+    if meaning and which > 1:
+        meaning = f"{meaning}; {_counted(which)} one at this joint"
     for q in known:
         meaning = meaning.replace(q.name, spoken(q.name)) if "_" in q.name else meaning
     return meaning
@@ -165,10 +193,15 @@ def unit_or_dash(unit: str) -> str:
 
 
 def in_order(cause: str, parameters: Mapping[str, Value]) -> list[tuple[str, Value]]:
-    """The parameters as the effect lists them; JSON sorts them by name."""
+    """The parameters as the effect lists them, one after the other where there are several; JSON sorts them by name."""
     known = [q.name for q in find_effect(cause).parameters] if cause in effect_names() else []
     place = {name: k for k, name in enumerate(known)}
-    return sorted(parameters.items(), key=lambda item: (place.get(item[0], len(known)), item[0]))
+
+    def rank(parameter: str) -> tuple[int, int, str]:
+        own, which = _part(cause, parameter)
+        return which, place.get(own, len(known)), parameter
+
+    return sorted(parameters.items(), key=lambda item: rank(item[0]))
 
 
 def per_joint(x: Array) -> str:

@@ -16,7 +16,7 @@ __all__ = ["figure_in_words"]
 _WORD = re.compile(r"\S+")
 _CAUSES = (re.compile(r"([a-z_]+)(?::(\d+))?:([a-z_0-9]+)"),  # "coulomb:3:level", "payload:mass"
            re.compile(r"([a-z_]+)(?: joint (\d+))?(?: (.+))?"))  # "coulomb joint 3 level", "payload mass"
-_HARMONIC = re.compile(r" ([23])$")
+_HARMONIC = re.compile(r" ([2-9]|[1-9][0-9]+)$")
 _METHOD = re.compile(r"(?:varpro|output-error|ekf) ")
 
 

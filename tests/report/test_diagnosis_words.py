@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,11 @@ import pytest
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import (
     BeforeAfter,
+    Detectable,
     Diagnosis,
     Finding,
     Gain,
+    Proof,
     Rejected,
     ResidualRms,
     Rival,
@@ -25,11 +27,27 @@ from pipelines.model.diagnosis.result import (
 )
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
+from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_report import diagnosis_report
-from pipelines.report.diagnosis_words import held_out_floor, named, spoken, together, told_values, torque_errors, without_keys
+from pipelines.report.diagnosis_words import (
+    held_out_floor,
+    in_order,
+    meaning_of,
+    named,
+    spoken,
+    together,
+    told_values,
+    torque_errors,
+    without_keys,
+)
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
+
+NOTHING: Any = {field.name: () for field in fields(Result)} | {
+    "verdict": "nothing-wrong", "question": "what is wrong", "reason": "", "floor_origin": "twin", "held_out": "logs",
+    "held_out_floor": None, "replicas": 0, "robot": "", "residual_rms": ResidualRms(*(np.ones(2),) * 3),
+    "after_rms": ResidualRms(*(np.ones(2),) * 3), "noise": np.ones(2), "memory": None, "rated": (50.0, 50.0)}
 
 
 def found(cause: str) -> Finding:
@@ -105,17 +123,63 @@ def test_a_change_is_told_in_figures_that_show_its_sign() -> None:
 
 def test_a_threshold_that_nothing_can_exceed_is_no_figure() -> None:
     """No gain is more than the whole residual: 604 % says nothing but that the cause cannot be shown."""
-    nothing: Any = {field.name: () for field in fields(Result)} | {
-        "verdict": "nothing-wrong", "question": "what is wrong", "reason": "", "floor_origin": "twin", "held_out": "logs",
-        "held_out_floor": None, "replicas": 0, "robot": "", "residual_rms": ResidualRms(*(np.ones(2),) * 3),
-        "after_rms": ResidualRms(*(np.ones(2),) * 3), "noise": np.ones(2), "memory": None, "rated": (50.0, 50.0)}
     trials = tuple(Trial(1, "cogging", joint, 0.02, threshold, 0.95, float("nan"), False, "below its threshold")
                    for joint, threshold in ((1, 0.05), (2, 6.04)))
     bounds = tuple(Threshold("cogging", joint, threshold, "blocks") for joint, threshold in ((1, 0.05), (2, 6.04)))
-    page = diagnosis_report(Result(**(nothing | {"ledger": trials, "thresholds": bounds})))
+    page = diagnosis_report(Result(**(NOTHING | {"ledger": trials, "thresholds": bounds})))
     tables = {section.title: section.tables[0] for section in page.sections if section.tables}
     for title, heading in (("Ledger of hypotheses", "threshold [%]"), ("What this rests on",
                                                                        "share of the squared residual to exceed [%]")):
         table = tables[title]
         assert [row[table.columns.index(heading)] for row in table.rows] == [5.0, None]
         assert "above 100 % is told as a dash" in table.caption
+
+
+def test_any_number_of_waves_has_words() -> None:
+    """Cogging of three orders with three harmonics each: every number has a name and a meaning of its own, order by order."""
+    own = [q.name for q in find_effect("cogging").parameters]
+    names = [*own, *(f"{name.removesuffix('_2').removesuffix('_3')}_{3 * k + 1 + (int(name[-1]) - 1 if name[-1] in '23' else 0)}"
+                     for k in (1, 2) for name in own)]
+    ordered = [name for name, _ in in_order("cogging", {name: Value(1.0, None, "1") for name in sorted(names)})]
+    assert ordered == names
+    told = [(spoken(name), meaning_of("cogging", name)) for name in names]
+    assert len(set(told)) == len(names)
+    assert all(meaning for _, meaning in told)
+    assert not any(re.search(r"[0-9_]", word) for word, _ in told)
+    assert meaning_of("cogging", "order_4").endswith("second one at this joint")
+    assert (spoken("order_12"), spoken("order_22"), spoken("w1")) == ("12th order", "22nd order", "w1")
+
+
+@pytest.mark.parametrize(("reasons", "said"), [
+    (("weaker than others",) * 2, "Each of these takes more than its threshold off the residual"),
+    (("weaker than others", "weaker than others", "impossible numbers"), "The other one came close, and is not believed."),
+    (("impossible numbers",), "They came close, and are not believed.")])
+def test_what_was_rejected_is_introduced_by_why(reasons: tuple[str, ...], said: str) -> None:
+    rejected = tuple(Rejected("cogging", joint, reason) for joint, reason in enumerate(reasons, 1))
+    page = diagnosis_report(Result(**(NOTHING | {"rejected": rejected})))
+    (section,) = (section for section in page.sections if section.title == "Rejected")
+    assert said in section.text[0]
+    assert ("believed" in section.text[0]) == (reasons[-1] != "weaker than others")
+
+
+def test_limits_are_told_for_what_a_technician_can_see() -> None:
+    """At how many waves a turn, from which joint: not by which form of a law."""
+    at = {"order": Value(106.918, None, "1/rev"), "sharpness": Value(111.0, None, "s/rad"), "inner_loops": Value(0, None, "1")}
+    found = (Detectable("cogging", 1, "amplitude", Value(0.1, None, "N m"), at),
+             Detectable("presliding", 2, "force", Value(0.1, None, "N m"), {"elastic": Value(-1.0, None, "1")}),
+             Detectable("stribeck", 2, "amplitude", Value(0.1, None, "N m"), {"speed": Value(0.0341, None, "rad/s")}))
+    page = diagnosis_report(Result(**(NOTHING | {"detectable": found})))
+    (table,) = (section.tables[0] for section in page.sections if section.title == "What would have been found")
+    assert [row[table.columns.index("at")] for row in table.rows] == ["107 waves a turn", "", "speed 0.0341 rad/s"]
+
+
+@pytest.mark.parametrize(("left", "said"), [
+    (0.02, "follows what it predicts"), (0.6, "part of what is left"), (1.0, "most of it stays")])
+def test_a_proof_says_what_it_shows(left: float, said: str) -> None:
+    """Where the means hardly fall, the figure does not claim that they do."""
+    x = np.linspace(0.0, 1.0, 20)
+    before = np.where(x < 0.5, 0.5, -0.5)
+    proof = Proof(1, "position", "rad", x, before, left * before, before, 0.1 * np.ones(20), x, before, left * before, before)
+    caption = next(proof_figures(1, replace(found("cogging"), proof=proof))).caption
+    assert said in caption
+    assert "0.5 N m rms without the finding" in caption
