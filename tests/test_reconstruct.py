@@ -162,6 +162,18 @@ def test_innovations_are_judged(tmp_path: Path) -> None:
     assert np.isnan(still.innovation_whiteness).all()
 
 
+def test_the_table_shows_what_the_innovations_are_judged_by(tmp_path: Path) -> None:
+    """Nearly white: a correlation below 0.2 in the headline and of each joint in the table, where 0 is white."""
+    log = open_log(Path(__file__).resolve().parents[1] / "sample_logs/rrr-changed/excitation-3.h5").log
+    done = stage(tmp_path, log)
+    found = done.result.logs[0].innovation_correlation
+    assert f"nearly white, their correlation {found.max():.2f} at most: below 0.2 these deviations hold" in done.report.verdict
+    (table,) = (table for section in done.report.sections for table in section.tables if "correlation" in table.columns)
+    assert [row[table.columns.index("correlation")] for row in table.rows] == found.tolist()
+    assert "0 where they are white" in table.caption
+    assert found.max() < 0.2
+
+
 def test_asked_for_deviations_that_mean_nothing_are_doubted(tmp_path: Path) -> None:
     """Coloured innovations under a jerk level asked for: a warning, words in the report, and no good verdict."""
     stiff = stage(tmp_path / "a", good_log(), settings=Settings(jerk_std=(0.5,)))

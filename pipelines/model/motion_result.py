@@ -19,14 +19,14 @@ from pipelines.model.tuned import Observers, encoder_resolution, tuned_observers
 from pipelines.signal.observer import Observer
 from pipelines.signal.tuning import smoother_bandwidth
 
-__all__ = ["ALARM", "LogResult", "MeanResult", "ObserverResult", "Place", "Series", "SmootherResult", "alarm", "assess",
+__all__ = ["ALARM", "SLIGHT", "LogResult", "MeanResult", "ObserverResult", "Place", "Series", "SmootherResult", "alarm", "assess",
            "coloured", "straying"]
 
 ALARM = 5e-4  # [rad] between measured and reconstructed position: Kostić et al. 2004, Fig. 10(a), stays below it
+SLIGHT = 0.2  # rms autocorrelation that changes a variance by less than a tenth
 
 _BUCKETS = 400  # of an envelope
 _WHITE = 3.0  # standard deviations
-_SLIGHT = 0.2  # rms autocorrelation that changes a variance by less than a tenth
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ def _words(statistic: float, correlation: float) -> str:
         return "none: the joint stands still"
     if abs(statistic) < _WHITE:
         return "white: the observer takes from the encoder all that a model of random jerk can"
-    if correlation < _SLIGHT:
+    if correlation < SLIGHT:
         return f"nearly white, correlation {correlation:.2f}: the motion is smoother than random jerk, the standard deviations hold"
     return (f"coloured, correlation {correlation:.2f}: an encoder error with a pattern, a vibration, or a jerk level that was "
             "asked for and does not fit; the standard deviations may be too small")

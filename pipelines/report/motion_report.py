@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.model.mean_period import NoiseFloor
-from pipelines.model.motion_result import ALARM, LogResult, ObserverResult, Series, alarm, coloured, straying
+from pipelines.model.motion_result import ALARM, SLIGHT, LogResult, ObserverResult, Series, alarm, coloured, straying
 from pipelines.report.figures import Array, joint_axes, joint_size
 from pipelines.report.motion_figures import draw_banded, draw_bode, draw_density
 from pipelines.report.report import Figure, Report, Section, Table, Tone
@@ -68,7 +68,11 @@ def _whiteness(logs: Sequence[LogResult], doubtful: Sequence[LogResult]) -> tupl
     words = {text.split(":")[0].split(",")[0] for log in logs for text in log.innovation_verdict}
     if words == {"none"}:
         return ("no joint moves, so nothing tells whether these deviations hold",)
-    return (f"the innovations are {'nearly white' if 'nearly white' in words else 'white'}, so these deviations hold",)
+    if "nearly white" not in words:
+        return ("the innovations are white, so these deviations hold",)
+    largest = max(value for log in logs for value, text in zip(log.innovation_correlation, log.innovation_verdict, strict=True)
+                  if text.startswith("nearly"))
+    return (f"the innovations are nearly white, their correlation {largest:.2f} at most: below {SLIGHT:g} these deviations hold",)
 
 
 def _alarm(logs: Sequence[LogResult], far: Sequence[LogResult]) -> tuple[str, ...]:
@@ -168,7 +172,7 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
     columns |= {f"k{i + 1} [{('1', '1/s', '1/s^2', '1/s^3')[i]}]": o.gains[:, i].tolist() for i in range(o.order)}
     columns |= {"bandwidth [Hz]": o.bandwidth_hz.tolist(), f"encoder noise [{unit}]": o.measurement_std.tolist(),
                 f"jerk σ [{unit}/s^{o.order}]": o.jerk_std.tolist(),
-                f"paper's rule [{unit}/s^{o.order}]": o.jerk_std_paper.tolist(), "whiteness": log.innovation_whiteness.tolist()}
+                f"paper's rule [{unit}/s^{o.order}]": o.jerk_std_paper.tolist(), "correlation": log.innovation_correlation.tolist()}
     known: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
     if log.smoother is not None:
         known |= {f"smoother's σ [{unit}/s^{o.order}]": log.smoother.jerk_std.tolist(),
@@ -176,8 +180,9 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
     known |= {f"error, largest [{unit}]": log.reconstruction_error_max.tolist(),
               f"rms [{unit}]": log.reconstruction_error_rms.tolist(), f"std q [{unit}]": log.position_std.tolist(),
               f"std dq [{unit}/s]": log.speed_std.tolist(), f"std ddq [{unit}/s^2]": log.acceleration_std.tolist()}
-    tables = (_table(columns, "The observer, eq. (20). Whiteness: about 0 ± 1 where the innovations are white; a long log "
-                     "shows even a correlation too small to matter."),
+    tables = (_table(columns, "The observer, eq. (20). Correlation: of an innovation with the 30 before it, rms; 0 where they are "
+                     f"white. Below {SLIGHT:g} it changes a variance by less than a tenth, and the standard deviations hold; a "
+                     "short log shows some by chance."),
               _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
     return tables if log.noise_floor is None else (*tables, _floor_table(log, log.noise_floor))
 
