@@ -41,8 +41,7 @@ def degrees(s: Subject) -> Sequence[Check | NotTested]:
                                f"{reach:.4g} at up to {speed[j]:.4g} a second, beyond the limits in rad",
                                signal="q", joint=j,
                                remedy=degrees_or_motor(reach, joint.position)))
-    travel = ", ".join(f"{v:.3g}" for v in s.travel)
-    return found or s.ok("S07", f"angles: {travel} rad of travel, speeds as the limits allow", signal="q")
+    return found or s.ok("S07", f"angles: {s.with_units('q', s.travel.tolist())} of travel, speeds as the limits allow", signal="q")
 
 
 def peak_speed(s: Subject) -> Array:
@@ -96,9 +95,8 @@ def limits(s: Subject) -> Sequence[Check | NotTested]:
     if np.isnan(speed).any():
         joints = ", ".join(str(j + 1) for j in np.flatnonzero(np.isnan(speed)))
         return s.cannot_tell("D12", f"no stretch of even samples to take the speed of joint {joints} from", signal="q")
-    fastest = ", ".join(f"{v:.3g}" for v in speed)
-    hardest = ", ".join("not visible" if np.isnan(v) else f"{v:.3g}" for v in acceleration)
-    return s.ok("D12", f"within the limits; speed at most {fastest} rad/s, acceleration {hardest} rad/s^2", signal="q")
+    fastest, hardest = s.with_units("dq", speed.tolist()), s.with_units("ddq_ref", acceleration.tolist())
+    return s.ok("D12", f"within the limits; speed at most {fastest}, acceleration {hardest}", signal="q")
 
 
 def _peak_acceleration(s: Subject) -> Array:

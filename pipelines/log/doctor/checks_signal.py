@@ -135,7 +135,7 @@ def saturation(s: Subject) -> list[Check]:
     if found:
         return found
     peak = np.nanmax(np.abs(s.good.log.tau), axis=0, initial=0.0)
-    return s.ok("D05", "the torque stays below its limits, at most " + ", ".join(f"{v:.3g}" for v in peak), signal="tau")
+    return s.ok("D05", "the torque stays below its limits, at most " + s.with_units("tau", peak.tolist()), signal="tau")
 
 
 def glitches(s: Subject) -> list[Check]:
@@ -173,20 +173,18 @@ def wraps(s: Subject) -> list[Check]:
 
 def resolution(s: Subject) -> Sequence[Check | NotTested]:
     """D08: encoders count as finely as the description says; the observer's noise is R = δ² / 12."""
-    found, seen = [], []
+    found = []
     for j, joint in enumerate(s.log.robot.joints):
         step = s.steps[j]
         if step is None:
-            seen.append("not visible")
             continue
-        seen.append(f"{step:.3g}")
         declared = joint.encoder_resolution
         too_coarse = step > 1.5 * declared if declared else s.travel[j] < 1000.0 * step
         if too_coarse and np.unique(s.good.log.q[np.isfinite(s.good.log.q[:, j]), j]).size >= 50:
             said = f"the description says {declared:.3g}" if declared else f"only {s.travel[j] / step:.0f} steps in all"
             found.append(s.say("D08", "warn",
                                f"the encoder counts in steps of {step:.3g} {s.unit('q', j)}, {said}; "
-                               f"noise is set to R = δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}^2 from the data",
+                               f"noise is set to R = δ²/12 = {step**2 / 12.0:.3g} {s.unit('q', j)}² from the data",
                                signal="q", joint=j,
                                remedy="correct encoder_resolution, or look for bits lost on the way"))
     hidden = [str(j + 1) for j, step in enumerate(s.steps) if step is None]
@@ -194,7 +192,7 @@ def resolution(s: Subject) -> Sequence[Check | NotTested]:
                           signal="q") if hidden else []
     if found or len(hidden) == len(s.steps):
         return [*found, *blind]
-    return [*s.ok("D08", f"encoder steps: {', '.join(seen)}", signal="q"), *blind]
+    return [*s.ok("D08", f"encoder steps: {s.with_units('q', s.steps)}", signal="q"), *blind]
 
 
 def identical(s: Subject) -> list[Check]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -67,7 +68,15 @@ class Subject:
         return tuple(range(self.log.n_joints)) if self.log.experiment == "excitation" else ()
 
     def unit(self, signal: str, joint: int) -> str:
-        return joint_unit(signal, self.log.robot.joints[joint].revolute)
+        return joint_unit(signal, self.log.robot.joints[joint].revolute).replace("^2", "²")
+
+    def with_units(self, signal: str, values: Iterable[float | None]) -> str:
+        """A number for each joint: "4.82, 2.18 rad/s", or "4.82 rad/s, 0.3 m/s" where some turn and some slide."""
+        units = [self.unit(signal, joint) for joint in range(self.log.n_joints)]
+        told = ["not visible" if value is None or np.isnan(value) else f"{value:.3g}" for value in values]
+        if len(set(units)) == 1 and told[-1] != "not visible":
+            return f"{', '.join(told)} {units[0]}"
+        return ", ".join(word if word == "not visible" else f"{word} {unit}" for word, unit in zip(told, units, strict=True))
 
     def place(self, signal: str = "", joint: int | None = None, sample: int | None = None) -> str:
         """Where: file, signal, joint (from 0), sample of the recording."""
