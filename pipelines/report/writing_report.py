@@ -157,9 +157,9 @@ def _at_the_edge(log: FirstValidation, t: float) -> str:
 
 def _online_section(result: Result) -> Section:
     rows: list[tuple[Cell, ...]] = [
-        (log.name, log.online.observer, _list(100 * log.online.relative_error), _list(100 * log.online.relative_error_low_pass),
-         float(f"{log.online.differs:.2g}")) for log in result.logs if log.online is not None]
-    table = Table(("log", "motion of", "left [%]", "left, low-passed [%]", "differs from arrays [N m]"), tuple(rows),
+        (log.name, log.online.observer, _list(100 * log.online.relative_error), _list(100 * log.online.relative_error_low_pass))
+        for log in result.logs if log.online is not None]
+    table = Table(("log", "motion of", "left [%]", "left, low-passed [%]"), tuple(rows),
                   f"Relative errors as above ({', '.join(result.joints)}), with the motion that an observer sees meanwhile.")
     return Section("Sample by sample, as it would run online", (
         "The complete model was also evaluated one sample at a time, as a controller would. An observer's acceleration is noisier "
