@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipelines.report.style import format_number, format_unit, printable, to_one_place, with_std
+from pipelines.report.style import figure_style, format_number, format_unit, log_ticks, printable, to_one_place, with_std
 
 
 @pytest.mark.parametrize(("value", "text"), [
@@ -55,3 +55,24 @@ def test_a_row_of_errors_is_rounded_at_one_place() -> None:
     assert to_one_place([0.0, math.nan, 0.0]) == [0.0, None, 0.0]
     assert to_one_place([1234.5, 99.4]) == [1234.0, 99.0]
     assert to_one_place([]) == []
+
+
+@pytest.mark.parametrize(("ends", "least"), [((0.3, 8.0), 2), ((0.2, 0.8), 2), ((1.1, 4.4), 2), ((3.0, 70.0), 2), ((1.0, 1e3), 4)])
+def test_a_logarithmic_axis_can_be_read(ends: tuple[float, float], least: int) -> None:
+    """At least two labels in view, each of which reads as the number it stands at; powers of ten alone where they do."""
+    with figure_style("test"):
+        from matplotlib.figure import Figure
+
+        axes = Figure().subplots()
+        axes.set_yscale("log")
+        axes.set_ylim(*ends)
+        log_ticks(axes.yaxis)
+        found = {}
+        for minor in (False, True):
+            places = axes.yaxis.get_minorticklocs() if minor else axes.yaxis.get_majorticklocs()
+            words = (axes.yaxis.get_minor_formatter() if minor else axes.yaxis.get_major_formatter()).format_ticks(places)
+            found |= {float(x): text for x, text in zip(places, words, strict=True) if text and ends[0] <= x <= ends[1]}
+    assert len(found) >= least
+    assert all(float(text) == pytest.approx(x) for x, text in found.items() if text[:2] != "10")
+    if least == 4:
+        assert list(found.values()) == ["1", "10", "100", "1000"]
