@@ -23,7 +23,7 @@ __all__ = ["as_sentence", "cause_at", "floor_name", "floor_words", "held_out_flo
 _PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _NUMBERED = re.compile(r"(.+)_([2-9]|[1-9][0-9]+)$")  # harmonics, and waves of further orders
-_KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+))?\b")
+_KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
 
 _FLOORS = {
     "twin": "The floor is what the simulated twin leaves: the fitted model run through the same experiment and the same analysis.",
@@ -157,19 +157,23 @@ def meaning_of(cause: str, parameter: str) -> str:
     own, which = _part(cause, parameter)
     meaning = next((q.meaning for q in known if q.name == own), "")
     if meaning and which > 1:
-        meaning = f"{meaning}; {_counted(which)} one at this joint"
+        meaning = f"{meaning}; of the {_counted(which)} one at this joint"
     for q in known:
         meaning = meaning.replace(q.name, spoken(q.name)) if "_" in q.name else meaning
     return meaning
 
 
 def without_keys(text: str) -> str:
-    """A stored reason as people read it: "cogging at joint 2" for "cogging:2", "torque offset" for "torque_offset"."""
+    """A stored reason as people read it: "cogging at joint 2" for "cogging:2", "torque offset" for "torque_offset".
+
+    A parameter behind them stands before: "level of Coulomb friction at joint 1" for "coulomb:1:level".
+    """
     def in_words(found: re.Match[str]) -> str:
         cause, joint = found[1], found[2]
         if cause not in effect_names() or (joint is None and "_" not in cause):
             return found[0]
-        return named(cause, None if joint is None else int(joint))
+        place = named(cause, None if joint is None else int(joint))
+        return f"{spoken(found[3])} of {place}" if found[3] else place
 
     return _KEY.sub(in_words, text)
 

@@ -85,6 +85,8 @@ def test_a_stored_reason_is_read_without_keys() -> None:
     """Causes by their titles, with the joint where it is said; a person's name stays capital; other words stay."""
     assert without_keys("absorbed by coulomb:1, p3 and torque_offset:2") == (
         "absorbed by Coulomb friction at joint 1, p3 and torque offset at joint 2")
+    assert without_keys("absorbed by p3, coulomb:3:level; needs more") == (
+        "absorbed by p3, level of Coulomb friction at joint 3; needs more")
     assert without_keys("spring and friction stay as they are: 3 of 4") == "spring and friction stay as they are: 3 of 4"
     assert named("payload", None) == "a load at the tip"
 
