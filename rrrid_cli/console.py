@@ -74,13 +74,15 @@ def say_verdict(report: Report, stream: Any = None) -> None:
 def _say_table(table: Table, stream: Any) -> None:
     """The rows of a table; its head as well, where a row is more than a name and a figure."""
     from pipelines.report.cells import column_texts
-    from pipelines.report.style import format_number
+    from pipelines.report.style import format_number, format_unit
 
     if len(table.columns) <= 2:  # a figure is not like the one below it
         say_table((), [[clean(c, 60) if isinstance(c, str) else format_number(c) for c in row] for row in table.rows], stream)
     elif table.rows:
         columns = [column_texts(cells, lambda text: clean(text, 60)) for cells in zip(*table.rows, strict=True)]
-        say_table(table.columns, list(zip(*columns, strict=True)), stream)
+        parts = (name.rpartition("[") for name in table.columns)
+        head = [f"{name}{bracket}{format_unit(unit) if bracket else unit}" for name, bracket, unit in parts]
+        say_table(head, list(zip(*columns, strict=True)), stream)
 
 
 def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], stream: Any = None) -> None:

@@ -44,6 +44,15 @@ def test_what_to_check_follows_the_verdict(capsys: pytest.CaptureFixture[str]) -
     assert capsys.readouterr().out == ""
 
 
+def test_units_are_written_as_in_the_report(capsys: pytest.CaptureFixture[str]) -> None:
+    table = Table(("log", "acceleration [rad/s^2]", "k3 [1/s^2]"), (("a", 1.0, 2.0),))
+    say_outcome(outcome_of(Report("t", "v", key_figures=table)), as_json=False, quiet=False, verbose=False)
+    said = capsys.readouterr().out
+    assert "[rad/s²]" in said
+    assert "[1/s²]" in said
+    assert "^" not in said
+
+
 def test_no_rows_no_table(capsys: pytest.CaptureFixture[str]) -> None:
     say_table(("a", "b"), [])
     assert capsys.readouterr().out == ""
