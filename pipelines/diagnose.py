@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
-from pipelines.errors import Check, UsageError, did_you_mean
+from pipelines.errors import Check, UsageError
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.simulated import with_simulation
-from pipelines.model.effects import effect_names
+from pipelines.model.named_cause import refuse_unknown
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
@@ -70,9 +70,10 @@ def read(request: Request, settings: Settings) -> Inputs:
     """The logs in their roles, the model whose friction laws are to be taken, and stored thresholds.
 
     Raises:
-        UsageError: C02, no logs, or a log with two roles; C04, no such file.
+        UsageError: C01, C02, a setting that makes no sense, no logs, or a log with two roles; C04, no such file.
         InputRejected: a model (S18) or a calibration (S19, F05, F11) that cannot be used.
     """
+    _refuse_strange(settings)
     inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
                                               "reference": settings.reference})
     found = beside(settings, request)
@@ -147,9 +148,7 @@ def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
 def _refuse_strange(settings: Settings) -> None:
     """C01, C02 for a setting that makes no sense."""
     for cause in settings.without:
-        if cause not in effect_names():
-            raise UsageError("C01", f"'{cause}' is not a cause{did_you_mean(cause, effect_names())}", where="--without",
-                             remedy=f"the causes are {', '.join(effect_names())}")
+        refuse_unknown(cause, "--without")
     if settings.blocks < _FEWEST_BLOCKS:
         raise UsageError("C02", f"{settings.blocks} blocks", where="--blocks", remedy="give 2 or more")
     if settings.replicas < 0 or settings.replicas > 1000:

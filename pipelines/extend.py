@@ -34,7 +34,7 @@ from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
-from pipelines.model.named_cause import wanted_cause
+from pipelines.model.named_cause import refuse_unknown, wanted_cause
 from pipelines.report.extension_report import extension_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_by_role, slug
@@ -70,10 +70,12 @@ def read(request: Request, settings: Settings) -> Inputs:
     """The logs in their roles, and the model to extend.
 
     Raises:
-        UsageError: C02, no cause, no logs, or a log with two roles; C04, no such file.
+        UsageError: C01, no such cause; C02, no cause, no logs, or a log with two roles; C04, no such file.
     """
     if not settings.causes:
         raise UsageError("C02", "no cause", where="--with", remedy="name one, as diagnose does: --with cogging:2")
+    for text in settings.causes:
+        refuse_unknown(text, "--with")
     inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
                                               "reference": settings.reference})
     if settings.model is None:

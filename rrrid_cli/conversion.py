@@ -1,8 +1,8 @@
 """Take texts, paths and numbers as the command line gives them, without a schema.
 
 typer makes a pydantic schema of every option, given or not, and loads pydantic for it: 75 ms of CPU, more than numpy. A text
-is a text without one, a path that nobody asks to exist is a path, and Python reads numbers. Whatever else was given still
-goes typer's way, which has the words for what is no number.
+is a text without one, a path that nobody asks to exist is a path, and Python reads numbers: what is none is refused here, for
+typer has pydantic's words for it. Whatever else was given still goes typer's way.
 """
 
 from __future__ import annotations
@@ -11,10 +11,13 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
+from pipelines.errors import UsageError
+
 __all__ = ["plainly"]
 
 _PLAIN: dict[Any, Any] = {str: str, list[str]: str, Path: Path, list[Path]: Path, int: int, float: float}
 _NAMES: dict[Any, str] = {str: "TEXT", list[str]: "TEXT", Path: "PATH", list[Path]: "PATH", int: "NUMBER", float: "NUMBER"}
+_NUMBERS: dict[Any, tuple[str, str]] = {int: ("whole number", "4"), float: ("number", "0.5")}
 
 
 class _Plainly:
@@ -27,13 +30,20 @@ class _Plainly:
         return self
 
     def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
-        """`value`, which is None where the option was not given, as the type that the command wants."""
+        """`value`, which is None where the option was not given, as the type that the command wants.
+
+        Raises:
+            UsageError: C02, it is no number where the option takes one.
+        """
         many = param.multiple or param.nargs == -1
         if value is None:
             return () if many else None
         if self.plain is not None:
             with contextlib.suppress(ValueError):
                 return [self.plain(item) for item in value] if many else self.plain(value)
+        if self.plain in _NUMBERS:
+            kind, example = _NUMBERS[self.plain]
+            raise UsageError("C02", f"'{value}' is no {kind}", where=param.opts[0], remedy=f"give a {kind}, such as {example}")
         return self.typers_own().coerce(value, param=param, ctx=ctx)
 
 

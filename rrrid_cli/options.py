@@ -15,8 +15,8 @@ import typer
 from pipelines.errors import UsageError
 from rrrid_cli.conversion import plainly
 
-__all__ = ["Common", "LogPaths", "Roles", "SomeLogs", "StageCommand", "StageGroup", "numbers", "whole_numbers", "with_common",
-           "with_common_but"]
+__all__ = ["CauseCommand", "Common", "LogPaths", "Roles", "SomeLogs", "StageCommand", "StageGroup", "numbers", "whole_numbers",
+           "with_common", "with_common_but"]
 
 LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
                                                   readable=False)]  # rrrid says it better: exit 6, RRID-F13
@@ -128,6 +128,18 @@ class StageCommand(typer.core.TyperCommand):
         for stage, names in known_options(str(self.name)).items():
             formatter.write_paragraph()
             formatter.write_text(f"--set {stage}.OPTION=VALUE, options: {', '.join(names) or 'none'}.")
+
+
+class CauseCommand(StageCommand):
+    """A command that takes causes: its help ends in all of them, each with a few words."""
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        from pipelines.model.effects import all_effects
+
+        super().format_epilog(ctx, formatter)
+        for scope, title in (("joint", "Causes at one joint"), ("arm", "Causes of the whole arm")):
+            with formatter.section(title):
+                formatter.write_dl([(effect.name, effect.title) for effect in all_effects() if effect.scope == scope])
 
 
 _OUT = "Folder for everything the command leaves."

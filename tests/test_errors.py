@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.errors import InputRejected, clean
+from pipelines.errors import InputRejected, clean, did_you_mean
 
 REPO = Path(__file__).resolve().parents[1]
 KINDS = {"InputRejected", "UsageError", "EnvironmentFault", "NothingMatched"}
@@ -39,6 +39,15 @@ def test_an_error_is_one_printable_line() -> None:
     problem = InputRejected("F01", "a\nb\x1b[31m", where="x\ty", remedy="do it")
     assert str(problem) == "RRID-F01 x y: a b[31m. Do it."
     assert len(clean("x" * 10_000)) == 400
+
+
+@pytest.mark.parametrize(("word", "most", "said"), [
+    ("--twins", 1, ""),  # only the dashes, which every option has, make it like --joints
+    ("--quiet", 1, ""), ("--modle", 1, ", did you mean '--model'?"), ("-models", 1, ", did you mean '--model'?"),
+    ("--mosel", 2, ", did you mean '--model' or '--most'?"), ("--mode", 1, ", did you mean '--model'?"),
+])
+def test_only_what_is_near_is_suggested(word: str, most: int, said: str) -> None:
+    assert did_you_mean(word, ("--joints", "--model", "--most", "--out"), most) == said
 
 
 @pytest.mark.parametrize(("message", "remedy", "said"), [

@@ -16,7 +16,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import Effect
 
-__all__ = ["acting_cause", "wanted_cause"]
+__all__ = ["acting_cause", "refuse_unknown", "wanted_cause"]
 
 
 def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") -> Acting:
@@ -26,9 +26,7 @@ def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") ->
         UsageError: C01, no such cause or parameter; C02, a joint or number that does not fit.
     """
     name, *rest = text.split(":")
-    if name not in effect_names():
-        raise UsageError("C01", f"'{name}' is not a cause{did_you_mean(name, effect_names())}", where=where,
-                         remedy=f"the causes are {', '.join(effect_names())}")
+    refuse_unknown(text, where)
     kind = find_effect(name)
     joint, numbers = _place(text, kind, rest, len(revolute), where)
     values = _values(text, kind, kind(joint=joint), numbers, where)
@@ -43,9 +41,7 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
         UsageError: C01, no such cause or number; C02, a joint or number that does not fit, or one that every fit finds anew.
     """
     name, *rest = text.split(":")
-    if name not in effect_names():
-        raise UsageError("C01", f"'{name}' is not a cause{did_you_mean(name, effect_names())}", where=where,
-                         remedy=f"the causes are {', '.join(effect_names())}")
+    refuse_unknown(text, where)
     kind = find_effect(name)
     joint, numbers = _place(text, kind, rest, len(revolute), where)
     effect = kind(joint=joint)
@@ -60,6 +56,18 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
                          remedy=f"a start can be given to {', '.join(shapes)}" if shapes else f"write {text.split(':')[0]}"
                                 f"{'' if joint is None else f':{joint}'}")
     return effect, {one: values[one] for one in given}
+
+
+def refuse_unknown(text: str, where: str) -> None:
+    """Whether `text` begins with the name of a cause.
+
+    Raises:
+        UsageError: C01, it does not; with the nearest names, and where all of them stand.
+    """
+    name = text.split(":")[0]
+    if name not in effect_names():
+        raise UsageError("C01", f"'{name}' is not a cause{did_you_mean(name, effect_names(), 3)}", where=where,
+                         remedy="'rrrid extend --help' lists all causes")
 
 
 def _place(text: str, kind: type[Effect], rest: list[str], joints: int, where: str) -> tuple[int | None, str]:

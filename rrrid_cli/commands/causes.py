@@ -7,17 +7,18 @@ from typing import Annotated
 import typer
 
 from rrrid_cli.commands.application import app, go
-from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, numbers, with_common, with_common_but
+from rrrid_cli.options import CauseCommand, Common, Roles, SomeLogs, numbers, with_common, with_common_but
 
 __all__ = ["diagnose", "extend"]
 
 
-@app.command(cls=StageCommand)
+@app.command(cls=CauseCommand)
 @with_common_but("format")
 def diagnose(
     common: Common, roles: Roles,
     logs: SomeLogs = None,
-    without: Annotated[list[str] | None, typer.Option(help="Cause that it is not, you know: cogging. Repeatable.")] = None,
+    without: Annotated[list[str] | None, typer.Option(help="Cause that it is not, you know: cogging; all causes stand below. "
+                                                      "Repeatable.")] = None,
     model: Annotated[str | None, typer.Option(help="model.json whose friction laws are taken. [Coulomb and viscous]")] = None,
     replicas: Annotated[int | None, typer.Option(help="Simulated twins that say what is normal; 0: none. [10]")] = None,
     most: Annotated[int | None, typer.Option(help="Causes to look for, at most. [4]")] = None,
@@ -38,13 +39,14 @@ def diagnose(
         "min_speed": numbers(min_speed, "--min-speed"), "seed": seed, "calibration": calibration, "allow_mismatch": allow_mismatch})
 
 
-@app.command(cls=StageCommand)
+@app.command(cls=CauseCommand)
 @with_common
 def extend(
     common: Common, roles: Roles,
     logs: SomeLogs = None,
     with_: Annotated[list[str] | None, typer.Option("--with", help="CAUSE:JOINT, or CAUSE:JOINT:NAME=VALUE with a start for a "
-                                                    "non-linear number: cogging:2:order=18. Repeatable.")] = None,
+                                                    "non-linear number: cogging:2:order=18; all causes stand below. "
+                                                    "Repeatable.")] = None,
     model: Annotated[str | None, typer.Option(help="model.json to extend: its effects are kept, and fitted anew.")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
     filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,

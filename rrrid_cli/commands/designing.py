@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from rrrid_cli.commands.application import app, go
-from rrrid_cli.options import Common, StageCommand, numbers, whole_numbers, with_common
+from rrrid_cli.options import CauseCommand, Common, numbers, whole_numbers, with_common
 
 __all__ = ["design_excitation"]
 
 
-@app.command("design-excitation", cls=StageCommand)
+@app.command("design-excitation", cls=CauseCommand)
 @with_common
 def design_excitation(
     common: Common,

@@ -8,20 +8,30 @@ from typing import Annotated
 import typer
 
 from rrrid_cli.commands.application import app, go
-from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, numbers, whole_numbers, with_common, with_common_but
+from rrrid_cli.options import (
+    CauseCommand,
+    Common,
+    Roles,
+    SomeLogs,
+    StageCommand,
+    numbers,
+    whole_numbers,
+    with_common,
+    with_common_but,
+)
 
 __all__ = ["frf", "simulate", "validate_writing"]
 
 
-@app.command(cls=StageCommand)
+@app.command(cls=CauseCommand)
 @with_common_but("check")
 def simulate(
     common: Common,
     model: Annotated[str, typer.Argument(help="The model.json of estimate-bps, or the shipped 'rrr'.", show_default=False)],
     like: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to imitate, or a folder. Repeatable.")] = None,
     fault: Annotated[list[str] | None, typer.Option(
-        help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. A wrong CAUSE "
-             "or NAME is refused with a list of the right ones.")] = None,
+        help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes stand below; a "
+             "wrong NAME is refused with a list of the right ones.")] = None,
     replicas: Annotated[int | None, typer.Option(help="Simulations that differ in their noise; windows have one. [1]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first one's noise. [1]")] = None,
     noise: Annotated[list[str] | None, typer.Option(

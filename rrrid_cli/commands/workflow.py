@@ -11,7 +11,7 @@ import typer
 
 from rrrid_cli.batch import BatchCommand, batch
 from rrrid_cli.commands.application import app, asked, done, go
-from rrrid_cli.options import Common, Roles, SomeLogs, StageCommand, with_common, with_common_but
+from rrrid_cli.options import CauseCommand, Common, Roles, SomeLogs, StageCommand, with_common, with_common_but
 
 __all__ = ["batch", "demo", "run"]
 
@@ -51,7 +51,7 @@ def run(
 app.command(cls=BatchCommand)(batch)
 
 
-@app.command(cls=StageCommand)
+@app.command(cls=CauseCommand)
 @with_common_but("robot", "assume_units", out="demo")
 def demo(
     common: Common,

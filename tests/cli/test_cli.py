@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from pipelines.log.files import open_log, write_log
+from pipelines.model.effects import all_effects
 from tests.cli.commands import REPO, rrrid
 from tests.healthy import good_log, with_signal
 from tests.log.logs import small_log
@@ -105,7 +106,14 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
      "RRID-C01 rrrid convert: no such option '--ot', did you mean '--out'? See 'rrrid convert --help'."),
     (("convert",), "RRID-C02 rrrid convert: missing argument 'LOGS'. See 'rrrid convert --help'."),
     (("compare", "logs"), "RRID-C02 rrrid compare: missing argument 'B'. See 'rrrid compare --help'."),
-    (("reconstruct", "logs", "--order", "x"), "RRID-C02 rrrid reconstruct: invalid value for '--order': "),
+    (("reconstruct", "logs", "--order", "x"), "RRID-C02 --order: 'x' is no whole number. Give a whole number, such as 4."),
+    (("reconstruct", "logs", "--order", "2.5"), "RRID-C02 --order: '2.5' is no whole number. "),
+    (("fit-friction", "logs", "--window", "many"), "RRID-C02 --window: 'many' is no number. Give a number, such as 0.5."),
+    (("diagnose", "logs", "--twins", "3"), "RRID-C01 rrrid diagnose: no such option '--twins'. See "),
+    (("diagnose", "logs", "--without", "coging"),
+     "RRID-C01 --without: 'coging' is not a cause, did you mean 'cogging'? 'rrrid extend --help' lists all causes."),
+    (("extend", "logs", "--with", "quadratic:2"),
+     "RRID-C01 --with: 'quadratic' is not a cause, did you mean 'quadratic_drag'? 'rrrid extend --help' lists all causes."),
     (("convert", "logs", "-q", "-v"), "RRID-C02 -q, -v: "),
 ])
 def test_wrong_usage_is_one_line_and_exit_2(logs: Path, words: tuple[str, ...], said: str) -> None:
@@ -215,6 +223,13 @@ def test_help_names_what_set_takes(tmp_path: Path) -> None:
     """The options of --set, for `run` those of every stage, are made of the stages' own settings."""
     assert "--set convert.OPTION=VALUE, options: to." in rrrid("convert", "--help", cwd=tmp_path).stdout
     assert "--set inspect.OPTION=VALUE, options: trust_units, allow_same." in rrrid("run", "--help", cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize("command", ["extend", "diagnose", "simulate", "demo", "design-excitation"])
+def test_help_names_every_cause(command: str, tmp_path: Path) -> None:
+    """Where a cause is asked for, all of them can be read, each with its title."""
+    lines = {" ".join(line.split()) for line in rrrid(command, "--help", cwd=tmp_path).stdout.splitlines()}
+    assert {f"{effect.name} {effect.title}" for effect in all_effects()} <= lines
 
 
 def test_a_pattern_that_the_shell_left_is_expanded(logs: Path) -> None:
