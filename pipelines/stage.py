@@ -27,7 +27,7 @@ from pipelines.log.atomic import environment_faults, replace_folder, staging_fol
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, expanded, hash_file
 from pipelines.log.inputs import Inputs, Rejected, Request, read_by_role, read_logs
-from pipelines.log.places import given_names, keep_apart, refuse_foreign, renamed, short_names, slug, tilde
+from pipelines.log.places import given_names, keep_apart, refuse_foreign, refuse_unwritable, renamed, short_names, slug, tilde
 from pipelines.log.results import encode, json_text, write_series
 from pipelines.log.robot_files import robot_sources
 from pipelines.report.report import Report
@@ -131,6 +131,7 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     started = time.time()
     if request.out is not None:
         keep_apart(request.out, (), request.paths)
+        refuse_unwritable(request.out)
         refuse_foreign(request.out, request.force, stage.remakes)
     described = _hashes(robot_sources(request.robot), {}) if request.robot is not None else {}
     inputs = stage.read(request, settings)
@@ -147,6 +148,7 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
              started: float) -> Outcome[R]:
     out = request.out or default_out(inputs, stage.name)
     keep_apart(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))
+    refuse_unwritable(out)
     changed = refuse_foreign(out, request.force, stage.remakes)
     hashes = _hashes(inputs.sources, inputs.hashes) | described
     # Equal inputs give equal bytes, wherever they lie: no path of this machine goes into a result.

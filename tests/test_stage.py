@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from pipelines import convert, inspect, run
-from pipelines.errors import Check, InputRejected, UsageError
+from pipelines.errors import Check, InputRejected, RrridError, UsageError
 from pipelines.log.files import write_log
 from pipelines.log.places import renamed, short_names
 from pipelines.report.report import Report
@@ -170,6 +170,32 @@ def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> No
     (tmp_path / "link").symlink_to(tmp_path / "out")
     with pytest.raises(UsageError, match="RRID-C05"):
         refuse_foreign(tmp_path / "link")
+
+
+def test_a_large_folder_of_somebody_else_is_not_walked_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """C05: three files that are not rrrid's are enough; `--out /usr` took seconds before it was refused."""
+    for number in range(30):
+        (tmp_path / f"out/folder-{number:02}").mkdir(parents=True)
+        (tmp_path / f"out/folder-{number:02}/file").write_text("")
+    seen: list[object] = []
+    look = os.listdir
+    monkeypatch.setattr("pipelines.log.places.os.listdir", lambda folder: seen.append(folder) or look(folder))
+    with pytest.raises(UsageError, match=r"RRID-C05 .*did not write there: folder-00/file, folder-01/file, folder-02/file\."):
+        refuse_foreign(tmp_path / "out")
+    assert len(seen) < 10
+
+
+@pytest.mark.parametrize(("out", "allowed", "code"), [("out/new", False, "RRID-F13"), ("logs/a.h5/new", True, "RRID-C05")])
+def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
+        logs: Path, out: str, allowed: bool, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody waits for a result that then has no place."""
+
+    def work(inputs: Inputs, settings: _Nothing) -> _Nothing:
+        raise AssertionError("it was begun")
+
+    monkeypatch.setattr("pipelines.log.places.os.access", lambda path, mode: allowed)
+    with pytest.raises(RrridError, match=code):
+        run_stage(_stage(work), Request((logs / "a.h5",), out=logs.parent / out), _Nothing())
 
 
 @dataclass(frozen=True)

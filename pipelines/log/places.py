@@ -7,15 +7,17 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import UsageError, clean
+from pipelines.errors import EnvironmentFault, UsageError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 
-__all__ = ["given_names", "keep_apart", "refuse_foreign", "renamed", "short_names", "slug", "tilde", "written_by"]
+__all__ = ["given_names", "keep_apart", "refuse_foreign", "refuse_unwritable", "renamed", "short_names", "slug", "tilde",
+           "written_by"]
 
 _ELSEWHERE = "choose another folder with --out"
 
@@ -59,16 +61,41 @@ def refuse_foreign(out: Path, force: bool = False, remade: Callable[[str], bool]
         ours = {}
     if ours and force:
         return ()
-    there = {path.relative_to(out).as_posix(): path for path in out.rglob("*") if path.is_symlink() or not path.is_dir()}
-    foreign = sorted(set(there) - set(ours) - ({PROVENANCE} if ours else set()))
+    known = {*ours, PROVENANCE} if ours else set()
+    # three are enough: the folder may hold the whole machine
+    foreign = list(islice((name for name in _members(out) if name not in known), 3))
     if foreign:
-        raise UsageError("C05", f"holds files that rrrid did not write there: {', '.join(foreign[:3])}", where=out,
+        raise UsageError("C05", f"holds files that rrrid did not write there: {', '.join(foreign)}", where=out,
                          remedy=f"{_ELSEWHERE}, or move them")
-    edited = sorted(name for name, path in there.items() if name in ours and hash_file(path) != ours[name])
+    edited = sorted(name for name in _members(out) if name in ours and hash_file(out / name) != ours[name])
     if kept := [name for name in edited if not remade(name)]:
         raise UsageError("C05", f"holds files that were changed since rrrid wrote them: {', '.join(kept[:3])}", where=out,
                          remedy=f"{_ELSEWHERE}, or replace them with --force")
     return tuple(edited)
+
+
+def refuse_unwritable(out: Path) -> None:
+    """F13, C05: `out` can be made where it shall be.
+
+    Raises:
+        EnvironmentFault: the nearest folder above it that there is may not be written.
+        UsageError: that is none.
+    """
+    above = next(path for path in out.absolute().parents if path.exists())
+    if not above.is_dir():
+        raise UsageError("C05", f"lies below {above}, which is not a folder", where=out, remedy=_ELSEWHERE)
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise EnvironmentFault("F13", "permission denied", where=above, remedy="choose another --out, or change its permissions")
+
+
+def _members(folder: Path, above: str = "") -> Iterator[str]:
+    """The names of everything below `folder` that is no folder, or one that cannot be read; in the order of their names."""
+    for name in sorted(os.listdir(folder)):
+        path = folder / name
+        if path.is_symlink() or not path.is_dir() or not os.access(path, os.R_OK | os.X_OK):
+            yield f"{above}{name}"
+        else:
+            yield from _members(path, f"{above}{name}/")
 
 
 def written_by(folder: Path) -> str:

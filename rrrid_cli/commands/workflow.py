@@ -62,9 +62,10 @@ def demo(
     """A first verdict without files of one's own: simulate an arm with a fault, and run everything on its logs."""
     from pipelines import demo as recording
     from pipelines import run as workflow
-    from pipelines.stage import run_stage
+    from pipelines.stage import refuse_foreign, run_stage
 
     out = common.out or Path("demo")
+    refuse_foreign(out / "run", common.force, workflow.STAGE.remakes)  # before the arm is simulated
     given = {"fault": tuple(fault or ()) or None, "seed": seed}
     request, settings, teller = asked(recording.STAGE, (), replace(common, out=out / "recording", no_report=True), given)
     teller("simulating the arm")

@@ -83,3 +83,12 @@ def test_the_demo_names_what_it_hid(tmp_path: Path) -> None:
     assert (finding["cause"], finding["joint"]) == ("cogging", 2)
     order = finding["parameters"]["order"]
     assert abs(order["value"] - 18.0) < max(3.0 * order["std"], 0.02)
+
+
+def test_a_place_that_is_taken_is_refused_before_the_arm_is_simulated(tmp_path: Path) -> None:
+    """C05: what stands where the run's result would go is found first."""
+    (tmp_path / "demo/run").mkdir(parents=True)
+    (tmp_path / "demo/run/thesis.tex").write_text("years of work")
+    done = rrrid("demo", *QUICK, cwd=tmp_path)
+    assert (done.returncode, "RRID-C05 demo/run: " in done.stderr) == (2, True)
+    assert [p.name for p in (tmp_path / "demo").iterdir()] == ["run"]
