@@ -45,6 +45,11 @@ class Fault:
 
 
 FAULTS = (
+    Fault("S05", lambda g: with_signal(g, tau=1000.0 * g.tau), "reject", "looks like N mm (1000 times too large)", "signal tau"),
+    Fault("S05 hundredths", lambda g: with_signal(g, tau=100.0 * g.tau),
+          "reject", "looks like N cm (100 times too large)", "signal tau"),
+    Fault("S05 measured", lambda g: replace(with_signal(g, tau=1000.0 * g.tau), torque="measured"),
+          "warn", "looks like N mm", "signal tau", True, also=("RRID-S15",)),
     Fault("S07", lambda g: with_signal(g, q=np.rad2deg(g.q)), "reject", "looks like degrees or the motor", "signal q, joint 1"),
     Fault("S08 ms", lambda g: retimed(g, lambda t: t * 1000.0), "repair", "is in ms", "signal t"),
     Fault("S08 us", lambda g: retimed(g, lambda t: t * 1000000.0), "repair", "is in us", "signal t"),

@@ -166,6 +166,15 @@ def test_s04_assume_units_takes_si_and_says_so(folder: Path) -> None:
     assert codes(run(folder, unit_away(RECIPE), assume_units=True)) == {"S04": "warn"}
 
 
+def test_s05_newton_metres_that_are_newton_millimetres(folder: Path) -> None:
+    """S05: the remedy stands in the recipe, for there is no log yet; with it the import is in order."""
+    columns = good()
+    write(folder, text(columns | {f"tau_{j}": 300.0 * columns[f"tau_{j}"] for j in (1, 2, 3)}))
+    with pytest.raises(InputRejected, match=r'RRID-S05.*looks like N mm.*Declare the unit of tau .* unit = "N mm"'):
+        run(folder)
+    assert run(folder, RECIPE.replace('"N m"', '"N mm"')).result.logs
+
+
 def test_s07_radians_that_are_degrees(folder: Path) -> None:
     """S07: ±40 degrees declared as radians leave a joint that can do ±2 rad by far."""
     columns = good()

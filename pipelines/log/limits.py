@@ -71,4 +71,5 @@ def late(ticks: Array, rms: float) -> npt.NDArray[np.intp]:
 
 def percent(share: float, digits: int = 3) -> str:
     """"1.5 %"; what rounding leaves of nothing is "below 0.001 %", for its digits say nothing."""
-    return "below 0.001 %" if abs(share) < 1e-5 else f"{100.0 * share:.{digits}g} %"
+    whole = abs(100.0 * share) >= 10.0**digits - 0.5  # more digits before the point than are asked for: "100", not "1e+02"
+    return "below 0.001 %" if abs(share) < 1e-5 else f"{100.0 * share:.{'0f' if whole else f'{digits}g'}} %"

@@ -41,7 +41,8 @@ UNITS: Final[dict[str, Unit]] = {
     "rad/s^2": Unit("acceleration", 1.0), "deg/s^2": Unit("acceleration", math.pi / 180.0),
     "rev/s^2": Unit("acceleration", _TURN), "m/s^2": Unit("acceleration", 1.0), "mm/s^2": Unit("acceleration", 1e-3),
     # torque and force
-    "N m": Unit("torque", 1.0), "mN m": Unit("torque", 1e-3), "N cm": Unit("torque", 1e-2), "kN m": Unit("torque", 1e3),
+    "N m": Unit("torque", 1.0), "mN m": Unit("torque", 1e-3), "N mm": Unit("torque", 1e-3), "N cm": Unit("torque", 1e-2),
+    "kN m": Unit("torque", 1e3),
     "N": Unit("torque", 1.0), "mN": Unit("torque", 1e-3), "kN": Unit("torque", 1e3),
     # current
     "A": Unit("current", 1.0), "mA": Unit("current", 1e-3),
@@ -50,7 +51,7 @@ UNITS: Final[dict[str, Unit]] = {
 }
 
 _SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "²": "^2", "\u03bc": "µ"})
-_ALIASES: Final = {"Nm": "N m", "mNm": "mN m", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
+_ALIASES: Final = {"Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
                    "radian": "rad", "radians": "rad", "seconds": "s", "sec": "s", "rad/s2": "rad/s^2",
                    "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "1/min": "rpm"}
 

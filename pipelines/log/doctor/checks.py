@@ -19,6 +19,7 @@ from pipelines.log.doctor.checks_motion import MOTION_CHECKS, both_ways
 from pipelines.log.doctor.checks_signal import SIGNAL_CHECKS
 from pipelines.log.doctor.checks_subject import NotTested, Subject
 from pipelines.log.doctor.checks_time import CLOCK_CHECKS, MOTION_BAND, TIME_CHECKS
+from pipelines.log.doctor.checks_unit import UNIT_CHECKS
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 
@@ -26,12 +27,13 @@ __all__ = ["CHECKS", "LogCheck", "NotTested", "Subject", "check_log", "check_tog
 
 LogCheck = Callable[[Subject], Sequence[Check | NotTested]]
 
-CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, MOTION_BAND, *SIGNAL_CHECKS, *MOTION_CHECKS)
+CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, MOTION_BAND, *UNIT_CHECKS, *SIGNAL_CHECKS, *MOTION_CHECKS)
 
 
 # What follows from an input that is rejected for another reason is not worth a word of its own.
 _CONSEQUENCES: Final = {
     "RRID-D04": ("D11", "S16"),
+    "RRID-S05": ("D05", "D06"),
     "RRID-S07": ("D06", "D08", "D11", "D12", "D16", "S16"),
     "RRID-S08": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),
     "RRID-S09": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),

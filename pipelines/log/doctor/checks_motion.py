@@ -8,6 +8,7 @@ import numpy as np
 
 from pipelines.errors import Check
 from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
+from pipelines.log.doctor.checks_unit import angles_in_file
 from pipelines.log.doctor.faults import lagged_speed
 from pipelines.log.doctor.stop import emergency_stop
 from pipelines.log.experiment import Array
@@ -40,7 +41,7 @@ def degrees(s: Subject) -> Sequence[Check | NotTested]:
                                f"q of joint {j + 1} is declared in rad, but looks like degrees or the motor side: it reaches "
                                f"{reach:.4g} at up to {speed[j]:.4g} a second, beyond the limits in rad",
                                signal="q", joint=j,
-                               remedy=degrees_or_motor(reach, joint.position)))
+                               remedy=angles_in_file(s)))
     return found or s.ok("S07", f"angles: {s.with_units('q', s.travel.tolist())} of travel, speeds as the limits allow", signal="q")
 
 
@@ -116,7 +117,8 @@ def _peak_acceleration(s: Subject) -> Array:
 
 
 def degrees_or_motor(reach: float, bounds: tuple[float, float]) -> str:
-    """S07's remedy: numbers too large for a joint in rad are degrees, or of the motor, and each asks for something else."""
+    """S07's remedy in a recipe: numbers too large for a joint in rad are degrees, or of the motor, and each asks for something
+    else."""
     wide = max(abs(bounds[0]), abs(bounds[1]), bounds[1] - bounds[0])
     least = f" of at least {reach / wide:.3g}" if np.isfinite(wide) and wide > 0 else ""
     return (f'if degrees, declare unit = "deg" (divides by 57.3); if motor side, add [drive] transmission = the gear ratios'

@@ -126,9 +126,13 @@ def saturation(s: Subject) -> list[Check]:
         share = float(flags[:, j].mean())
         level = float(np.nanmin(np.abs(s.good.log.tau[flags[:, j], j])))
         described = torque_limit(s.log)[j]
-        limit = f"the described limit of {described:.4g}" if level >= 0.99 * described else f"a flat top at {level:.4g}"
+        limit, peak = f"at the described limit of {described:.4g}", float(np.nanmax(np.abs(s.good.log.tau[flags[:, j], j])))
+        if level < 0.99 * described:
+            limit = f"at a flat top at {level:.4g}"
+        elif peak > 1.01 * described:  # commands, which the drive cuts
+            limit = f"at or beyond the described limit of {described:.4g}, up to {peak:.4g}"
         found.append(s.say("D05", "warn",
-                           f"{percent(share, 2)} of the torque samples lie at {limit} {s.unit('tau', j)}; "
+                           f"{percent(share, 2)} of the torque samples lie {limit} {s.unit('tau', j)}; "
                            "they are left out of fits",
                            signal="tau", joint=j, sample=int(s.good.kept[np.argmax(flags[:, j])]), gate=share > 0.05,
                            remedy="move slower or with less acceleration; a saturated drive hides what the arm needs"))

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from pipelines.errors import Check, clean
 from pipelines.log.doctor.checks import check_log
+from pipelines.log.doctor.checks_motion import degrees_or_motor
+from pipelines.log.doctor.checks_unit import torque_in_recipe
 from pipelines.log.experiment import ExperimentLog
 
 __all__ = ["examine"]
 
 # A glitch was recorded as it stands there: what to make of it is for whoever uses the log to decide.
 _KEPT = "RRID-D06"
+
+# What to do about it stands in the recipe, and not in a file that is not written yet.
+_IN_RECIPE = {"RRID-S05": torque_in_recipe(), "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf))}
 
 
 def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Check, ...]:
@@ -23,7 +30,7 @@ def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Chec
     found = []
     for check in check_log(replace(log, source=recording), ("RRID-S07",) if trust_units else ()):
         if check.level == "reject" or (check.level == "repair" and check.code != _KEPT):
-            raise check.as_error()
+            raise replace(check, remedy=_IN_RECIPE.get(check.code, check.remedy)).as_error()
         if check.code == _KEPT and check.level == "repair":
             words = check.message.removesuffix("; left out") + "; kept in the log, left out of fits"
             found.append(replace(check, level="warn", message=clean(words)))

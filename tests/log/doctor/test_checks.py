@@ -13,9 +13,9 @@ import pytest
 
 from pipelines.log.doctor.checks import CHECKS, LogCheck, NotTested, Subject, check_log, check_together
 from pipelines.log.doctor.checks_motion import limits, peak_speed
-from pipelines.log.doctor.faults import quantum, spikes, time_base
+from pipelines.log.doctor.faults import quantum, spikes, time_base, torque_limit
 from pipelines.log.files import Opened
-from pipelines.log.limits import sentinels
+from pipelines.log.limits import percent, sentinels
 from tests.faulty import healthy_without_reference, turning
 from tests.healthy import changed, good_log, healthy_logs, make_log, one_joint, rest, rows, stops, with_signal
 
@@ -35,7 +35,7 @@ def test_healthy_logs_are_silent(seed: int) -> None:
 def test_every_check_says_what_it_measured() -> None:
     codes = {c.code.removeprefix("RRID-") for c in check_log(good_log())}
     assert codes == {"T07", "S08", "T01", "T02", "T03", "T04", "T05", "T09", "D01", "D03", "D04", "D05", "D06", "D07",
-                     "D08", "S07", "D12",
+                     "D08", "S05", "S07", "D12",
                      "S16", "D11", "D10"}
 
 
@@ -64,6 +64,29 @@ def test_rounding_is_no_figure() -> None:
     messages = {c.code: c.message for c in check_log(good_log())}
     assert messages["RRID-T05"] == "the interval varies: rms below 0.001 %, at most below 0.001 % of the sample time"
     assert not [words for words in messages.values() if re.search(r"e-\d+ %", words)]
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.994, "99 %"), (0.996, "100 %"), (1.0, "100 %"), (0.051, "5.1 %"),
+                                              (4.56, "456 %"), (0.00012, "0.012 %")])
+def test_a_share_has_no_power_of_ten(share: float, said: str) -> None:
+    assert percent(share, 2) == said
+
+
+def test_commands_beyond_a_limit_are_not_said_to_lie_at_it() -> None:
+    """D05: a drive cuts what its controller commands beyond the limit; how far it went is said."""
+    log = good_log()
+    tau = np.where(np.abs(log.tau) > 0.9 * np.abs(log.tau).max(axis=0), 1.5 * np.sign(log.tau) * torque_limit(log), log.tau)
+    told = [c.message for c in check_log(with_signal(log, tau=tau)) if c.code == "RRID-D05"]
+    assert any("at or beyond the described limit of 30, up to 45 N m" in words for words in told), told
+
+
+def test_a_limit_that_is_passed_for_moments_is_no_wrong_unit() -> None:
+    """S05: a controller that winds up commands much, for a moment; a tenth of the samples far beyond is another unit."""
+    log = good_log()
+    for share, expected in ((0.05, "ok"), (0.2, "reject")):
+        many = np.where(np.arange(log.n_samples)[:, None] < share * log.n_samples, 20.0 * torque_limit(log), log.tau)
+        levels = {c.code: c.level for c in check_log(with_signal(log, tau=many))}
+        assert levels["RRID-S05"] == expected
 
 
 @pytest.mark.parametrize("share", [0.01, 0.03, 0.2])

@@ -1,0 +1,74 @@
+"""Check that torque is in the unit its log declares, and say how a file is told the unit that its numbers are in.
+
+A torque at its limit is clipped. One that stays far beyond a limit shows that unit or limit is not what the log says: no drive
+follows commands of many times what it can give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipelines.errors import Check
+from pipelines.log.doctor.checks_subject import NotTested, Subject
+from pipelines.log.doctor.faults import torque_limit
+from pipelines.log.experiment import Array
+from pipelines.log.units import UNITS
+
+__all__ = ["UNIT_CHECKS", "angles_in_file", "torque_in_recipe"]
+
+_OFTEN, _FAR = 0.9, 5.0  # quantile of a joint's |torque|, and times its limit: a controller that winds up gets there for moments
+_PEAK, _SLACK = 0.999, 1.1  # quantile, so that no glitch counts; times the limit, which a joint may pass a little
+_SMALL = 0.02  # of the limit: no arm uses less of its drives in all joints
+_SMALLER = {True: ("N cm", "N mm"), False: ("mN",)}  # units that give larger numbers, where a joint turns, and where it slides
+
+
+def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
+    """S05: torques declared in N m are in N m. Only limits of torque can tell."""
+    limit = torque_limit(s.log)
+    if "tau" not in s.log or not np.isfinite(limit).any():
+        return s.cannot_tell("S05", "the robot's description has no limits of torque", signal="tau")
+    often = _quantile(s.good.log.tau, _OFTEN) / limit
+    if not (often > _FAR).any():
+        return s.ok("S05", "torque is of the size that its limits allow", signal="tau")
+    j = int(np.argmax(often))
+    most = float((_quantile(s.good.log.tau, _PEAK) / limit).max())
+    fitting = [unit for unit in _SMALLER[s.log.robot.joints[j].revolute]
+               if _SMALL <= most * UNITS[unit].factor <= _SLACK]
+    factors = " or ".join(f"{unit} ({1.0 / UNITS[unit].factor:g} times too large)" for unit in fitting)
+    declared = s.unit("tau", j)
+    told = f"write so to the file: {_to_declare(s, 'tau', fitting[0])}; or " if fitting else ""
+    return [s.say("S05", "warn" if s.log.torque == "measured" else "reject",
+                  f"tau is declared in {declared}, but a tenth of joint {j + 1}'s samples are beyond "
+                  f"{often[j]:.0f} times its limit of {limit[j]:.4g} {declared}, which no drive gives: "
+                  f"{f'this looks like {factors}' if fitting else 'unit or limit is wrong'}",
+                  signal="tau", joint=j, gate=True,
+                  remedy=f"{told}correct the torque limits of the robot's description (--robot)")]
+
+
+def torque_in_recipe() -> str:
+    """S05's remedy where a recipe makes the log."""
+    return 'declare the unit of tau that its numbers are in, such as unit = "N mm", or correct the torque limits of the robot'
+
+
+def angles_in_file(s: Subject) -> str:
+    """S07's remedy for the file of a log."""
+    return (f"if degrees, write so to the file: {_to_declare(s, 'q', 'deg')} (likewise q_ref; dq, dq_ref: deg/s; ddq_ref: "
+            "deg/s^2); if of the motor side, import the recording anew with the gear ratios; if neither, correct the limits of the "
+            "robot's description (--robot)")
+
+
+def _to_declare(s: Subject, signal: str, unit: str) -> str:
+    if s.log.source.endswith(".parquet"):
+        return f'units = "{unit}" in the metadata of the columns {signal}_1, …, without the digest'
+    return f'attribute units = "{unit}" of /signals/{signal}, without the attribute digest of /'
+
+
+def _quantile(tau: Array, share: float) -> Array:
+    """(joints,) quantile of |tau|; zero where there is no sample."""
+    size = np.where(np.isfinite(tau), np.abs(tau), 0.0)
+    return np.quantile(size, share, axis=0) if len(size) else np.zeros(tau.shape[1])
+
+
+UNIT_CHECKS = (torque_unit,)
