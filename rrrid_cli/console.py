@@ -5,6 +5,7 @@ Results go to standard output, everything else to standard error, so that `--jso
 
 from __future__ import annotations
 
+import re
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -20,6 +21,8 @@ __all__ = ["Teller", "say_error", "say_outcome", "say_table", "say_verdict"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
 _MOST = 12  # remarks
+_LOGS = 30  # named for one remark
+_NUMBERS = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z_])")  # values; p3 and q_1 are names
 _HEADS = (12, 8, 6)  # characters: a heading is broken into lines no shorter than that; shorter ones where the table is too wide
 _WIDE = 80  # characters of the narrowest terminal that tables are made for
 
@@ -120,18 +123,31 @@ def _heading(words: str, width: int, tight: bool) -> list[str]:
 
 
 def _say_checks(checks: Iterable[Check], verbose: bool, stream: Any) -> None:
-    shown = [check for check in dict.fromkeys(checks) if verbose or check.level != "ok"]
-    seen: dict[tuple[str, str], int] = {}
-    for check in shown:
-        seen[check.code, check.message] = seen.get((check.code, check.message), 0) + 1
-    once = list({(check.code, check.message): check for check in shown}.values())
-    for check in once[:_MOST]:
-        more = seen[check.code, check.message] - 1
-        place = f"{check.where}{f' and {more} more' if more else ''}: " if check.where else ""
+    """What was found, what explains the most first; what differs in numbers alone, of several joints or logs, once."""
+    from pipelines.log.codes import first_to_read
+
+    alike: dict[tuple[str, str, str], list[Check]] = {}
+    for check in sorted(dict.fromkeys(checks), key=first_to_read):
+        if verbose or check.level != "ok":
+            alike.setdefault((check.code, check.level, _NUMBERS.sub("#", check.message)), []).append(check)
+    for group in list(alike.values())[:_MOST]:
+        check = group[0]
+        place = f"{check.where}: " if check.where else ""
         remedy = f" ({check.remedy})" if check.remedy else ""
         print(f"  {_SIGNS[check.level]} {check.code} {place}{check.message}{remedy}", file=stream)
-    if len(once) > _MOST:
-        print(f"  … {len(once) - _MOST} more in the report", file=stream)
+        if len(group) > 1:
+            print(f"      {_likewise(group)}", file=stream)
+    if len(alike) > _MOST:
+        print(f"  … {len(alike) - _MOST} more in the report", file=stream)
+
+
+def _likewise(group: Sequence[Check]) -> str:
+    """Where else a finding was made: "alike 5 times in all, in a.h5, b.h5; joints 1, 2"."""
+    logs = list(dict.fromkeys(check.where.split(", ")[0] for check in group if check.where))
+    joints = sorted({int(number) for check in group for number in re.findall(r", joint (\d+)", check.where)})
+    named = ", ".join(logs[:_LOGS]) + (f" and {len(logs) - _LOGS} more" if len(logs) > _LOGS else "")
+    where = f", in {named}" if logs else ""
+    return f"alike {len(group)} times in all{where}" + (f"; joints {', '.join(map(str, joints))}" if len(joints) > 1 else "")
 
 
 def say_error(problem: RrridError, *, as_json: bool) -> None:

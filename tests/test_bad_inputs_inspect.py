@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 
+from pipelines import inspect
+from pipelines.errors import Check
+from pipelines.log.codes import first_to_read
 from pipelines.log.files import write_log
+from pipelines.stage import Request, run_stage
 from tests.fault_table import FAULTS, Fault
-from tests.healthy import good_log
+from tests.healthy import good_log, with_signal
 from tests.rows.commanded import Command, command
 
 __all__ = ["command"]
@@ -43,6 +49,48 @@ def test_the_good_log_itself_is_in_order(tmp_path: Path, command: Command) -> No
     write_log(tmp_path / "log.h5", good_log())
     done = command("inspect", "log.h5", "--no-report", "--out", "out", "--check", "--strict")
     assert (done.exit, {c["level"] for c in done.object["checks"]}) == (0, {"ok"})
+
+
+@pytest.mark.parametrize(("row", "ways"), [("S05", ("units = \"N mm\" of /signals/tau", "--robot")),
+                                           ("S07", ("units = \"deg\" of /signals/q", "--robot"))])
+def test_a_remedy_names_only_what_the_command_has(row: str, ways: tuple[str, ...], tmp_path: Path, command: Command) -> None:
+    """S05, S07: of a log, what to do with its file, and no word of recipes; --trust-units where there is such an option."""
+    fault = next(f for f in FAULTS if f.row == row)
+    write_log(tmp_path / "log.h5", fault.make(good_log()))
+    told = [c["remedy"] for c in command("inspect", "log.h5", "--no-report", "--out", "out").told(row)]
+    error = command("diagnose", "log.h5", "--no-report", "--out", "other").error
+    assert error["code"] == f"RRID-{row}"
+    for remedy in (*told, error["remedy"]):
+        assert all(way in remedy for way in ways)
+        assert "declare" not in remedy
+        assert not remedy.endswith("…")
+    assert "--trust-units" not in error["remedy"]
+    assert ["--trust-units" in remedy for remedy in told] == [row == "S07"] * len(told)
+
+
+@pytest.mark.parametrize(("signal", "unit"), [("tau", "N mm"), ("q", "deg")])
+def test_the_repair_that_is_named_is_one(signal: str, unit: str, tmp_path: Path, command: Command) -> None:
+    """S05, S07: with the unit written to the file, and without the digest, the log is in order."""
+    fault = next(f for f in FAULTS if f.row == {"tau": "S05", "q": "S07"}[signal])
+    write_log(tmp_path / "log.h5", fault.make(good_log()))
+    with h5py.File(tmp_path / "log.h5", "r+") as file:
+        file[f"signals/{signal}"].attrs["units"] = unit
+        del file.attrs["digest"]
+    done = command("inspect", "log.h5", "--no-report", "--out", "out")
+    assert done.exit == 0
+    assert {c["code"] for c in done.object["checks"] if c["level"] != "ok"} == {"RRID-F05", "RRID-S06"}
+
+
+def test_a_late_torque_is_told_before_a_missing_digest(tmp_path: Path, command: Command) -> None:
+    """T06, F05: what spoils an identification comes first, in the verdict and in the list."""
+    write_log(tmp_path / "log.h5", with_signal(good_log(), tau=np.roll(good_log().tau, 40, axis=0)))
+    with h5py.File(tmp_path / "log.h5", "r+") as file:
+        del file.attrs["digest"]
+    checks = [Check(**c) for c in command("inspect", "log.h5", "--no-report", "--out", "out").object["checks"]]
+    found = sorted((c for c in checks if c.level != "ok"), key=first_to_read)
+    assert [found[0].code, found[-1].code] == ["RRID-T06", "RRID-F05"]
+    done = run_stage(inspect.STAGE, Request((tmp_path / "log.h5",), tmp_path / "out"), inspect.Settings())
+    assert "First of all: torque lies" in done.report.verdict
 
 
 def test_trusted_units_are_not_doubted(tmp_path: Path, command: Command) -> None:

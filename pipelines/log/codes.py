@@ -7,7 +7,11 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["CODES", "title_of"]
+from pipelines.errors import Check, Level
+
+__all__ = ["CODES", "first_to_read", "title_of"]
+
+_WORST_FIRST: Final[tuple[Level, ...]] = ("reject", "repair", "warn", "ok")
 
 CODES: Final[dict[str, str]] = {
     "C01": "unknown name in a configuration or recipe", "C02": "value out of bounds", "C03": "not a TOML file",
@@ -41,6 +45,17 @@ CODES: Final[dict[str, str]] = {
     "X05": "declares more than it can hold", "X06": "declares more than it can hold", "X07": "pickled objects",
     "X11": "link or name that leads elsewhere", "X12": "archive", "X13": "unsafe URDF", "Z70": "internal error",
 }
+
+
+def first_to_read(check: Check) -> tuple[bool, bool, int, int]:
+    """What findings are sorted by, the first to read first.
+
+    Columns in the wrong place, in the wrong unit or at the wrong time explain what else is found; what is said of a container
+    spoils no fit.
+    """
+    code = check.code.removeprefix("RRID-")
+    rank = 0 if code.startswith("S") or code == "T06" else 1 if code[:1] in ("T", "D") else 2
+    return check.level != "reject", not check.gate, rank, _WORST_FIRST.index(check.level)
 
 
 def title_of(code: str) -> str:

@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
+from pipelines.errors import Check
 from pipelines.report.report import Report, Table
 from pipelines.stage import Outcome
-from rrrid_cli.console import say_outcome, say_table
+from rrrid_cli.console import _say_checks, say_outcome, say_table
 
 TABLE = Table(("joint", "held-out torque error now [N m]", "cause"),
               ((1, 0.08783, "cogging"), (2, 1.2, "–"), (3, None, "no cause")))
@@ -74,3 +75,20 @@ def test_a_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     *above, told = capsys.readouterr().out.splitlines()
     assert told.split() == list(wide[0])
     assert [line.split() for line in above] == [["all", "of", "them"], ["one", "two", "[%]"]]
+
+
+def test_one_finding_of_several_logs_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+    """What differs in its numbers alone stands in one line, and the logs and joints in the next; what comes first goes first."""
+    late = [Check.of("T06", "warn", f"torque lies {38.5 + k} ± 1.2 samples behind", where=f"{name}.h5, signal tau")
+            for k, name in enumerate("ab")]
+    wide = [Check.of("S07", "reject", f"q of joint {j} is in degrees", where=f"{name}.h5, signal q, joint {j}", remedy="do it")
+            for name in "ab" for j in (1, 2)]
+    lost = [Check.of("D09", "warn", f"p{j} cannot be told", where="a.h5") for j in (1, 2)]
+    _say_checks([Check.of("F05", "warn", "no integrity data", where="a.h5"), *late, *lost, *wide], False, None)
+    assert capsys.readouterr().out.splitlines() == [
+        "  x RRID-S07 a.h5, signal q, joint 1: q of joint 1 is in degrees (do it)",
+        "      alike 4 times in all, in a.h5, b.h5; joints 1, 2",
+        "  ! RRID-T06 a.h5, signal tau: torque lies 38.5 ± 1.2 samples behind",
+        "      alike 2 times in all, in a.h5, b.h5",
+        "  ! RRID-D09 a.h5: p1 cannot be told", "  ! RRID-D09 a.h5: p2 cannot be told",
+        "  ! RRID-F05 a.h5: no integrity data"]
