@@ -14,7 +14,10 @@ from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.frf import Settings
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.files import Opened, open_log, write_log
+from pipelines.model.arm import Arm
 from pipelines.model.frf.result import Posture
+from pipelines.model.parameter import Parameter
+from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from sample_logs.bench_session import controllers_model, machine
 from tests.cli.commands import rrrid
@@ -111,6 +114,16 @@ def test_a_given_model_sets_what_is_expected(samples: Path) -> None:
     (posture,) = result.postures
     assert posture.expected_from == "given model"
     assert posture.level.value == pytest.approx(posture.expected_level, rel=0.01)
+
+
+def test_a_model_of_friction_alone_expects_nothing(samples: Path) -> None:
+    """Within `run`, where base parameters were refused, what is handed on has friction and no inertia: the controller's holds."""
+    opened = open_log(samples / "rrr-healthy/frf-1-1.h5")
+    (without,) = frf.compute(Inputs((opened,), label="logs"), QUICK).postures
+    body = rigid_body(opened.log.robot)
+    bare = Arm("bare", body, tuple(Parameter(one.name, 0.0, None, one.unit) for one in body.parameters))
+    (posture,) = frf.compute(Inputs((opened,), label="logs", material=bare), QUICK).postures
+    assert (posture.expected_from, posture.expected_level) == (without.expected_from, without.expected_level)
 
 
 def test_no_frf_log(samples: Path) -> None:

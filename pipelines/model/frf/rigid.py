@@ -32,14 +32,17 @@ def expected_rigid(measured: Measured, arm: Arm | None) -> Expected:
     """The level of acceleration to expect, and the inertia behind it."""
     turned = measured.first
     controllers = _controllers(turned)
-    model = arm if arm is not None else controllers
-    inertia = None if model is None else _inertia(model, turned)
-    source = "none" if model is None else "given model" if arm is not None else "controller's model"
+    inertia, source = None, "none"
+    for model, whose in ((arm, "given model"), (controllers, "controller's model")):
+        # a model of friction alone, as a run has where the base parameters were refused, knows of no inertia
+        if inertia is None and model is not None and (known := _inertia(model, turned)) > 0.0:
+            inertia, source = known, whose
     if turned.quantity == "tau":
         return Expected(None if inertia is None else 1.0 / inertia, inertia, source)
     if inertia is None:
         return Expected(1.0, None, source)
     theirs = _inertia(controllers, turned) if controllers is not None else inertia
+    theirs = theirs if theirs > 0.0 else inertia
     return Expected(theirs / inertia, inertia, source)
 
 
