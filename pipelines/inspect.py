@@ -20,6 +20,7 @@ from pipelines.errors import Check, Level, RrridError
 from pipelines.log.codes import first_to_read, title_of
 from pipelines.log.doctor.checks import NotTested, Subject, check_together, findings
 from pipelines.log.doctor.checks_subject import many
+from pipelines.log.doctor.columns_first import columns_first
 from pipelines.log.doctor.faults import quantum
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
@@ -124,6 +125,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         if len(previews) < _PREVIEWS and subject.sampled:
             previews.append(log_preview(subject))
     found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
+    if len({log.robot for log in logs}) == 1:
+        found = list(columns_first(found))
     return Result((*reading, *found), tuple(blind), len(reading), tuple(logs),
                   tuple(str(r.path) for r in inputs.rejected), tuple(previews))
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.errors import Check, InputRejected, Level, NothingMatched, UsageError, did_you_mean
+from pipelines.log.doctor.columns_first import columns_first
 from pipelines.log.files import expanded
 from pipelines.log.places import renamed, short_names, tilde
 from pipelines.log.results import decode, encode
@@ -190,6 +191,8 @@ def _computed(stage: Stage[Any, Any], settings: Any, inputs: Inputs, place: str,
         if isinstance(problem, UsageError) and place == stage.name:  # of several robots one does without what fits another
             raise
         told = tilde(renamed(problem.as_dict(), given.names)) | {"exit": problem.exit_code}
+        # what is an option of the stage's own command is a setting here
+        told["remedy"] = told["remedy"].replace("--allow-mismatch", f"--set {stage.name}.allow_mismatch=true")
         return given.store.keep(place, key, {"problem": told}, None, lambda folder: None), None
     about = {"exit": stage.exit_code(result, True), "problem": None,
              "checks": [tilde(renamed(check.as_dict(), given.names)) for check in stage.checks(result)]}
@@ -252,8 +255,8 @@ def _exit_code(result: Result, check: bool) -> int:
 
 def _checks(result: Result) -> tuple[Check, ...]:
     of = {group.name: f"{group.name}, " if result.runs else "" for group in result.groups}
-    return tuple(dataclasses.replace(check, where=f"{of[group.name]}{check.where}".removesuffix(", "))
-                 for group in result.groups for step in group.stages for check in step.checks)
+    return tuple(dataclasses.replace(check, where=f"{of[group.name]}{check.where}".removesuffix(", ")) for group in result.groups
+                 for check in columns_first(check for step in group.stages for check in step.checks))
 
 
 def _remakes(name: str) -> bool:

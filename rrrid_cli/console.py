@@ -126,10 +126,10 @@ def _say_checks(checks: Iterable[Check], verbose: bool, stream: Any) -> None:
     """What was found, what explains the most first; what differs in numbers alone, of several joints or logs, once."""
     from pipelines.log.codes import first_to_read
 
-    alike: dict[tuple[str, str, str], list[Check]] = {}
+    alike: dict[tuple[str, str], list[Check]] = {}
     for check in sorted(dict.fromkeys(checks), key=first_to_read):
         if verbose or check.level != "ok":
-            alike.setdefault((check.code, check.level, _NUMBERS.sub("#", check.message)), []).append(check)
+            alike.setdefault((check.code, _NUMBERS.sub("#", check.message)), []).append(check)
     for group in list(alike.values())[:_MOST]:
         check = group[0]
         place = f"{check.where}: " if check.where else ""

@@ -82,12 +82,17 @@ def _law_and_errors(joint: JointResult) -> str:
     words = f"{joint.name[:1].upper()}{joint.name[1:]}: {_plain(joint.law)}"
     if not judged.by:
         return words
-    with_, without = (_error(value) for value in (judged.velocity_error_with, judged.velocity_error_without))
-    return f"{words}, simulated speed off by {with_} {_speed_unit(joint)} rms ({without} without friction)"
+    with_, without, unit = judged.velocity_error_with, judged.velocity_error_without, _speed_unit(joint)
+    if with_ is None:
+        beside = ", with friction and without" if without is None else f" ({_off(without, unit)} without friction)"
+        return f"{words}; the simulation runs away{beside}"
+    beside = "without friction it runs away" if without is None else f"{format_number(without, 3)} without friction"
+    return f"{words}, simulated speed {_off(with_, unit)} ({beside})"
 
 
-def _error(value: float | None) -> str:
-    return "no end" if value is None else format_number(value, 3)
+def _off(error: float | None, unit: str) -> str:
+    """How far a simulated speed is from the measured one; None is no figure, but an arm that runs away."""
+    return "runs away from it" if error is None else f"off by {format_number(error, 3)} {unit} rms"
 
 
 def _speed_unit(joint: JointResult) -> str:
@@ -207,9 +212,9 @@ def _tables(joint: JointResult) -> tuple[Table, ...]:
 def _simulation_words(joint: JointResult) -> tuple[str, ...]:
     judged = joint.validation
     log = f"{judged.by}, {'which was held out' if judged.held_out else 'which was fitted too, for no log has role validate'}"
-    errors, unit = [_error(value) for value in (judged.velocity_error_with, judged.velocity_error_without)], _speed_unit(joint)
-    return (f"Simulated from its first sample under the torque of {log}: the speed is off by {errors[0]} {unit} rms with friction, "
-            f"by {errors[1]} {unit} without.",)
+    with_, without = (_off(value, _speed_unit(joint)) for value in (judged.velocity_error_with, judged.velocity_error_without))
+    return (f"Simulated from its first sample under the torque of {log}, beside the measured speed: {with_} with friction, "
+            f"{without} without.",)
 
 
 def _ladder_words(joint: JointResult) -> tuple[str, ...]:

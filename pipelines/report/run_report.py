@@ -47,17 +47,33 @@ def _title(result: Result) -> str:
 
 
 def _verdicts(group: Group) -> list[str]:
-    """What diagnosis says, then the extended model, then whatever is not in order; without these, what the last stage says.
+    """What diagnosis says, then the extended model, then what was refused, each reason once, or else whatever is not in order;
+    without these, what the last stage says.
 
     Of several robots or days each has its first answer there; the table of stages has the others.
     """
     done = [step for step in group.stages if step.result is not None]
     answers = [step for kind in (Diagnosis, Extension) for step in done if isinstance(step.result, kind)]
-    others = [step for step in group.stages if step not in answers and step.report.tone in ("attention", "bad")]
-    shown = [*answers, *others] or done[-1:]
+    refused = _refusals(group)
+    others = [step.report.verdict for step in group.stages if step not in answers and step.report.tone in ("attention", "bad")]
+    shown = [*(step.report.verdict for step in answers), *(refused or others)] or [step.report.verdict for step in done[-1:]]
     if group.name:
-        return [f"{group.name}: {step.report.verdict}" for step in shown[:1]]
-    return [step.report.verdict for step in shown]
+        return [f"{group.name}: {words}" for words in shown[:1]]
+    return shown
+
+
+def _refusals(group: Group) -> list[str]:
+    """Why stages were not done: one sentence for each reason and one for what to do, with the stages it stopped."""
+    reasons: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for step in group.stages:
+        if step.result is None and step.exit != NothingMatched.exit_code:
+            for check in step.checks:
+                reasons.setdefault((check.code, check.message), []).append((step.name, check.remedy))
+    found = []
+    for (_, message), stopped in reasons.items():
+        remedy = stopped[0][1].split("; ")[0]
+        found.append(f"Not done ({', '.join(name for name, _ in stopped)}): {message}. {remedy[:1].upper()}{remedy[1:]}.")
+    return found
 
 
 def _key_figures(steps: list[Step]) -> Table | None:

@@ -7,6 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from pipelines.errors import Check
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
@@ -103,3 +104,28 @@ def test_of_several_robots_each_has_one_sentence() -> None:
 
     assert run_report(Result((), (of("a"), of("b")))).verdict == "a: Cogging. b: Cogging."
     assert run_report(Result(of("").stages)).verdict == "Cogging. Better."
+
+
+def refused(stage: str, remedy: str) -> Step:
+    """A stage that a swapped log stopped."""
+    check = Check.of("S13", "reject", "columns 1,2 fit swapped", where="a.h5", remedy=remedy, gate=True)
+    return Step(stage, 3, None, Report(stage, f"Not done: {check.message}. {remedy}.", "bad"), (check,))
+
+
+def test_each_refusal_is_told_once_and_nothing_that_follows_from_it() -> None:
+    """The headline names the stages that one reason stopped, with one thing to do; the table of stages has the rest."""
+    steps = (Step("inspect", 1, object(), Report("Log doctor", "All should be looked at.", "attention"), ()),
+             Step("fit-friction", 0, object(), Report("Friction", "A law. " * 20, "bad"), ()),
+             *(refused(name, f"correct the map; if it is right, say --set {name}.allow_mismatch=true") for name in
+               ("estimate-bps", "diagnose")),
+             Step("frf", 5, None, Report("Responses", "Passed over: no frf log. Record one.", "neutral"),
+                  (Check.of("C06", "warn", "no frf log", remedy="record one"),)))
+    said = run_report(Result(steps))
+    assert said.verdict == "Not done (estimate-bps, diagnose): columns 1,2 fit swapped. Correct the map."
+    assert [row[1] for row in next(s for s in said.sections if s.title == "Stages").tables[0].rows] == [s.name for s in steps]
+
+
+def test_what_is_not_in_order_is_told_where_nothing_was_refused() -> None:
+    steps = (Step("inspect", 1, object(), Report("Log doctor", "All should be looked at.", "attention"), ()),
+             Step("reconstruct", 0, object(), Report("Motion", "Known.", "good"), ()))
+    assert run_report(Result(steps)).verdict == "All should be looked at."

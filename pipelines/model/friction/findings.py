@@ -30,8 +30,9 @@ def _sign(joint: JointFit, log: ExperimentLog) -> Check | None:
     if joint.fit.inertia > -_SURE * float(joint.fit.std[0]):
         return None
     return Check.of("S14", "warn", f"the inertia of joint {joint.logs.joint} comes out negative, {joint.fit.inertia:.3g}: torque "
-                    "and position have opposite signs", where=log.source or log.name, gate=True,
-                    remedy="turn the sign of this joint's torque or position in the import")
+                    "and position have opposite signs, or are of different joints", where=log.source or log.name, gate=True,
+                    remedy="let 'rrrid inspect' look at logs that move every joint: if it finds no columns mixed up, turn the sign "
+                           "of this joint's torque or position in the import")
 
 
 def _amperes(joint: JointFit, log: ExperimentLog) -> Check | None:

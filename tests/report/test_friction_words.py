@@ -1,0 +1,35 @@
+"""What a friction report says of a joint whose simulation has no error that a number could tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pipelines import fit_friction
+from pipelines.log.files import open_log
+from pipelines.model.friction.result import Result
+from pipelines.stage import Inputs
+
+
+@pytest.fixture(scope="module")
+def result(samples: Path) -> Result:
+    opened = open_log(samples / "rrr-closed-form/friction-3.h5")
+    return fit_friction.compute(Inputs((opened,), label="logs"), fit_friction.Settings(law="coulomb+viscous"))
+
+
+@pytest.mark.parametrize(("with_", "without", "said"), [
+    (None, None, "; the simulation runs away, with friction and without"),
+    (None, 2.0, "; the simulation runs away (off by 2 rad/s rms without friction)"),
+    (0.1, None, "simulated speed off by 0.1 rad/s rms (without friction it runs away)"),
+    (0.1, 2.0, "simulated speed off by 0.1 rad/s rms (2 without friction)")])
+def test_a_simulation_that_runs_away_is_said_to(with_: float | None, without: float | None, said: str, result: Result) -> None:
+    """An infinite error is no figure: the verdict and the section of the simulation say what happens."""
+    (joint,) = result.joints
+    judged = replace(joint.validation, velocity_error_with=with_, velocity_error_without=without)
+    told = fit_friction.report(replace(result, joints=(replace(joint, validation=judged),)))
+    assert said in told.verdict
+    words = next(" ".join(section.text) for section in told.sections if section.title.endswith(": simulation"))
+    assert ("runs away" in words) == (None in (with_, without))
+    assert "no end" not in told.verdict + words
