@@ -7,11 +7,13 @@ Source   causes.md for the causes; Kostić et al. 2004, eq. (4), (12)-(15), for 
 A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its size, where no
 held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the measured one. What gives way
 takes its numbers from frequency responses, a load from how the base parameters moved since the reference logs. What is not accepted
-is named with the reason; there is no way around it.
+is named with the reason; there is no way around it. A model that an earlier extension left in the default folder, and this one
+does not make anew, is moved beside it with its whole output: extend-cogging-2.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -175,5 +177,17 @@ def report(result: Extension) -> Report:
     return extension_report(result)
 
 
+def _other_model(result: Extension, folder: Path) -> str:
+    """The causes of the model that an earlier extension has left in `folder`, where this one does not make it anew: it has other
+    causes, or was not accepted. Nothing else says what that model was, and the next fit would have to find it again."""
+    try:
+        earlier = json.loads((folder / "result.json").read_text(encoding="utf-8"))["causes"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+    anew = result.model is not None and sorted(map(str, earlier)) == sorted(result.causes)
+    return "" if anew or not (folder / "model.json").is_file() else " ".join(one.replace(":", "-") for one in map(str, earlier))
+
+
 STAGE = Stage("extend", "Extend the model by named causes", Settings, compute, report, read, write,
-              lambda result, check: int(check and not result.accepted), lambda result: result.doctor, uses=Uses(before=True))
+              lambda result, check: int(check and not result.accepted), lambda result: result.doctor, uses=Uses(before=True),
+              spare=_other_model)

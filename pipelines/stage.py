@@ -27,7 +27,17 @@ from pipelines.log.atomic import environment_faults, replace_folder, staging_fol
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, expanded, hash_file
 from pipelines.log.inputs import Inputs, Rejected, Request, read_by_role, read_logs
-from pipelines.log.places import given_names, keep_apart, refuse_foreign, refuse_unwritable, renamed, short_names, slug, tilde
+from pipelines.log.places import (
+    free_name,
+    given_names,
+    keep_apart,
+    refuse_foreign,
+    refuse_unwritable,
+    renamed,
+    short_names,
+    slug,
+    tilde,
+)
 from pipelines.log.results import encode, json_text, write_series
 from pipelines.log.robot_files import robot_sources
 from pipelines.report.report import Report
@@ -83,6 +93,7 @@ class Stage(Generic[S, R]):
     in_run: S | None = None  # settings within `run`, where they are others than by default
     durations: Callable[[R], dict[str, float]] = lambda result: {}  # [s] of parts of compute, for provenance.json alone
     remakes: Callable[[str], bool] = lambda name: False  # own files that are made again where they were changed (P10)
+    spare: Callable[[R, Path], str] = lambda result, folder: ""  # names the earlier output in `folder` that must stay: "cogging-2"
     ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None  # told at the end; `finished`: not by a signal
 
 
@@ -167,13 +178,29 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
             _fill(staging, stage, result, report, object_, series, request, hashes)
             _unchanged(hashes)
             _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
+            moved = _spared(stage.spare(result, out), request, out)
             replace_folder(staging, out)
     except EnvironmentFault as problem:
         problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
         raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-    return Outcome(result, object_, report, out, stage.exit_code(result, request.check), renamed(checks, names))
+    return Outcome(result, object_, report, out, stage.exit_code(result, request.check), (*moved, *renamed(checks, names)))
+
+
+def _spared(name: str, request: Request, out: Path) -> tuple[Check, ...]:
+    """C05: an earlier output that this one does not make anew is not lost: by default it is moved beside `out` as a whole. Where
+    the user has named the folder, it is replaced as asked, and that is said."""
+    if not name:
+        return ()
+    if request.out is not None:
+        return (Check.of("C05", "warn", f"the earlier model there, of {name}, was replaced", where=out,
+                         remedy="give every model an --out of its own to keep them all"),)
+    aside = free_name(out.with_name(f"{out.name}-{slug(name)}"))
+    with environment_faults(aside):
+        os.replace(out, aside)
+    return (Check.of("C05", "warn", f"an earlier model lay there, of {name}; its whole output was moved to {aside}", where=out,
+                     remedy="none needed; --out chooses the folder"),)
 
 
 def _remade(changed: Iterable[str]) -> Iterable[Check]:

@@ -208,6 +208,26 @@ def _stage(compute: object, **more: object) -> Stage[_Nothing, _Nothing]:
                  **more)
 
 
+def test_an_output_that_is_not_made_anew_is_moved_or_named(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """C05: in the default folder an earlier model goes aside as a whole, twice under two names; a folder that the user has named is
+    replaced, and that is said."""
+    monkeypatch.chdir(logs.parent)
+    request = Request((logs,))
+    first = run_stage(_stage(lambda inputs, settings: _Nothing()), request, _Nothing())
+    kept = _contents(first.folder)
+    sparing = _stage(lambda inputs, settings: _Nothing(), spare=lambda result, folder: "cogging-2" if folder.exists() else "")
+    for name in ("convert-cogging-2", "convert-cogging-2-2"):
+        done = run_stage(sparing, request, _Nothing())
+        aside = first.folder.with_name(name)
+        assert (done.folder, (aside / "provenance.json").is_file()) == (first.folder, True)
+        assert [(c.code, str(aside) in c.message) for c in done.checks if c.level != "ok"] == [("RRID-C05", True)]
+    assert _contents(first.folder.with_name("convert-cogging-2")) == kept
+    for number in range(2):
+        named = run_stage(sparing, _request(logs), _Nothing())
+        assert ["was replaced" in c.message for c in named.checks if c.level != "ok"] == [True] * number
+    assert sorted(path.name for path in logs.parent.iterdir()) == ["logs", "out", "runs"]
+
+
 def test_an_input_that_changes_meanwhile_is_refused(logs: Path) -> None:
     """F14: the log is written over while the stage computes; nothing is left, not even a draft."""
 

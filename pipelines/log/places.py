@@ -16,8 +16,8 @@ from typing import Any
 from pipelines.errors import EnvironmentFault, UsageError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 
-__all__ = ["given_names", "keep_apart", "refuse_foreign", "refuse_unwritable", "renamed", "short_names", "slug", "tilde",
-           "written_by"]
+__all__ = ["free_name", "given_names", "keep_apart", "refuse_foreign", "refuse_unwritable", "renamed", "short_names", "slug",
+           "tilde", "written_by"]
 
 _ELSEWHERE = "choose another folder with --out"
 
@@ -72,6 +72,15 @@ def refuse_foreign(out: Path, force: bool = False, remade: Callable[[str], bool]
         raise UsageError("C05", f"holds files that were changed since rrrid wrote them: {', '.join(kept[:3])}", where=out,
                          remedy=f"{_ELSEWHERE}, or replace them with --force")
     return tuple(edited)
+
+
+def free_name(folder: Path) -> Path:
+    """`folder`, or the first of folder-2, folder-3, … that nothing has yet."""
+    number, free = 1, folder
+    while free.exists() or free.is_symlink():
+        number += 1
+        free = folder.with_name(f"{folder.name}-{number}")
+    return free
 
 
 def refuse_unwritable(out: Path) -> None:
