@@ -28,10 +28,14 @@ def clean(text: object, limit: int = 400) -> str:
     return line if len(line) <= limit else line[: limit - 1] + "…"
 
 
-def did_you_mean(word: str, known: Iterable[str], most: int = 1) -> str:
-    """A hint such as ", did you mean 'torque'?", with at most so many names; an empty string where nothing known is near."""
+def did_you_mean(word: str, known: Iterable[str], most: int = 1, near_by: float = 0.6) -> str:
+    """A hint such as ", did you mean 'torque'?", with at most so many names; an empty string where nothing known is near.
+
+    Args:
+        near_by: ratio of Ratcliff and Obershelp from which a name is near; 1: the same word.
+    """
     bare = {name.lstrip("-"): name for name in known}  # what every option begins with makes no two of them alike
-    near = [f"'{bare[name]}'" for name in difflib.get_close_matches(word.lstrip("-"), list(bare), n=most, cutoff=0.6)]
+    near = [f"'{bare[name]}'" for name in difflib.get_close_matches(word.lstrip("-"), list(bare), n=most, cutoff=near_by)]
     return f", did you mean {' or '.join(filter(None, (', '.join(near[:-1]), near[-1])))}?" if near else ""
 
 

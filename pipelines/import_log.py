@@ -44,7 +44,8 @@ _FINEST = 4.0  # times the recorded rate
 @dataclass(frozen=True)
 class Settings:
     """`recipe`: a TOML file or the name of a shipped one. `source`: folder of the recordings, default the recipe's own.
-    `map`: "q_1=Joint_1", columns named differently from the recipe. `trust_units`: radians are radians, however large."""
+    `map`: "q_1=Joint_1", columns named differently from the recipe. `trust_units`: units are what is declared, however large
+    the numbers."""
 
     recipe: str = ""
     source: Path | None = None

@@ -20,6 +20,7 @@ from pipelines.errors import Check, Level, RrridError
 from pipelines.log.codes import first_to_read, title_of
 from pipelines.log.doctor.checks import NotTested, Subject, check_together, findings
 from pipelines.log.doctor.checks_subject import many
+from pipelines.log.doctor.checks_unit import TRUSTED
 from pipelines.log.doctor.columns_first import columns_first
 from pipelines.log.doctor.faults import quantum
 from pipelines.log.experiment import ExperimentLog
@@ -42,7 +43,8 @@ _TRUST = "--trust-units"
 
 @dataclass(frozen=True)
 class Settings:
-    """`trust_units`: radians are radians, however large (S07). `allow_same`: one recording may have two roles (D14)."""
+    """`trust_units`: units are what the log says, however large the numbers (S05, S07). `allow_same`: one recording may have two
+    roles (D14)."""
 
     trust_units: bool = False
     allow_same: bool = False
@@ -132,8 +134,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
 
 def _with_way_out(item: Check | NotTested) -> Check | NotTested:
-    """S07 with the option that this command has for whoever knows better; within `run` there is none."""
-    if isinstance(item, NotTested) or item.code != "RRID-S07" or item.level != "reject":
+    """S05 and S07 with the option that this command has for whoever knows better; within `run` there is none."""
+    if isinstance(item, NotTested) or item.code not in TRUSTED or item.level != "reject":
         return item
     return replace(item, remedy=f"{item.remedy}; if all is right as it is, pass {_TRUST}")
 
@@ -149,7 +151,7 @@ def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings)
                             remedy="give the description of this robot, or choose the columns with --joints")
         return Subject(log), [mismatch]
     subject = Subject(log if robot is None else replace(log, robot_text=format_robot(robot)))
-    found = [*findings(subject, ("RRID-S07",) if settings.trust_units else ())]
+    found = [*findings(subject, TRUSTED if settings.trust_units else ())]
     if any(isinstance(item, Check) and item.level == "reject" for item in found):
         return subject, found
     twins = any(item.code == "RRID-S13" for item in found)

@@ -65,7 +65,8 @@ def test_a_remedy_names_only_what_the_command_has(row: str, ways: tuple[str, ...
         assert "declare" not in remedy
         assert not remedy.endswith("…")
     assert "--trust-units" not in error["remedy"]
-    assert ["--trust-units" in remedy for remedy in told] == [row == "S07"] * len(told)
+    assert told
+    assert all("--trust-units" in remedy for remedy in told)
 
 
 @pytest.mark.parametrize(("signal", "unit"), [("tau", "N mm"), ("q", "deg")])

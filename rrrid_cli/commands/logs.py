@@ -15,7 +15,7 @@ from rrrid_cli.options import Common, LogPaths, StageCommand, with_common_but
 __all__ = ["convert", "import_", "inspect"]
 
 
-TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Radians are radians, however large they are.")]
+TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Units are as declared, however large the numbers.")]
 AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
 
 

@@ -16,7 +16,9 @@ from pipelines.log.doctor.faults import torque_limit
 from pipelines.log.experiment import Array
 from pipelines.log.units import UNITS
 
-__all__ = ["UNIT_CHECKS", "angles_in_file", "torque_in_recipe"]
+__all__ = ["TRUSTED", "UNIT_CHECKS", "angles_in_file", "torque_in_recipe"]
+
+TRUSTED = ("RRID-S05", "RRID-S07")  # what is not asked where somebody vouches for the units
 
 _OFTEN, _FAR = 0.9, 5.0  # quantile of a joint's |torque|, and times its limit: a controller that winds up gets there for moments
 _PEAK, _SLACK = 0.999, 1.1  # quantile, so that no glitch counts; times the limit, which a joint may pass a little
@@ -67,8 +69,8 @@ def _to_declare(s: Subject, signal: str, unit: str) -> str:
 
 def _quantile(tau: Array, share: float) -> Array:
     """(joints,) quantile of |tau|; zero where there is no sample."""
-    size = np.where(np.isfinite(tau), np.abs(tau), 0.0)
-    return np.quantile(size, share, axis=0) if len(size) else np.zeros(tau.shape[1])
+    size = np.sort(np.where(np.isfinite(tau), np.abs(tau), 0.0), axis=0)
+    return np.asarray(size[round(share * (len(size) - 1))]) if len(size) else np.zeros(tau.shape[1])
 
 
 UNIT_CHECKS = (torque_unit,)

@@ -9,7 +9,7 @@ import numpy as np
 from pipelines.errors import Check, clean
 from pipelines.log.doctor.checks import check_log
 from pipelines.log.doctor.checks_motion import degrees_or_motor
-from pipelines.log.doctor.checks_unit import torque_in_recipe
+from pipelines.log.doctor.checks_unit import TRUSTED, torque_in_recipe
 from pipelines.log.experiment import ExperimentLog
 
 __all__ = ["examine"]
@@ -28,7 +28,7 @@ def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Chec
         InputRejected: what the doctor would reject, or would have to mend before use: the import should have.
     """
     found = []
-    for check in check_log(replace(log, source=recording), ("RRID-S07",) if trust_units else ()):
+    for check in check_log(replace(log, source=recording), TRUSTED if trust_units else ()):
         if check.level == "reject" or (check.level == "repair" and check.code != _KEPT):
             raise replace(check, remedy=_IN_RECIPE.get(check.code, check.remedy)).as_error()
         if check.code == _KEPT and check.level == "repair":

@@ -86,13 +86,13 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: Floored
     judge = first.held.judge if responded.parts else prepared.judge
     if judge is None or responded.judge is None or floored.noise is None:
         return done, responded, None
-    if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:
-        return done, responded, None  # what motion shows that the reference logs do not have, they may have had as well
     final = responded.final
     own = motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
                        floored.rms, chosen.seed)
     if own is None:
         return done, responded, None
+    if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:
+        return done, responded, own  # what motion shows that the reference logs do not have, they may have had as well
     plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
     believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved)
     return believed, responded if believed is done else judged(held, believed.found.final), own
