@@ -66,7 +66,7 @@ def refuse_unknown(text: str, where: str) -> None:
     """
     name = text.split(":")[0]
     if name not in effect_names():
-        near = did_you_mean(name, effect_names(), 3) or did_you_mean(name, effect_names(), 1, 0.5)
+        near = did_you_mean(name, effect_names(), 3) or did_you_mean(name, effect_names(), 3, 0.5)
         raise UsageError("C01", f"'{name}' is not a cause{near}", where=where,
                          remedy="'rrrid extend --help' lists all causes")
 
