@@ -20,8 +20,8 @@ _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the n
 
 def fewest(tried: Sequence[Tried]) -> Tried | None:
     """Of those at the joint of the best that leave nearly as little, one whose further number is worth it, else the one with
-    fewest; where the best is of the arm, of those at any joint; none where the best leaves no less."""
-    possible = [one for one in tried if one.error < 1.0 and one.possible]
+    fewest; where the best is of the arm, of those at any joint; none where the best leaves no less, held out or on a par."""
+    possible = [one for one in tried if max(one.error, one.rank) < 1.0 and one.possible]
     if not possible:
         return None
     best = possible[0]
