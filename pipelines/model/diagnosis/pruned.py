@@ -33,6 +33,7 @@ __all__ = ["Settled", "at_odds", "settled", "vague"]
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
 _ALIKE = 0.25  # of what a cause took away, that one for which it could be mistaken takes as well: weaker ones are no rivals
+_REST = 0.5  # of what the later of two takes, the earlier takes as well in a looser form: then it is the rest of that
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
 _SHAPE = "it only mends the shape of what was found before it at the joint"
@@ -218,11 +219,12 @@ def _turned(found: Found, kept: list[int], believed: list[int], case: Case) -> l
 
 
 def _mistaken(found: Found, earlier: int, later: int, case: Case) -> bool:
-    """Whether the later of two causes would have passed for the earlier one."""
+    """Whether the later of two causes would have passed for the earlier one, or is what the law of that leaves."""
     own, before = (found.final.model.effects[k].effect for k in (later, earlier))
     if before.joint != own.joint or not (own.name in before.twins or before.name in own.twins):
         return False
-    return imitated(found.steps[earlier], _family(case, own), case) > _ALIKE
+    rest = Family(before.name, before.joint, (before.looser(),))
+    return imitated(found.steps[earlier], _family(case, own), case) > _ALIKE or imitated(found.steps[later], rest, case) > _REST
 
 
 def _power(found: Found, rms: Array) -> float:

@@ -109,6 +109,10 @@ class Effect(ABC):
         """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
         return self
 
+    def looser(self) -> Self:
+        """A form with more numbers than any that is named: what it takes of a later finding is the rest of its own shape."""
+        return self
+
     def forms(self) -> tuple[Self, ...]:
         """Other laws of the same cause, each to be tried in place of this one, which is the most likely."""
         return ()

@@ -15,6 +15,7 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["Spring"]
 
 _DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
+_ANY = 11  # of what a polynomial leaves of a spring that hardens and gives way again
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …
 
 
@@ -61,6 +62,9 @@ class Spring(Effect):
 
     def full(self) -> Self:
         return replace(self, degree=self.highest)
+
+    def looser(self) -> Self:
+        return replace(self, degree=_ANY)
 
     def forms(self) -> tuple[Self, ...]:
         return (replace(self, degree=_MORE, highest=_MORE),) if self.highest == _DEGREE else ()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.diagnosis import chance, pruned
+from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
@@ -49,6 +50,21 @@ def test_a_twin_by_name_that_could_not_have_passed_for_the_earlier_is_one_of_its
     one, other = twins()
     found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.05, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
     assert pruned._apart(found, [0, 1], among(effect(other, 1))) == [0, 1]
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.9, [0]), (0.2, [0, 1])])
+def test_what_an_earlier_law_would_take_in_a_looser_form_is_the_rest_of_it(share: float, kept: list[int],
+                                                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two and a half waves beside a spring a hundred times as great: the polynomial with more terms takes as much of them."""
+    spring, waves = effect("spring", 1), effect("cogging", 1)
+    found = searched(left(0.5, 0.01, 0.01), (spring, left(0.05, 0.01, 0.01)), (waves, left(0.01, 0.01, 0.01)))
+
+    def taken(step: Any, family: Any, case: Any) -> float:
+        return share if step is found.steps[1] and family.shapes == (spring.looser(),) else 0.0
+
+    monkeypatch.setattr(pruned, "imitated", taken)
+    case = SimpleNamespace(families=(Family("cogging", 1, (waves,)),), judge=None, blocks=10)
+    assert pruned._apart(found, [0, 1], case) == kept
 
 
 @pytest.mark.usefixtures("alike")

@@ -1,0 +1,28 @@
+"""What a law with more numbers than is named can take of a finding made after it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipelines.model.effects.spring import Spring
+from tests.model.estimation.experiments import arm, motion_of
+
+
+@pytest.mark.parametrize(("waves", "rest"), [(1.5, True), (2.0, True), (5.0, False), (8.0, False)])
+def test_few_waves_beside_a_spring_are_its_curve_and_many_are_not(waves: float, rest: bool) -> None:
+    """Of what the spring that is named leaves of a wave, the looser one takes nearly all of two waves in the range and little of
+    five: a polynomial of degree n follows about n/π of them (Boyd 2001, ch. 2.13)."""
+    motion = motion_of(1)(np.arange(0.0, 10.0, 0.01))
+    q = motion.q[:, 1]
+    travel = float(np.ptp(q))
+    y = np.sin(2.0 * np.pi * waves * q / travel + 0.4)
+
+    def left(spring: Spring) -> float:
+        columns = np.polynomial.chebyshev.chebvander((q - q.min()) / travel * 2.0 - 1.0, spring.degree)
+        assert spring.columns(motion, arm())[:, 1].shape[1] == columns.shape[1]
+        return float(np.sum(np.square(y - columns @ np.linalg.lstsq(columns, y, rcond=None)[0])))
+
+    named = Spring(joint=2)
+    taken = 1.0 - left(named.looser()) / left(named)
+    assert taken > 0.5 if rest else taken < 0.5
