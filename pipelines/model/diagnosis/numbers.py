@@ -3,12 +3,14 @@
     parameters(done, place)         {"order": Value(18.0, 0.01, "1/rev"), …} of effect number `place`
 
 Covariance is that of all numbers of the model together, by the sandwich of `Refined.covariance`; what is reported follows from
-them to first order.
+them to first order. What follows mostly from a number that these logs do not tell from others is not known at all: ± ∞. The inertia
+of a motor that turns with the last two of parallel joints, say, is a part of theirs.
 """
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
@@ -27,7 +29,7 @@ def parameters(done: Refined, place: int, covariance: Array | None = None) -> di
     whole = done.covariance() if covariance is None else covariance
     index = done.of_effect(place)
     names = [done.names[k - len(done.model.beta)][2] for k in index]
-    own = whole[np.ix_(index, index)]
+    own, unseen = whole[np.ix_(index, index)], np.isin(index, done.unseen)
     here = _reported(one)
     slopes: dict[str, Array] = {name: np.zeros((len(value), len(names))) for name, value in here.items()}
     for k, name in enumerate(names):
@@ -38,6 +40,7 @@ def parameters(done: Refined, place: int, covariance: Array | None = None) -> di
     found = {}
     for key, value in here.items():
         std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes[key], own, slopes[key]), 0.0))
+        std = np.where(_untold(slopes[key], unseen), np.inf, std)
         plain = one.effect.reported(one.values)[key]
         unit = _unit(one, key, done.model.columns.body.robot.revolute)
         fixed = not slopes[key].any()
@@ -49,16 +52,16 @@ def parameters(done: Refined, place: int, covariance: Array | None = None) -> di
 
 
 def standard_deviations(done: Refined, place: int, covariance: Array) -> dict[str, float]:
-    """Of every parameter of effect number `place` that is fitted."""
+    """Of every parameter of effect number `place` that is fitted, and that these logs tell."""
     one = done.model.effects[place]
     index = done.of_effect(place)
     names = [done.names[k - len(done.model.beta)][2] for k in index]
-    own = covariance[np.ix_(index, index)]
+    own, unseen = covariance[np.ix_(index, index)], np.isin(index, done.unseen)
     here, found = one.values, {}
     moved = [number_moved(one, name, _step(one, name)).values for name in names]
     for key, value in here.items():
         slope = np.array([(there[key] - value) / _step(one, name) for there, name in zip(moved, names, strict=True)])
-        if slope.any() and np.isfinite(slope).all():
+        if slope.any() and np.isfinite(slope).all() and not _untold(slope, unseen):
             found[key] = float(np.sqrt(max(slope @ own @ slope, 0.0)))
     return found
 
@@ -69,6 +72,12 @@ def acting(done: Refined, place: int, covariance: Array) -> Acting:
     joint = one.effect.joint
     turning = joint is None or done.model.columns.body.robot.revolute[joint - 1]
     return Acting.of(one.effect, one.values, standard_deviations(done, place, covariance), revolute=turning)
+
+
+def _untold(slopes: Array, unseen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """(…,) of `slopes` (…, numbers): whether one of those `unseen` (numbers,) moves it more than all that are seen."""
+    size = np.abs(slopes)
+    return np.asarray(np.where(unseen, size, 0.0).max(axis=-1) > np.where(unseen, 0.0, size).max(axis=-1))
 
 
 def _reported(one: Named) -> dict[str, Array]:

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -71,9 +72,18 @@ class Refined:
         first = len(self.model.beta)
         return [first + k for k, (kind, which, _) in enumerate(self.names) if kind == 1 and which == place]
 
+    @cached_property
+    def unseen(self) -> list[int]:
+        """Which slopes, of effects, the others are as well: those numbers stay where they were, for these logs do not tell them."""
+        return _superfluous(self.slopes * self.weights, len(self.model.beta), self.names)
+
     def covariance(self) -> Array:
-        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for."""
-        return covariance(self.slopes * self.weights, self.residual)
+        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held."""
+        seen = np.ones(len(self.slopes), dtype=bool)
+        seen[self.unseen] = False
+        whole = np.zeros((len(seen), len(seen)))
+        whole[np.ix_(seen, seen)] = covariance((self.slopes * self.weights)[seen], self.residual)
+        return whole
 
 
 def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target: Array | None = None) -> Refined:
@@ -117,7 +127,7 @@ def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: flo
     """The step for every number. The others do without one that would leave its range, and stays at its end; without friction that
     would drive its joint; and without one of an effect that the rest of the model does as well: rounding would move it anywhere."""
     first = len(model.beta)
-    stuck = superfluous(table, [first + k for k, (kind, _, _) in enumerate(names) if kind == 1], _INVISIBLE)
+    stuck = _superfluous(table, first, names)
     shift = _without(table, y, ridge, stuck)
     beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
     held = driving(model.beta, shift, model.columns.laws)
@@ -129,6 +139,11 @@ def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: flo
             break
         held = sorted({*held, *more})
     return shift
+
+
+def _superfluous(table: Array, first: int, names: Sequence[Which]) -> list[int]:
+    """Of the numbers of effects, whose slopes stand behind the `first` of `table` (numbers, rows)."""
+    return superfluous(table, [first + k for k, (kind, _, _) in enumerate(names) if kind == 1], _INVISIBLE)
 
 
 def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
