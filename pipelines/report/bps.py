@@ -40,10 +40,10 @@ def torque_figure(name: str, caption: str, t: Array, measured: Array, model: Arr
 
 
 def draw_torques(axis: Axes, t: Array, measured: Array, model: Array, friction: Array, left: Array) -> None:
-    for values, label, color, width in ((measured, "measured", style.GREY, 1.6), (model, "model", style.BLUE, 0.9),
-                                        (friction, "friction", style.GREEN, 0.9),
-                                        (left, "left", style.VERMILLION, 0.9)):
-        axis.plot(*figures.envelope(t, values, 800), color=color, linewidth=width, label=label)
+    figures.draw_measured(axis, *figures.envelope(t, measured, 800))
+    figures.draw_modelled(axis, *figures.envelope(t, model, 800), "model")
+    for values, label, color in ((friction, "friction", style.GREEN), (left, "left", style.BLACK)):
+        axis.plot(*figures.envelope(t, values, 800), color=color, linewidth=0.9, label=label)
     axis.margins(x=0.01, y=0.08)
     axis.locator_params(axis="y", nbins=4)
 

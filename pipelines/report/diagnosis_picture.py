@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.model.diagnosis.result import Curve, Diagnosis, Evidence, Spectrum
 from pipelines.report import style
 from pipelines.report.diagnosis_words import floor_words
-from pipelines.report.figures import envelope, joint_axes, joint_size
+from pipelines.report.figures import draw_measured, draw_modelled, envelope, joint_axes, joint_size
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure, Section, Table
 from pipelines.report.sections import joint_signal_figure
@@ -96,8 +96,8 @@ def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:
 
 def _compared(axes: Sequence[Axes], one: Evidence, unit: str) -> None:
     for j, axis in enumerate(axes):
-        axis.plot(*envelope(one.t, one.measured[:, j]), color=style.SKY, linewidth=3.0, label="measured")
-        axis.plot(*envelope(one.t, one.predicted[:, j]), color=style.VERMILLION, linewidth=0.9, label="predicted")
+        draw_measured(axis, *envelope(one.t, one.measured[:, j]))
+        draw_modelled(axis, *envelope(one.t, one.predicted[:, j]), "predicted")
     _over_time(axes, f"torque [{unit}]")
 
 
@@ -106,7 +106,7 @@ def _simulated(axes: Sequence[Axes], one: Evidence, unit: str) -> None:
     assert t is not None  # no figure is made without
     assert nominal is not None
     for j, axis in enumerate(axes):
-        axis.plot(t, 1e3 * nominal[:, j], color=style.BLUE, linewidth=1.4, label="nominal model")
+        axis.plot(t, 1e3 * nominal[:, j], color=style.SKY, linewidth=2.4, label="nominal model")
         if extended is not None:
             axis.plot(t, 1e3 * extended[:, j], color=style.VERMILLION, linewidth=0.9, label="with the findings")
     _over_time(axes, f"simulated − measured [{unit}]")

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["draw_intervals", "draw_joint_signals", "draw_timeline", "envelope", "joint_axes", "joint_size",
-           "merge_spans", "true_spans"]
+__all__ = ["draw_intervals", "draw_joint_signals", "draw_measured", "draw_modelled", "draw_timeline", "envelope", "joint_axes",
+           "joint_size", "merge_spans", "true_spans"]
 
 Array = npt.NDArray[np.float64]
 Span = tuple[float, float]
@@ -113,6 +113,16 @@ def draw_joint_signals(axes: Sequence[Axes], t: Array, values: Array, unit: str,
         first = next(axis for axis, mask in zip(axes, flags.T, strict=True) if mask.any())
         first.fill_between([], [], color=style.ORANGE, alpha=0.35, label=printable(flag_name, 60))
         first.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0)
+
+
+def draw_measured(axis: Axes, t: Array, x: Array) -> None:
+    """What was measured, broad and light: a model that lies on it leaves its borders to be seen, and where it does not, both."""
+    axis.plot(t, x, color=style.SKY, linewidth=3.0, label="measured")
+
+
+def draw_modelled(axis: Axes, t: Array, x: Array, label: str) -> None:
+    """What a model says of it, thin and dark, over what was measured."""
+    axis.plot(t, x, color=style.VERMILLION, linewidth=0.9, label=label)
 
 
 def _line(axis: Axes, t: Array, x: Array, color: str, width: float) -> None:

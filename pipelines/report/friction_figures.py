@@ -79,8 +79,8 @@ def simulation_figure(name: str, caption: str, series: Series, revolute: bool) -
         for k, (title, q, dq) in enumerate(columns):
             for axis, measured, simulated, label in zip(grid[:, k], (series.q, series.dq), (q, dq), ("position", "speed"),
                                                         strict=True):
-                axis.plot(*figures.envelope(series.t, measured, 800), color=style.GREY, linewidth=2.4, label="measured")
-                axis.plot(*figures.envelope(series.t, simulated, 800), color=style.VERMILLION, linewidth=0.9, label="simulated")
+                figures.draw_measured(axis, *figures.envelope(series.t, measured, 800))
+                figures.draw_modelled(axis, *figures.envelope(series.t, simulated, 800), "simulated")
                 axis.margins(x=0.01, y=0.08)
                 axis.locator_params(axis="y", nbins=5)
                 if k == 0:

@@ -9,8 +9,7 @@ import numpy as np
 
 from pipelines.model.simulation.course import Course
 from pipelines.model.simulation.imitate import Imitation
-from pipelines.report import style
-from pipelines.report.figures import Array, joint_axes, joint_size
+from pipelines.report.figures import Array, draw_measured, draw_modelled, joint_axes, joint_size
 from pipelines.report.motion_figures import colour, draw_density
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.sections import joint_signal_figure
@@ -172,8 +171,8 @@ def _drawn(joints: int, t: Array, measured: Array, simulated: Array, unit: str, 
 def draw_compared(axes: Sequence[Axes], t: Array, measured: Array, simulated: Array, unit: str, quantity: str) -> None:
     """Measured (broad) under simulated (thin), one row a joint; both are envelopes (points, joints)."""
     for j, axis in enumerate(axes):
-        axis.plot(t, measured[:, j], color=style.SKY, linewidth=3.0, label="measured")
-        axis.plot(t, simulated[:, j], color=style.VERMILLION, linewidth=0.9, label="simulated")
+        draw_measured(axis, t, measured[:, j])
+        draw_modelled(axis, t, simulated[:, j], "simulated")
         axis.set_title(f"joint {j + 1}", pad=3.0)
         axis.margins(x=0.01, y=0.1)
         axis.locator_params(axis="y", nbins=4)
