@@ -139,7 +139,7 @@ WORDS: Final[dict[str, str]] = {
     # validate-writing
     "TorqueError.rms": "[N m] measured minus model",
     "Result.torque": "measured torque against that of the model; null: not validated",
-    "gates": "what has to hold, and whether it does", "cases": "the six control cases, Table IV of the paper",
+    "gates": "what has to hold, and whether it does", "cases": "the six control cases, Table IV of Kostić et al. 2004",
     "draws": "models drawn for the spread of the cases", "simulation_left_out": "why the task was not simulated; empty: it was",
     "imitation": "the task simulated with the model", "design": "the task that was designed; null: none was",
     "relative_error": "rms of what is missed over rms of the torque, joint by joint",

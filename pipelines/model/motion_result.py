@@ -31,15 +31,15 @@ _WHITE = 3.0  # standard deviations
 
 @dataclass(frozen=True)
 class ObserverResult:
-    """The Kalman observer of eq. (18)-(20). Every array is per joint."""
+    """The Kalman observer of Kostić et al. 2004, eq. (18)-(20). Every array is per joint."""
 
     order: int
     sample_time: float  # [s]
-    gains: Array  # (joints, order) k_i of eq. (20) [1, 1/s, 1/s², ...]
+    gains: Array  # (joints, order) k_i of Kostić et al. 2004, eq. (20) [1, 1/s, 1/s², ...]
     bandwidth_hz: Array  # -3 dB of the position
     measurement_std: Array  # [rad] √R
     jerk_std: Array  # [rad/s^order] σ, as tuned or as asked for
-    jerk_std_paper: Array  # the paper's first guess, the largest jerk of the reference
+    jerk_std_paper: Array  # the first guess of Kostić et al. 2004: the largest jerk of the reference
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class LogResult:
     innovation_whiteness: Array  # about standard normal where white; null for a joint that stands still
     innovation_correlation: Array  # rms of their autocorrelation over 30 lags
     innovation_verdict: tuple[str, ...]  # what that means
-    reconstruction_error_max: Array  # [rad] max |measured - reconstructed|, Fig. 10(a)
+    reconstruction_error_max: Array  # [rad] max |measured - reconstructed|
     reconstruction_error_rms: Array  # [rad]
     peak_speed: Array
     peak_acceleration: Array

@@ -147,7 +147,7 @@ def _parameter_section(result: Result) -> Section:
               "small beside parameters of its kind, the value may be zero. Barely: the value says little. Standard deviations "
               "allow for a residual whose samples depend on one another.")
     return Section("Parameters", (legend, *_described_words(result), *_rotor_words(result)),
-                   (Table(columns, tuple(rows), "Table V of the paper, with what each stands for"
+                   (Table(columns, tuple(rows), "As Table V of Kostić et al. 2004, with what each stands for"
                           f"{', and the value of the described links' if known else ''}.", tones),))
 
 

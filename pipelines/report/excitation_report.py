@@ -147,7 +147,7 @@ def _motion(result: Result) -> Section | None:
     if c is None:
         return None
     own = {quantity: format_unit(unit_of(result.limits, quantity)) for quantity in ("position", "speed", "acceleration", "torque")}
-    kinds = [("position", "positions", c.q, f"position [{own['position']}]", "Positions over one period, as Fig. 8 of the paper."),
+    kinds = [("position", "positions", c.q, f"position [{own['position']}]", "Positions over one period."),
              ("speed", "speeds", c.dq, f"speed [{own['speed']}]", "Speeds; dashed, limits that are near."),
              ("acceleration", "accelerations", c.ddq, f"acceleration [{own['acceleration']}]",
               "Accelerations; dashed, limits that are near.")]

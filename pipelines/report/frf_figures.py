@@ -47,7 +47,7 @@ def bode_figure(joint: int, drawn: Sequence[tuple[Posture, Mapping[str, Method]]
         grid[2, 0].set_ylabel("coherence")
         grid[0, -1].legend(loc="lower left", fontsize="small")
 
-    return Figure(f"bode-{joint}", f"Joint {joint}: input to position (Fig. 17), with 95 % bands. Vertical lines: resonances "
+    return Figure(f"bode-{joint}", f"Joint {joint}: input to position, with 95 % bands. Vertical lines: resonances "
                   f"(solid) and antiresonances (dashed). Grey: coherence under {COHERENCE:g}, not reliable.", draw, (6.4, 5.6))
 
 
@@ -91,7 +91,7 @@ def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Meth
 
 
 def _label(name: str) -> str:
-    return {"closed-loop": "Φvq/Φvu (default)", "indirect": "indirect, (29)", "direct": "direct"}[name]
+    return {"closed-loop": "Φvq/Φvu (default)", "indirect": "indirect", "direct": "direct"}[name]
 
 
 def _phase(value: np.ndarray) -> Array:  # type: ignore[type-arg]

@@ -186,8 +186,8 @@ def _beside(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method]]
                   tuple(tones))
     tables = [table, *_continuous(postures)]
     text = ("Default: cross spectra of the excitation with position and with input. No disturbance biases their quotient, and it "
-            "needs no controller. Indirect: by the sensitivity, eq. (29), with the controller as it was sampled. Direct: input to "
-            "position.",)
+            "needs no controller. Indirect: by the sensitivity (Kostić et al. 2004, eq. (29)), with the controller as it was "
+            "sampled. Direct: input to position.",)
     return Section("Three methods", text, tuple(tables), (), warning)
 
 
@@ -203,7 +203,7 @@ def _continuous(postures: Iterable[Posture]) -> list[Table]:
             for p in postures if p.continuous]
     if not rows:
         return []
-    return [Table(("joint", "posture", "error of (29) with a continuous controller"), tuple(rows),
+    return [Table(("joint", "posture", "error of the indirect method with a continuous controller"), tuple(rows),
                   "What k_p + k_d jω in the place of the sampled controller would have cost. It is not used.")]
 
 

@@ -151,7 +151,8 @@ def _summary(result: Result) -> Section:
         rows.append((f"gravity, {name}", *(None if v is None else with_std(v.value, v.std) for v in found), unit))
         meanings.append((f"gravity, {name}", _GRAVITY[name]))
     text = ("Compare curves, not labels: several sets of numbers give one curve.",)
-    table = Table(("parameter", *(joint.name for joint in result.joints), "unit"), tuple(rows), "Table III: value ± std.")
+    table = Table(("parameter", *(joint.name for joint in result.joints), "unit"), tuple(rows),
+                  "As Table III of Kostić et al. 2004: value ± std.")
     return Section("Parameters", text, (table, Table(("parameter", "what it is"), tuple(meanings))))
 
 
@@ -160,8 +161,8 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
     curve = curve_figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law, {_band(joint)}; the points pair torques at equal "
                          "position and opposite speed and know of no law.", joint.series, revolute)
     parts = fraction_figure(f"fractions-{joint.joint}", f"{joint.name}: torque of {joint.validation.by} and its fractions in the "
-                            "simulation (Fig. 5).", joint.series, revolute)
-    simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion (Fig. 6). Gravity is "
+                            "simulation.", joint.series, revolute)
+    simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion. Gravity is "
                                   "compensated at the measured position.", joint.series, revolute)
     alone = (Section(f"{joint.name}: simulation", _simulation_words(joint), (), (simulated, parts)),) if joint.validation.by else ()
     return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *alone,

@@ -81,7 +81,7 @@ def _alarm(logs: Sequence[LogResult], far: Sequence[LogResult]) -> tuple[str, ..
     worst = max(far, key=lambda log: max(log.reconstruction_error_max[j - 1] for j in straying(log)))
     joint = max(straying(worst), key=lambda j: float(worst.reconstruction_error_max[j - 1]))
     limit, noise = float(alarm(worst)[joint - 1]), float(worst.observer.measurement_std[joint - 1])
-    allowed = "the paper calls good enough" if limit == ALARM else "its steps allow for"
+    allowed = "Kostić et al. 2004 stay below" if limit == ALARM else "its steps allow for"
     chance = float(worst.reconstruction_error_max[joint - 1]) < _CHANCE * noise
     why = f", as an encoder with noise of {format_number(noise, 2)} rad does" if chance else ""
     more = f"; in {len(far)} of {len(logs)} logs a joint strays" if len(far) > 1 else ""
@@ -129,8 +129,8 @@ def _explanation(logs: Sequence[LogResult]) -> Section:
     doubtful = sum(bool(coloured(log)) for log in logs)
     text = ["The observer takes each joint for a chain of integrators that random jerk drives. The encoder's resolution and its "
             "samples say how noisy it is; the jerk is the one that predicts the next sample best, unless it was asked for. The "
-            "paper's rule, the largest jerk of the reference, is a first guess and filters hardly at all. Positions alone are "
-            "asked: whether the torque belongs to them is for inspect and estimate-bps to say."]
+            "rule of Kostić et al. 2004, the largest jerk of the reference, is a first guess and filters hardly at all. Positions "
+            "alone are asked: whether the torque belongs to them is for inspect and estimate-bps to say."]
     if logs[0].smoother is not None:
         text.append("The smoother sees both sides of a sample and needs far less jerk. Near the ends of a log and over long gaps "
                     "it takes the observer's, because there it has to look ahead as well.")
@@ -172,7 +172,7 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
     columns |= {f"k{i + 1} [{('1', '1/s', '1/s^2', '1/s^3')[i]}]": o.gains[:, i].tolist() for i in range(o.order)}
     columns |= {"bandwidth [Hz]": o.bandwidth_hz.tolist(), f"encoder noise [{unit}]": o.measurement_std.tolist(),
                 f"jerk σ [{unit}/s^{o.order}]": o.jerk_std.tolist(),
-                f"paper's rule [{unit}/s^{o.order}]": o.jerk_std_paper.tolist(), "correlation": log.innovation_correlation.tolist()}
+                f"largest jerk [{unit}/s^{o.order}]": o.jerk_std_paper.tolist(), "correlation": log.innovation_correlation.tolist()}
     known: dict[str, Sequence[float]] = {"joint": range(1, len(log.units) + 1)}
     if log.smoother is not None:
         known |= {f"smoother's σ [{unit}/s^{o.order}]": log.smoother.jerk_std.tolist(),
@@ -180,9 +180,9 @@ def _tables(log: LogResult) -> tuple[Table, ...]:
     known |= {f"error, largest [{unit}]": log.reconstruction_error_max.tolist(),
               f"rms [{unit}]": log.reconstruction_error_rms.tolist(), f"std q [{unit}]": log.position_std.tolist(),
               f"std dq [{unit}/s]": log.speed_std.tolist(), f"std ddq [{unit}/s^2]": log.acceleration_std.tolist()}
-    tables = (_table(columns, "The observer, eq. (20). Correlation: of an innovation with the 30 before it, rms; 0 where they are "
-                     f"white. Below {SLIGHT:g} it changes a variance by less than a tenth, and the standard deviations hold; a "
-                     "short log shows some by chance."),
+    tables = (_table(columns, "The observer of Kostić et al. 2004, eq. (20). Correlation: of an innovation with the 30 before it, "
+                     f"rms; 0 where they are white. Below {SLIGHT:g} it changes a variance by less than a tenth, and the standard "
+                     "deviations hold; a short log shows some by chance."),
               _table(known, "The motion it leads to; std: standard deviation in the middle of all samples."))
     return tables if log.noise_floor is None else (*tables, _floor_table(log, log.noise_floor))
 
@@ -242,6 +242,6 @@ def _bode(o: ObserverResult, name: str) -> Figure:
                   [np.asarray(s**i) for i in range(len(response))])
 
     widths = ", ".join(f"{format_number(hz, 3)}" for hz in o.bandwidth_hz)
-    return Figure(name, f"What the observer does to a measured position, eq. (20): it passes it up to {widths} Hz (-3 dB, joint by "
+    return Figure(name, f"What the observer does to a measured position: it passes it up to {widths} Hz (-3 dB, joint by "
                   "joint), and differentiates below that like the dotted line; above, noise is held back instead of amplified.",
                   draw, (6.0, 1.9 * len(response) + 0.4), alt="Bode plot of the Kalman observer")

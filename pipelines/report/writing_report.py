@@ -108,8 +108,8 @@ def _torque_section(result: Result) -> Section:
     filtered = f" Low-passed: both after the same zero-phase low-pass, at {span} Hz." if cutoffs else ""
     table = Table(columns, tuple(rows), "Root mean squares in N m (N of a joint that slides): the measured torque, what the model "
                   "leaves of it, and the parts of the model.")
-    text = ("The torque that the controller commanded, beside the torque of the model on the motion that was realised (Fig. 14 of "
-            "the paper). A command also holds what the controller makes of encoder steps and noise, which no model has."
+    text = ("The torque that the controller commanded, beside the torque of the model on the motion that was realised. A command "
+            "also holds what the controller makes of encoder steps and noise, which no model has."
             f"{filtered}",)
     drawn: list[Figure] = []
     for log in [one for one in result.logs if one.course is not None][:1]:
@@ -198,7 +198,7 @@ def _cases_section(result: Result) -> Section:
         tone: Tone = "neutral" if one.case != 6 or result.gates.cases is None else "good" if result.gates.cases else "bad"
         tones.append(tone)
     table = Table(("case", "ahead of the feedback", "x [mm]", "y [mm]", "z [mm]", "case 1 over it, x, y, z", "origin", "log"),
-                  tuple(rows), "Standard deviation of the tip's error (Table IV of the paper).", tuple(tones))
+                  tuple(rows), "Standard deviation of the tip's error, as Table IV of Kostić et al. 2004.", tuple(tones))
     figure = executed_figure(result.cases)
     return Section("Control cases: the second validation", tuple(text), (table,), () if figure is None else (figure,))
 

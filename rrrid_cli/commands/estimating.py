@@ -22,7 +22,7 @@ AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One record
 def fit_friction(
     common: Common, roles: Roles, logs: SomeLogs = None,
     law: Annotated[str | None, typer.Option(help="Law to fit, as the ladder names it. [the simplest that is not worse]")] = None,
-    method: Annotated[str | None, typer.Option(help="varpro, output-error, or ekf (the paper's). [varpro]")] = None,
+    method: Annotated[str | None, typer.Option(help="varpro, output-error, or ekf (Kostić et al. 2004). [varpro]")] = None,
     window: Annotated[float | None, typer.Option(help="Windows of the equations [s]. [0.02]")] = None,
 ) -> None:
     """Fit the friction law of each joint that was driven alone, and choose it."""
@@ -36,7 +36,7 @@ def fit_friction(
 def reconstruct(
     logs: LogPaths, common: Common,
     method: Annotated[str | None, typer.Option(help="smoother, observer, zero-phase or central-differences. [smoother]")] = None,
-    order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
+    order: Annotated[int | None, typer.Option(help="Integrators in the observer: 2, 3 (Kostić et al. 2004) or 4. [4]")] = None,
     jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk [rad/s^order]: one, or one a joint. [as data say]")] = None,
     bandwidth: Annotated[list[str] | None, typer.Option(help="Bandwidth [Hz], instead of jerk: one, or one a joint.")] = None,
     average: Average = None,
@@ -53,7 +53,7 @@ def reconstruct(
 def estimate_bps(
     common: Common, roles: Roles, logs: SomeLogs = None,
     method: Annotated[str | None, typer.Option(help="Motion by smoother, observer, zero-phase or central-differences.")] = None,
-    order: Annotated[int | None, typer.Option(help="Integrators of the observer's model: 2, 3 (the paper's) or 4. [4]")] = None,
+    order: Annotated[int | None, typer.Option(help="Integrators in the observer: 2, 3 (Kostić et al. 2004) or 4. [4]")] = None,
     jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk [rad/s^order]: one, or one a joint. [as data say]")] = None,
     bandwidth: Annotated[list[str] | None, typer.Option(help="Bandwidth [Hz], instead of jerk: one, or one a joint.")] = None,
     average: Average = None,
@@ -62,7 +62,7 @@ def estimate_bps(
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
     symmetric: Annotated[bool | None, typer.Option("--symmetric", help="RRR arm, mirror-symmetric links: p4 = p15 = 0.")] = None,
-    unweighted: Annotated[bool, typer.Option("--unweighted", help="Weigh all joints alike, as eq. (15).")] = False,
+    unweighted: Annotated[bool, typer.Option("--unweighted", help="Weigh all joints alike, as Kostić et al. 2004.")] = False,
     model: Annotated[str | None, typer.Option(help="model.json whose friction is subtracted, not fitted.")] = None,
     allow_same: AllowSame = None,
     allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Fit torque that looks misplaced.")] = None,

@@ -91,7 +91,8 @@ def frf(
     low: Annotated[float | None, typer.Option(help="Modes are looked for from here [Hz]. [4]")] = None,
     high: Annotated[float | None, typer.Option(help="To here [Hz]. [250, or 0.3 of the rate]")] = None,
     model: Annotated[str | None, typer.Option(help="model.json whose inertia is expected. [the controller's own]")] = None,
-    posture: Annotated[list[str] | None, typer.Option(help="Postures to draw, by their numbers: 1,3. [the paper's two]")] = None,
+    posture: Annotated[list[str] | None, typer.Option(help="Postures to draw, by their numbers: 1,3. "
+                                                             "[nearest to the two of Kostić et al. 2004]")] = None,
 ) -> None:
     """Measure frequency responses, and say what gives way: base, joint, delay, or nothing."""
     from pipelines.frf import STAGE

@@ -26,7 +26,7 @@ class Result:
     joints: tuple[str, ...]
     torque_units: tuple[str, ...]  # per joint: "N m", or "N" of a prismatic one
     parameters: tuple[Estimated, ...]
-    condition_number: float  # of Φ in (13): rigid columns, unweighted, SI
+    condition_number: float  # of Φ in Kostić et al. 2004, eq. (13): rigid columns, unweighted, SI
     condition_number_fit: float  # of the weighted columns at unit length
     rank: int
     relative_error: dict[str, float]  # identify, validate

@@ -145,7 +145,8 @@ def _described(log: ExperimentLog) -> tuple[int, str]:
         return log.joint, "tau"
     if "r" not in log:
         raise InputRejected("S01", f"an frf log under '{law}' without r, the input of the plant", where=where,
-                            remedy="record r, eq. (25)-(27); under PD say so in /controller, torque is the input then")
+                            remedy="record r, the acceleration asked of the model (Kostić et al. 2004, eq. (25)-(27)); under PD "
+                                   "say so in /controller, torque is the input then")
     return log.joint, "r"
 
 

@@ -100,7 +100,7 @@ class Posture:
     fit: Curve  # the rational function at the same frequencies
     compliance: Curve  # τ → q [rad/(N m)]
     with_reversal: Curve | None  # input → q of the whole log
-    continuous: Mapping[str, float]  # [Hz] as text -> error of (29) with the controller taken as continuous; share
+    continuous: Mapping[str, float]  # [Hz] as text -> error of the indirect method with the controller taken as continuous; share
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Validation:
-    """Root mean square errors of the simulated speed [rad/s], Fig. 6."""
+    """Root mean square errors of the simulated speed [rad/s]: Kostić et al. 2004, Fig. 6."""
 
     velocity_error_with: float | None  # None: the simulation ran away
     velocity_error_without: float | None
