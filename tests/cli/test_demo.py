@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import fields
@@ -46,6 +47,16 @@ def test_logs_and_what_was_hidden(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "demo/run/result.json").read_text())["stages"][0]["name"] == "inspect"
     refused = rrrid("demo", *QUICK, "--fault", "quadratic_dog:3", cwd=tmp_path)
     assert (refused.returncode, "quadratic_drag" in refused.stderr) == (2, True)
+
+
+def test_a_checkout_stays_clean(tmp_path: Path) -> None:
+    """The README's command, said inside a checkout, leaves nothing that git would take for work."""
+    shutil.copy(REPO / ".gitignore", tmp_path)
+    subprocess.run(["git", "init", "--quiet", tmp_path], check=True)
+    assert rrrid("demo", *QUICK, cwd=tmp_path).returncode == 0
+    assert (tmp_path / "demo").is_dir()
+    said = subprocess.run(["git", "status", "--porcelain"], cwd=tmp_path, text=True, capture_output=True, check=True).stdout
+    assert said.split() == ["??", ".gitignore"]
 
 
 def test_without_mujoco_and_network(tmp_path: Path) -> None:
