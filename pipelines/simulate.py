@@ -45,7 +45,7 @@ class Settings:
     noise: tuple[float, ...] = ()  # [N m] std of the drives' torque noise: one, or one a joint
     windowed: bool = False
     window: float = 0.1  # [s]
-    steps: int | None = None  # of the integrator, a sample; None: as few as the error allows
+    steps: int | None = None  # of the integrator, a sample, the body held in none; None: as few as the error allows
 
     @property
     def how(self) -> How:

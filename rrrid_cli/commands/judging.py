@@ -38,7 +38,7 @@ def simulate(
         help="Torque noise of the drives, std [N m], one or one a joint: 0.02,0.01,0.005. Windows have none. [0]")] = None,
     windowed: Annotated[bool | None, typer.Option("--windowed", help="In short windows, though the controller is known.")] = None,
     window: Annotated[float | None, typer.Option(help="Length of such a window [s]. [0.1]")] = None,
-    steps: Annotated[int | None, typer.Option(help="Integrator steps a sample. [as few as the error allows]")] = None,
+    steps: Annotated[int | None, typer.Option(help="Runge-Kutta steps a sample; 1 to 1000. [as few as the error allows]")] = None,
 ) -> None:
     """Simulate a model as a log's experiment would have it, optionally with a fault."""
     from pipelines.simulate import STAGE

@@ -43,7 +43,7 @@ class How:
     noise: tuple[float, ...] = ()  # [N m] std of the drives' torque noise: one, or one a joint; none
     windowed: bool = False  # although the controller is known
     window: float = 0.1  # [s]
-    steps: int | None = None  # of the integrator, a sample; None: as few as the error allows
+    steps: int | None = None  # of the integrator, a sample, the body held in none; None: as few as the error allows
 
     def check(self, n_joints: int) -> None:
         """Raises: UsageError, C02: a setting that does not fit."""
@@ -131,7 +131,7 @@ def _closed_loop(log: ExperimentLog, bare: ExperimentLog, plant: Plant, experime
     noise = _noise(how, log.n_joints)
     step = choose_step(plant, experiment, noise) if how.steps is None else None
     done = run(plant, experiment, step.per_sample if step else how.steps or 1, noise, range(how.seed, how.seed + how.replicas),
-               step is not None and step.exact)
+               step is None or step.exact)  # who asks for steps asks for their accuracy: a held body would stop short of it
     files = tuple(file if k == 0 else f"{file}-{k + 1}" for k in range(how.replicas))
     logs = tuple(_simulated_log(bare, done, k, settings) for k in range(how.replicas))
     about = _About(log, files, "closed-loop", "", how.replicas, done.steps, step, None, logs)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipelines.log.experiment import Controller
-from pipelines.model.rigid.body import Array
+from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.simulation import Experiment, Noise, choose_step
+from pipelines.model.simulation.imitate import How, imitate
 from pipelines.model.simulation.integrate import HeldBody
 from pipelines.model.simulation.plant import Plant
 from pipelines.model.simulation.replicas import run_together
+from pipelines.model.writing.planned import planned_log
 from tests.model.simulation.arms import TS, Case, rrr, serial
 from tests.model.simulation.pinocchio_loop import Loop
 from tests.model.simulation.test_forward_dynamics import follow, offsets
@@ -58,6 +61,19 @@ def swinging(case: Case, samples: int) -> Experiment:
     none = np.zeros(case.n)
     return Experiment(sample_time=TS, start_time=0.0, controller=pd, q_ref=q, dq_ref=dq, ddq_ref=ddq, q0=q[0], dq0=dq[0], tau0=none,
                       resolution=none)
+
+
+def test_steps_that_are_asked_for_hold_nothing(shared: Path, tmp_path: Path) -> None:
+    """Each of them is Runge-Kutta of order 4: 1 a sample is nearer to 4 than 1 that hold the body ever come."""
+    case = serial("tx40", shared, tmp_path)
+    asked = swinging(case, 250)
+    plan = planned_log("swing", case.arm.robot, Motion(TS * np.arange(250), asked.q_ref, asked.dq_ref, asked.ddq_ref))
+    log = replace(plan, controller=asked.controller)
+    one, four = (imitate(log, case.arm, How(steps=steps), "swing").logs[0].q for steps in (1, 4))
+    held = run_together(Plant.of(case.arm), [Experiment.of_log(log)], 1)[0].q[0]
+    far, near = (float(np.abs(found - four).max()) for found in (held, one))
+    assert far > 1e-8
+    assert near < 0.1 * far
 
 
 @pytest.mark.parametrize(("noise", "exact"), [(0.0, True), (0.01, True), (1.0, False)])
