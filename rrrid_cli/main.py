@@ -19,7 +19,7 @@ from pipelines.errors import Interrupted, RrridError
 from pipelines.log.atomic import fault_of
 from rrrid_cli.commands import app
 from rrrid_cli.console import say_error
-from rrrid_cli.usage import WrongUsage, as_error
+from rrrid_cli.usage import WrongUsage, as_error, as_given
 
 __all__ = ["entry"]
 
@@ -43,7 +43,7 @@ def entry() -> NoReturn:
         _deaf()
         if debug:
             raise
-        error = problem.as_error() if isinstance(problem, Interrupted) else problem
+        error = problem.as_error() if isinstance(problem, Interrupted) else as_given(problem, sys.argv[1:])
         say_error(error, as_json=as_json)
         if isinstance(problem, Interrupted):
             _leave(error.exit_code)

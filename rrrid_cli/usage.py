@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any, Final
 
 import typer
 
-from pipelines.errors import UsageError, did_you_mean
+from pipelines.errors import RrridError, UsageError, did_you_mean
 
-__all__ = ["WrongUsage", "as_error"]
+__all__ = ["WrongUsage", "as_error", "as_given"]
 
 # typer has carried its own copy of click since 0.26: the class is asked of typer, whichever copy that uses.
 WrongUsage: Final[Any] = typer.BadParameter.__mro__[1]
@@ -33,3 +36,22 @@ def as_error(problem: Any) -> UsageError:
         word = words.split("'")[1]
         return UsageError("C01", f"no such command '{word}'{did_you_mean(word, commands)}", where=command, remedy=remedy)
     return UsageError("C02", f"{words[:1].lower()}{words[1:]}", where=command, remedy=remedy)
+
+
+def as_given(problem: RrridError, words: Iterable[str]) -> RrridError:
+    """`problem` with every path that one of the `words` of the command line gave relative written as it was given there.
+
+    Stages work with absolute paths, so that no other working folder changes what they mean.
+    """
+    from pipelines.log.places import renamed
+
+    names: dict[str, str] = {}
+    for text in (part for word in words for part in (word, word.partition("=")[2]) if part and not part.startswith("-")):
+        path = Path(text)
+        for one in () if path.is_absolute() else (path, *path.parents):
+            if one == path or one != Path():
+                names.setdefault(str(one.absolute()), str(one))
+                names.setdefault(os.path.abspath(one), str(one))
+    told = (problem.where, problem.message, problem.remedy)
+    problem.where, problem.message, problem.remedy = (renamed(text, names) for text in told)
+    return problem
