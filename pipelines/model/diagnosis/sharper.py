@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.log.derive import recording
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Motions, Recipe, of_each
@@ -42,8 +43,14 @@ def sharpened(motions: Motions, recipe: Recipe) -> Motions:
 
 
 def _sharper(log: ExperimentLog, found: Reconstructed, recipe: Recipe) -> Reconstructed:
-    observers, felt = found.observers, cutoff_at(recipe.cutoff_hz, 1.0 / log.sample_time)
-    if felt is None or observers is None or not observers.twice:  # derived before, or as asked for
+    felt = cutoff_at(recipe.cutoff_hz, 1.0 / log.sample_time)
+    if felt is None:
+        return found
+    if found.derived:  # by `reconstruct`, within `run`: the same motion, without the observers that made it
+        log = recording(log)
+        found = reconstruct(log, recipe.how, found.good)
+    observers = found.observers
+    if observers is None or not observers.twice:  # as asked for
         return found
     own = observers.smoothing
     wide = (smoother_bandwidth(own, twice=True) >= felt) & (np.broadcast_to(np.array(recipe.min_speed), log.n_joints) == 0.0)
