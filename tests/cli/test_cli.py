@@ -246,6 +246,14 @@ def test_help_names_what_set_takes(tmp_path: Path) -> None:
     assert "--set inspect.OPTION=VALUE, options: trust_units, allow_same." in rrrid("run", "--help", cwd=tmp_path).stdout
 
 
+@pytest.mark.parametrize("command", ["run", "diagnose", "extend"])
+def test_help_says_how_long_a_slow_command_takes(command: str, tmp_path: Path) -> None:
+    """With what that hangs on, in its own help; the list of all commands keeps to one sentence."""
+    own, listed = (" ".join(rrrid(*words, cwd=tmp_path).stdout.split()) for words in ((command, "--help"), ("--help",)))
+    assert re.search(r"Takes (some \d+ s|half a minute) for three joints and two minutes of motion", own)
+    assert "Takes" not in listed
+
+
 @pytest.mark.parametrize("command", ["extend", "diagnose", "simulate", "demo", "design-excitation"])
 def test_help_names_every_cause(command: str, tmp_path: Path) -> None:
     """Where a cause is asked for, all of them can be read, each with its title."""
