@@ -132,6 +132,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
                   without=settings.without, doctor=said, memory=memory,
+                  laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name,
                   calibrated_with=() if given.calibration is None else tuple(one.name for one in given.calibration.origin.logs))
 
 

@@ -170,6 +170,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         torque_signal_rms={key: tuple(map(float, e.signal_rms)) for key, e in both.items()},
         held_out=judged.by, filter_hz=fitted.recipe.cutoff_hz, equations=tuple(map(int, found.statistics.counts)),
         friction="fitted" if fitted.recipe.known is None else "given",
+        friction_of="" if fitted.recipe.known is None else "fit-friction" if settings.model is None else Path(settings.model).name,
         physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
         unresolved=str(found.unresolved) if found.unresolved.parameters else "",
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),

@@ -63,6 +63,8 @@ def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: b
     say_verdict(outcome.report, stream)
     if outcome.report.key_figures is not None:
         _say_table(outcome.report.key_figures, stream)
+    for line in outcome.report.basis:
+        print(f"  {clean(line, 400)}", file=stream)
     _say_checks(outcome.checks, verbose, stream)
     report = outcome.folder / "report.html"
     print(f"→ {report if report.exists() else outcome.folder}", file=stream)

@@ -18,6 +18,7 @@ from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Outcome, Request, read_logs, run_stage
+from tests.cli.commands import rrrid
 
 WITHOUT = run.Settings(skip=("diagnose", "extend"))  # they are dear, and have tests of their own
 
@@ -67,6 +68,28 @@ def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], sam
     assert inside["parameters"] == alone.json["parameters"]
     assert inside["relative_error"] == alone.json["relative_error"]
     assert (whole.folder / "estimate-bps/model.json").read_bytes() == (alone.folder / "model.json").read_bytes()
+
+
+def test_it_is_said_whose_friction_went_in(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
+    """In a run that of fit-friction, on its own none, or that of a model; the report says so, and which option makes them equal."""
+    rests = next(section for section in whole.report.sections if section.title == "estimate-bps: What the estimate rests on")
+    assert rests.text[0].startswith("Friction: held, that of fit-friction, earlier in this run.")
+    assert "--model RUN/fit-friction/model.json" in rests.text[0]
+    logs = samples / "rrr-closed-form"
+    for words, said in (((), "Friction: Coulomb and viscous, fitted with the rest, for no other was given."),
+                        (("--model", whole.folder / "fit-friction/model.json"), "Friction: held, that of model.json, as --model")):
+        told = rrrid("estimate-bps", logs, *words, "--no-report", "--out", tmp_path / "out", cwd=tmp_path).stdout
+        assert said in told
+
+
+def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(samples: Path, tmp_path: Path) -> None:
+    words = ("diagnose", samples / "rrr-closed-form/excitation-1.h5", "--replicas", "0", "--out", tmp_path / "out", "--no-report")
+    told = rrrid(*words, cwd=tmp_path).stdout
+    assert "Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run" in told
+    assert "--set diagnose.model=FILE" in told
+    assert "Thresholds: " in told
+    told = rrrid(*words, "--model", "rrr", cwd=tmp_path).stdout
+    assert "Friction laws: those of rrr, as asked for" in told
 
 
 def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path: Path) -> None:

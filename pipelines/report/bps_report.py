@@ -13,6 +13,7 @@ from pipelines.model.estimation.result import Result
 from pipelines.report.bps import convergence_figure, torque_figure
 from pipelines.report.bps_balance import balance_table, balance_words
 from pipelines.report.figure_words import figure_in_words as plain
+from pipelines.report.model_words import friction_words
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.style import format_number, format_unit, with_std
 
@@ -32,7 +33,8 @@ def bps_report(result: Result) -> Report:
         sections.insert(2, _noise_section(result))
     if result.comparison:
         sections.append(_comparison_section(result))
-    return Report("Base parameters", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
+    return Report("Base parameters", _verdict(result), _tone(result), _key_figures(result), tuple(sections),
+                  basis=(friction_words(result),))
 
 
 def _tone(result: Result) -> Tone:
@@ -130,7 +132,7 @@ def _key_figures(result: Result) -> Table:
         ("condition number of the rigid columns", result.condition_number),
         ("condition number of the fit, unit columns", result.condition_number_fit),
         ("low-pass over torque and columns [Hz]", "none" if result.filter_hz is None else result.filter_hz),
-        ("friction", "fitted with the rest" if result.friction == "fitted" else "taken from the given model"),
+        ("friction", "fitted with the rest" if result.friction == "fitted" else f"that of {result.friction_of or 'a given model'}"),
         ("links that could exist", {True: "yes", False: "no", None: "cannot be said"}[result.physically_consistent]))
     return Table(("what", "figure"), rows)
 
@@ -210,7 +212,8 @@ def _trust_section(result: Result) -> Section:
         "convergence", "Estimates as samples come in, each in units of its final value; every one ends at 1. What matters is "
         "the second half: the frame is set by it, and cuts earlier parts off. Parameters that move least are grey.",
         result.convergence_samples, result.convergence, result.convergence_std, tuple(plain(p.name) for p in result.parameters))
-    return Section("What the estimate rests on", (*balance_words(result), *_settling_words(result)), tuple(tables), (growth,))
+    return Section("What the estimate rests on", (friction_words(result), *balance_words(result), *_settling_words(result)),
+                   tuple(tables), (growth,))
 
 
 def _settling_words(result: Result) -> tuple[str, ...]:

@@ -34,6 +34,7 @@ from pipelines.report.diagnosis_words import (
 )
 from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.joint_units import units_in
+from pipelines.report.model_words import laws_words, threshold_words
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
@@ -41,6 +42,7 @@ from pipelines.report.style import format_number
 __all__ = ["diagnosis_report"]
 
 _LEDGER = 40  # lines
+_IN_RUN = "--set diagnose.model=FILE"
 _OUT_OF_REACH = "A threshold above 100 % is told as a dash: an arm in order leaves so much of it that such logs cannot show it."
 _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
 
@@ -54,7 +56,7 @@ def diagnosis_report(result: Result) -> Report:
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
                   errors_table(result.residual_rms, result.after_rms, result.rated, *held_out_floor(result), units),
-                  tuple(sections), _advice(result))
+                  tuple(sections), _advice(result), (laws_words(result.laws_of, _IN_RUN), threshold_words(result)))
 
 
 def _verdict(result: Result) -> str:
@@ -182,10 +184,7 @@ def _alike(joints: int) -> str:
 
 def _basis(result: Result) -> Section:
     """Where floor and thresholds come from, and what judged."""
-    origins = sorted({one.origin for one in result.thresholds})
-    text = [floor_words(result), held_out_words(result.held_out), f"Thresholds come from {' and '.join(origins) or 'nothing'}."]
-    if result.calibrated_with:
-        text.append(f"An earlier diagnosis has stored them, of {', '.join(result.calibrated_with)}.")
+    text = [laws_words(result.laws_of, _IN_RUN), floor_words(result), held_out_words(result.held_out), threshold_words(result)]
     if result.replicas:
         text.append(f"The twin is the fitted model run {result.replicas} times through the same controllers, references, encoders "
                     f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")

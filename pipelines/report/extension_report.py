@@ -6,6 +6,7 @@ from pipelines.model.diagnosis.outcome import Extension
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_words import held_out_words, tip_change, title_of, together, torque_errors, without_keys
 from pipelines.report.joint_units import Units, units_in
+from pipelines.report.model_words import laws_words
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 
@@ -32,7 +33,7 @@ def extension_report(result: Extension) -> Report:
         sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
                   torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.floor, *_NOISE, units),
-                  tuple(sections))
+                  tuple(sections), basis=(laws_words(result.laws_of),))
 
 
 def _verdict(result: Extension) -> str:
@@ -52,7 +53,7 @@ def _first_reason(result: Extension) -> str:
 
 
 def _basis(result: Extension, units: Units) -> Section:
-    text = [held_out_words(result.held_out),
+    text = [laws_words(result.laws_of), held_out_words(result.held_out),
             "A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its "
             "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the "
             "measured one."]

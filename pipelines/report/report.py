@@ -60,3 +60,4 @@ class Report:
     key_figures: Table | None = None
     sections: tuple[Section, ...] = ()
     advice: tuple[str, ...] = ()  # what to look at on the machine, a sentence a finding
+    basis: tuple[str, ...] = ()  # for the terminal: which model, thresholds or earlier result went in; a section says so too

@@ -30,7 +30,8 @@ def writing_report(result: Result) -> Report:
         return _task_report(result, result.design)
     sections = [_torque_section(result), _where_section(result), _online_section(result), _cases_section(result),
                 _simulation_section(result)]
-    return Report("Writing task", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
+    return Report("Writing task", _verdict(result), _tone(result), _key_figures(result), tuple(sections),
+                  basis=(f"The model: {result.model}. --model FILE judges another.",))
 
 
 def _tone(result: Result) -> Tone:

@@ -25,6 +25,7 @@ class Result(Diagnosis):
     without: tuple[str, ...] = ()  # causes that were left out
     doctor: tuple[Check, ...] = ()
     calibrated_with: tuple[str, ...] = ()  # logs of an earlier diagnosis, whose thresholds were taken; none: its own
+    laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
     memory: Memory | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)
 
 
@@ -46,4 +47,5 @@ class Extension:
     rated: tuple[float, ...]  # [N m]
     doctor: tuple[Check, ...]
     model: ModelFile | None  # None where nothing was accepted
+    laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
     derived: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED, repr=False)

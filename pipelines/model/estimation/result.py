@@ -43,6 +43,7 @@ class Result:
     hard_to_see: tuple[Direction, ...]
     comparison: tuple[Compared, ...]
     rigid_body_alone: tuple[float, ...] | None = field(default=None, kw_only=True)  # [torque_units] held-out rms, no friction
+    friction_of: str = field(default="", kw_only=True)  # given: the model file, or "fit-friction" of the same run
     noise_floor: tuple[Beside, ...] = field(default=(), kw_only=True)  # of logs that hold two periods or more
     convergence_samples: tuple[int, ...]
     convergence: Array  # (counts, parameters)

@@ -1,0 +1,40 @@
+"""Which friction model and which thresholds the figures of a stage rest on, where these come from, and how to have others.
+
+Figures of a stage on its own and within a run differ where they rest on different ones: whoever lays them side by side is told.
+"""
+
+from __future__ import annotations
+
+from pipelines.model.diagnosis.outcome import Result as Diagnosed
+from pipelines.model.estimation.result import Result as Estimated
+
+__all__ = ["friction_words", "laws_words", "threshold_words"]
+
+
+def friction_words(result: Estimated) -> str:
+    """Of estimate-bps: friction is fitted with the rest, or held as somebody has found it."""
+    if result.friction == "fitted":
+        return ("Friction: Coulomb and viscous, fitted with the rest, for no other was given. A run holds that of its stage "
+                "fit-friction where every joint was driven alone: --model RUN/fit-friction/model.json does the same here.")
+    if result.friction_of == "fit-friction":
+        return ("Friction: held, that of fit-friction, earlier in this run. On its own estimate-bps fits Coulomb and viscous "
+                "friction with the rest; --model RUN/fit-friction/model.json gives it these figures.")
+    return (f"Friction: held, that of {result.friction_of or 'another model'}, as --model asked. Without it, Coulomb and viscous "
+            "friction is fitted with the rest.")
+
+
+def laws_words(laws_of: str, in_run: str = "") -> str:
+    """Of diagnose and extend, which fit the numbers of their laws themselves; `in_run`: the option that a run has for it."""
+    if laws_of:
+        return f"Friction laws: those of {laws_of}, as asked for; their numbers are fitted here."
+    other = f" (in a run {in_run})" if in_run else ""
+    return ("Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run: no earlier fit of friction is "
+            f"taken. --model FILE takes the laws of a model{other}.")
+
+
+def threshold_words(result: Diagnosed) -> str:
+    """Of diagnose: what says how much of a cause an arm in order shows, and whether an earlier diagnosis had found it."""
+    origins = " and ".join(sorted({one.origin for one in result.thresholds})) or "nothing"
+    if result.calibrated_with:
+        return f"Thresholds: {origins}. An earlier diagnosis has stored them, of {', '.join(result.calibrated_with)}."
+    return f"Thresholds: {origins}, made here; --calibration DIR takes those of an earlier diagnosis."
