@@ -26,6 +26,7 @@ __all__ = ["error_map_figure", "executed_figure", "simulated_figures", "split_fi
 
 _AXES = ("x", "y", "z")
 _SEGMENTS = 600  # of a coloured path
+_FAINT = 0.6  # [pt] of a line on the way between strokes
 _LEFT = (1, 2, 3, 4)  # Fig. 16 has the first four cases on one side
 _PARTS = (("inertia", style.BLUE), ("coriolis", style.PURPLE), ("gravity", style.ORANGE), ("friction", style.GREEN),
           ("left", style.VERMILLION))
@@ -74,10 +75,11 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
         axes = drawing.subplots(len(joints), 1, sharex=True, squeeze=False)[:, 0]
         points = course.tip[::every, [a, b]]
         lines = np.stack([points[:-1], points[1:]], axis=1)
+        down = (np.ones(len(course.tip)) if course.drawn is None else course.drawn)[::every][:len(lines)] > 0.0
         for j, axis in enumerate(axes):
             size = _largest_of(np.nan_to_num(np.abs(course.left[:, j])), every)
             top = float(np.quantile(size, 0.99)) or 1.0
-            drawn = LineCollection(list(lines), cmap="magma_r", linewidths=2.0)
+            drawn = LineCollection(list(lines), cmap="magma_r", linewidths=np.where(down, 2.0, _FAINT).tolist())
             drawn.set_array(size[:len(lines)])
             drawn.set_clim(-0.15 * top, top)  # the lightest colour is no colour on white
             axis.add_collection(drawn)
@@ -92,8 +94,14 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
             bar.set_label(f"|left| [{found.torque_units[j]}]")
         axes[-1].set_xlabel(f"{_AXES[a]} [m]")
 
-    return Figure(f"where-{found.name}", "Where on its way the tip is when the model misses torque.", draw,
+    return Figure(f"where-{found.name}",
+                  f"Where on its way the tip is when the model misses torque{_ways(course.drawn, 'thin')}.", draw,
                   (6.0, 0.7 + 1.35 * len(joints)))
+
+
+def _ways(drawn: Array | None, how: str) -> str:
+    """What a caption says of ways between strokes, where the reference tells them."""
+    return "" if drawn is None or drawn.all() else f"; {how} on the way between strokes, where a pen would be up"
 
 
 def _largest_of(size: Array, every: int) -> Array:
@@ -107,16 +115,16 @@ def executed_figure(cases: Sequence[Case]) -> Figure | None:
     panels = [part for part in ([c for c in shown if c.case in _LEFT], [c for c in shown if c.case not in _LEFT]) if part]
     if not panels or shown[0].track is None:
         return None
-    wanted = shown[0].track.wanted
+    wanted, drawn = shown[0].track.wanted, shown[0].track.drawn
     a, b = plane(wanted)
 
     def draw(drawing: Drawing) -> None:
         for axis, part in zip(drawing.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0], panels, strict=True):
-            axis.plot(wanted[:, a], wanted[:, b], color=style.BLACK, linewidth=2.6, alpha=0.25, label="wanted")
+            draw_strokes(axis, wanted[:, [a, b]], drawn, style.BLACK, 2.6, "wanted", 0.25)
             for one in part:
                 assert one.track is not None
-                axis.plot(one.track.executed[:, a], one.track.executed[:, b], color=style.COLOURS[(one.case - 1) % 6],
-                          linewidth=0.8, label=f"case {one.case}")
+                draw_strokes(axis, one.track.executed[:, [a, b]], one.track.drawn, style.COLOURS[(one.case - 1) % 6], 0.8,
+                             f"case {one.case}")
             axis.set_aspect("equal")
             axis.margins(0.03)
             axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderpad=0.0)
@@ -124,8 +132,18 @@ def executed_figure(cases: Sequence[Case]) -> Figure | None:
             axis.set_xlabel(f"{_AXES[a]} [m]")
 
     width, height = float(np.ptp(wanted[:, a])), float(np.ptp(wanted[:, b]))
-    return Figure("executed", "The letters as executed, on the wanted ones.", draw,
+    return Figure("executed", f"The letters as executed, on the wanted ones{_ways(drawn, 'dashed')}.", draw,
                   (6.0, min(len(panels) * (0.9 + 5.2 * height / max(width, 1e-9)), 9.0)))
+
+
+def draw_strokes(axis: Axes, path: Array, drawn: Array | None, color: str, width: float, label: str, alpha: float = 1.0) -> None:
+    """A path (points, 2): strokes as they are written, ways between them dashed and faint; all of it alike where nobody knows."""
+    if drawn is not None:
+        for first, last in figures.true_spans(np.arange(len(path), dtype=np.float64), drawn <= 0.0):
+            part = path[max(0, int(first) - 1):int(last) + 2]  # from stroke to stroke
+            axis.plot(part[:, 0], part[:, 1], color=color, linewidth=min(width, _FAINT), alpha=0.5 * alpha, linestyle=(0, (4, 3)))
+        path = np.where(drawn[:, None] > 0.0, path, np.nan)
+    axis.plot(path[:, 0], path[:, 1], color=color, linewidth=width, alpha=alpha, label=label)
 
 
 def simulated_figures(name: str, course: SimulatedCourse, unit: str, torque_unit: str) -> list[Figure]:

@@ -17,6 +17,7 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
+from pipelines.model.writing.recognise import pen_down
 
 __all__ = ["CASES", "Case", "TipStd", "TipTrack", "case_of", "measured_cases", "one_task", "tip_std", "track"]
 
@@ -52,6 +53,7 @@ class TipTrack:
 
     wanted: Array
     executed: Array
+    drawn: Array | None = None  # (points,) 1 where it writes, 0 on the way between strokes; null: the reference is no text
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,9 @@ def tip_std(log: ExperimentLog, q: Array) -> Array:
 def track(log: ExperimentLog, q: Array) -> TipTrack:
     """The path of the tip for Fig. 16."""
     chain, rows = serial_chain(log.robot), slice(None, None, max(1, -(-log.n_samples // _POINTS)))
-    return TipTrack(tip_position(chain, log["q_ref"][rows]), tip_position(chain, q[rows]))
+    wanted = tip_position(chain, log["q_ref"])
+    down = pen_down(wanted)
+    return TipTrack(wanted[rows], tip_position(chain, q[rows]), None if down is None else down[rows].astype(np.float64))
 
 
 def one_task(logs: Sequence[ExperimentLog], like: ExperimentLog) -> list[ExperimentLog]:

@@ -26,6 +26,7 @@ from pipelines.model.rigid.body import Motion
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
 from pipelines.model.writing.marks import Marks, marks_of, reference_tip
+from pipelines.model.writing.recognise import pen_down
 from pipelines.signal.filters import zero_phase
 
 __all__ = ["Course", "FirstValidation", "Largest", "LetterError", "Online", "first_validation", "online_validation", "residual"]
@@ -72,6 +73,7 @@ class Course:
     effects: Array
     left: Array  # measured - model
     tip: Array  # [m] (points, 3) as executed
+    drawn: Array | None = None  # (points,) 1 where it writes, 0 on the way between strokes; null: the reference is no text
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def first_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts:
         {name: _rms(getattr(parts, name)[known]) for name in _PARTS}, marks.kind, marks.text,
         _letters(log, smooth, known, marks, _rms(whole[known])),
         _largest(log, smooth, _seen_from_both_sides(log, known, cutoff), marks, tip), online,
-        _course(log, parts, tip, known) if draw else None)
+        _course(log, parts, tip, known, wanted) if draw else None)
 
 
 def online_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> tuple[Online, float]:
@@ -223,10 +225,12 @@ def _largest(log: ExperimentLog, left: Array, known: npt.NDArray[np.bool_], mark
     return tuple(found)
 
 
-def _course(log: ExperimentLog, parts: ArmTorque, tip: Array, known: npt.NDArray[np.bool_]) -> Course:
+def _course(log: ExperimentLog, parts: ArmTorque, tip: Array, known: npt.NDArray[np.bool_], wanted: Array | None) -> Course:
     """Every so-manieth sample: the torque of a task is smooth over milliseconds."""
     rows = slice(None, None, max(1, -(-log.n_samples // _POINTS)))
     shown = np.where(known[:, None], log.tau, np.nan)[rows]
     split = {name: getattr(parts, name)[rows] for name in _PARTS}
     model = parts.total[rows]
-    return Course((log.t - log.t[0])[rows], shown, model, left=shown - model, tip=tip[rows], **split)
+    down = None if wanted is None else pen_down(wanted)
+    return Course((log.t - log.t[0])[rows], shown, model, left=shown - model, tip=tip[rows],
+                  drawn=None if down is None else down[rows].astype(np.float64), **split)

@@ -1,6 +1,7 @@
 """Read a writing task back from the path of its tip: which letter was written when.
 
     letters = read_letters(tip)          letters[2].character, .first, .last; none where it is no text of our letters
+    down = pen_down(tip)                 (samples,) where it writes, not on its way between strokes; None where it is no text
 
 A log of a writing experiment holds joint references and no text. The path that they ask of the tip is exact, so that each letter
 is found by laying it over the path, arc length for arc length: the longest letter that fits first, another one where the rest
@@ -14,12 +15,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.model.rigid.body import Array
 from pipelines.model.writing.letters import CHARACTERS
 from pipelines.model.writing.path import Page, lay_out
 
-__all__ = ["Letter", "read_letters"]
+__all__ = ["Letter", "pen_down", "read_letters"]
 
 # All lengths here are in heights of a letter.
 _OFF = 0.01  # a letter lies on the path to within this
@@ -51,6 +53,7 @@ class _Form:
     width: float
     at: Array  # (points,) arc length
     points: Array  # (points, 2)
+    drawn: Array  # (lines and arcs that are drawn, 2) arc length from and to
 
     @property
     def length(self) -> float:
@@ -67,7 +70,8 @@ def _forms() -> tuple[_Form, ...]:
         piece = np.clip(np.searchsorted(path.starts, at, side="right") - 1, 0, len(path.pieces) - 1)
         points = np.array([path.pieces[k].at(np.array([s - path.starts[k]]))[0][0] for s, k in zip(at, piece, strict=True)])
         drawn = np.concatenate([p.at(np.linspace(0.0, p.length, 33))[0] for p in path.pieces if p.drawn])
-        found.append(_Form(character, float(np.ptp(drawn[:, 0])), at, points[:, [0, 2]]))
+        spans = np.array([path.starts[k:k + 2] for k, p in enumerate(path.pieces) if p.drawn])
+        found.append(_Form(character, float(np.ptp(drawn[:, 0])), at, points[:, [0, 2]], spans))
     return tuple(sorted(found, key=lambda form: -form.length))
 
 
@@ -115,17 +119,37 @@ class _Path:
 
 def read_letters(tip: Array) -> tuple[Letter, ...]:
     """The letters along the reference of a tip (samples, 3) [m]; none where they cannot be told."""
-    height = float(np.ptp(tip[:, 2])) if len(tip) else 0.0
-    if not np.isfinite(tip).all() or height < _FLAT:
-        return ()
-    path = _Path(tip[:, [0, 2]] / height)
-    if path.length > 10.0 * _LONGEST:
-        return ()
-    found = _parse(path)
-    return () if found is None else tuple(_in_samples(path, found))
+    read = _read(tip)
+    return () if read is None else tuple(_in_samples(*read))
+
+
+def pen_down(tip: Array) -> npt.NDArray[np.bool_] | None:
+    """(samples,) where the reference of a tip (samples, 3) [m] writes; not on its way from one stroke to the next, within a letter
+    or between two. None where no letters can be told: the path alone then says nothing of a pen."""
+    if (read := _read(tip)) is None:
+        return None
+    path, found = read
+    down = np.zeros(len(tip), dtype=bool)
+    for form, start, _ in found:
+        for first, last in start + form.drawn:
+            down |= (path.s >= first) & (path.s <= last)
+    lifted = np.abs(tip[:, 1] - np.median(tip[down, 1])) > _BENT * np.ptp(tip[:, 2])  # off the plane, above the end of a stroke
+    return np.asarray(down & ~lifted)
 
 
 _Found = tuple[_Form, float, int]  # letter, where it starts, spaces before it
+
+
+def _read(tip: Array) -> tuple[_Path, list[_Found]] | None:
+    """The path of a tip with all its letters; None where they cannot be told."""
+    height = float(np.ptp(tip[:, 2])) if len(tip) else 0.0
+    if not np.isfinite(tip).all() or height < _FLAT:
+        return None
+    path = _Path(tip[:, [0, 2]] / height)
+    if path.length > 10.0 * _LONGEST:
+        return None
+    found = _parse(path)
+    return None if found is None else (path, found)
 
 
 def _parse(path: _Path) -> list[_Found] | None:

@@ -9,7 +9,7 @@ from pipelines.log.robot_files import load_robot
 from pipelines.model.writing.letters import CHARACTERS
 from pipelines.model.writing.path import Page
 from pipelines.model.writing.profile import Pace
-from pipelines.model.writing.recognise import read_letters
+from pipelines.model.writing.recognise import pen_down, read_letters
 from pipelines.model.writing.reference import WritingReference, writing_task
 from pipelines.model.writing.via_points import via_point_motion
 
@@ -35,6 +35,17 @@ def test_every_text_is_read(text: str) -> None:
     assert (found.tip.speed[other] <= 0.01 * found.tip.speed.max()).all()
 
 
+@pytest.mark.parametrize(("text", "page"), [("RRRID", Page()), ("A E  T", Page(height=0.08)), ("RAD", Page(lift=0.01))])
+def test_ways_between_strokes_are_told_from_them(text: str, page: Page) -> None:
+    """Within letters and between them, in the plane and lifted: as the task was laid out, but for the rounding of a standstill."""
+    found = reference(text, page)
+    down = pen_down(found.tip.position)
+    assert down is not None
+    other = down != (found.drawn > 0.0)
+    assert (found.tip.speed[other] <= 0.05 * found.tip.speed.max()).all()
+    assert 0.2 < down.mean() < 0.98
+
+
 @pytest.mark.parametrize(("page", "pace"), [(Page(height=0.05, gap=0.5), None), (Page(height=0.12, x=0.05, z=0.5, lift=0.02), None),
                                             (Page(y=-0.45), Pace(fast=0.2, slow=0.1))])
 def test_size_place_gap_lift_and_pace_do_not_matter(page: Page, pace: Pace | None) -> None:
@@ -52,3 +63,4 @@ def test_what_is_no_text_is_not_read() -> None:
     tip = reference("RRR", Page()).tip.position
     for other in (tip_position(serial_chain(robot), moved.q), np.tile(tip[:1], (100, 1)), tip[:900], tip * [1.0, 1.0, -1.0]):
         assert read_letters(other) == ()
+        assert pen_down(other) is None
