@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -269,3 +270,22 @@ def test_a_log_that_cannot_be_opened_has_no_empty_tables(tmp_path: Path) -> None
     outcome = run_stage(inspect.STAGE, request, inspect.Settings())
     assert all(table.rows for section in outcome.report.sections for table in section.tables)
     assert outcome.report.verdict.startswith("The log cannot be used.")
+
+
+@pytest.mark.parametrize("experiment", ["hold", "excitation"])
+def test_angles_of_every_kind_of_log_are_told_in_radians(experiment: str, tmp_path: Path) -> None:
+    """Also where the file has them in degrees, and the joints are held: one unit throughout the report."""
+    log = good_log()
+    bare = replace(log, experiment=experiment, name=experiment)
+    write_log(tmp_path / "logs/log.h5", bare)
+    with h5py.File(tmp_path / "logs/log.h5", "a") as file:
+        file.attrs.pop("digest", None)
+        for name in [name for name in ("q", "q_ref") if name in file["signals"]]:
+            signal = file["signals"][name]
+            signal[...] = np.rad2deg(signal[...])
+            signal.attrs["units"] = "deg"
+    found = run_stage(inspect.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), inspect.Settings())
+    section = next(one for one in found.report.sections if one.title.startswith("Log "))
+    rows = {row[0]: row for row in section.tables[0].rows if row[1] == 1}
+    assert rows["q"][-1] == "rad"
+    assert rows["q"][2] == pytest.approx(float(np.nanmin(log.q[:, 0])), rel=1e-3)
