@@ -67,7 +67,8 @@ def test_steps_that_are_asked_for_hold_nothing(shared: Path, tmp_path: Path) -> 
     """Each of them is Runge-Kutta of order 4: 1 a sample is nearer to 4 than 1 that hold the body ever come."""
     case = serial("tx40", shared, tmp_path)
     asked = swinging(case, 250)
-    plan = planned_log("swing", case.arm.robot, Motion(TS * np.arange(250), asked.q_ref, asked.dq_ref, asked.ddq_ref))
+    t = np.asarray(TS * np.arange(250), dtype=np.float64)
+    plan = planned_log("swing", case.arm.robot, Motion(t, asked.q_ref, asked.dq_ref, asked.ddq_ref))
     log = replace(plan, controller=asked.controller)
     one, four = (imitate(log, case.arm, How(steps=steps), "swing").logs[0].q for steps in (1, 4))
     held = run_together(Plant.of(case.arm), [Experiment.of_log(log)], 1)[0].q[0]
