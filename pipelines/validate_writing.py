@@ -98,7 +98,8 @@ def read(request: Request, settings: Settings) -> Inputs:
     found = settings.model if settings.model is not None else _left_in(request.paths)
     model = None if found is None else read_model(found)
     sources = [] if found is None or not Path(found).is_file() else [Path(found).absolute()]
-    said = "" if found is None else "the given model" if settings.model is not None else f"{Path(found).name} of the folder"
+    said = f"{Path(found).name} of the folder" if found is not None else ""
+    said = said if settings.model is None else f"{Path(settings.model).name}, as given"
     robot = recipe = None
     if settings.designs:
         robot, known = _robot(request, inputs)
