@@ -223,8 +223,10 @@ def _mistaken(found: Found, earlier: int, later: int, case: Case) -> bool:
     own, before = (found.final.model.effects[k].effect for k in (later, earlier))
     if before.joint != own.joint or not (own.name in before.twins or before.name in own.twins):
         return False
-    rest = Family(before.name, before.joint, (before.looser(),))
-    return imitated(found.steps[earlier], _family(case, own), case) > _ALIKE or imitated(found.steps[later], rest, case) > _REST
+    if imitated(found.steps[earlier], _family(case, own), case) > _ALIKE:
+        return True
+    loose = before.looser()
+    return loose != before and imitated(found.steps[later], Family(loose.name, loose.joint, (loose,)), case) > _REST
 
 
 def _power(found: Found, rms: Array) -> float:
