@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.fit.flips import by_flips
 from pipelines.model.diagnosis import chance
 
 ROWS, FITTED = 2000, 8000  # 12 s of held-out logs beside 40 s of fitted ones, say
@@ -61,7 +62,7 @@ def test_all_time_tells_what_a_few_seconds_leave_open() -> None:
         moved = [noise(rng, rows, 0.1) for rows in (ROWS, FITTED)]
         before, after = left(held + cause[0], fitted + cause[1]), left(held, fitted)
         told += chance.by_all_time(before, after, 0, HELD, 10)
-        alone += chance.by_flips(chance._gains(before, after, np.ones(1, dtype=bool), HELD, 10)) <= chance._RARE
+        alone += by_flips(chance._gains(before, after, np.ones(1, dtype=bool), HELD, 10)) <= chance._RARE
         false += chance.by_all_time(before, left(held + moved[0], fitted + moved[1]), 0, HELD, 10)
     assert told > 0.9 * DRAWS
     assert alone < 0.5 * DRAWS
