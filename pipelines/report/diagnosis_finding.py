@@ -58,7 +58,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     if one.doubt:
         text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
     if offer and not one.doubt and not _happens_once(one):
-        text.append(f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\" writes the model with it")
+        text.append(_offer(one))
     if one.rivals:
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
@@ -71,6 +71,15 @@ def numbers_section(number: int, one: Finding, units: Units = _TURNING) -> Secti
     beside = "the findings before it" if one.origin in ("residual", "reversals") else "all other findings"
     return Section(f"{number}. In numbers", (), (_numbers(one), gain_table(
         one.gain, f"Gain on held-out time, root mean square, beside {beside}.", units)))
+
+
+def _offer(one: Finding) -> str:
+    """How to extend the model; and what held-out logs lack where no joint's gain is beyond its interval there."""
+    command = f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\""
+    if one.origin not in ("residual", "reversals") or (one.gain.validate_torque_rms.ci95[:, 1] < 0.0).any():
+        return f"{command} writes the model with it"
+    return (f"On the held-out time alone no joint's gain is beyond its 95 % interval. {command} writes the model with it where that "
+            "of all joints together is; else record more with the purpose \"validate\"")
 
 
 def _frequency(one: Finding) -> float:

@@ -55,6 +55,15 @@ def test_the_other_joint_is_named() -> None:
         "torque of another joint at joints 2 (from joint 1) and 3 (from joint 2)", "cogging at joint 1"]
 
 
+@pytest.mark.parametrize(("high", "sure"), [(-0.001, True), (0.002, False)])
+def test_a_gain_that_held_out_logs_leave_open_is_not_offered_as_sure(high: float, sure: bool) -> None:
+    """All time may bear out what a few seconds of held-out logs do not: `extend` waits for longer ones, and the report says so."""
+    torque = TorqueGain(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.019]), np.array([[-0.1, 0.1], [-0.1, 0.1], [-0.004, high]]))
+    said = " ".join(finding_section(1, replace(finding(), gain=replace(finding().gain, validate_torque_rms=torque)), NOMINAL).text)
+    assert "rrrid extend LOGS --with quadratic_drag:3" in said
+    assert ("beyond its 95 % interval" in said) is not sure
+
+
 def test_a_small_joint_is_not_hidden_by_a_large_one() -> None:
     """All that is wrong with joint 3 is little of what is wrong with the arm; both are said, where they differ."""
     said = " ".join(finding_section(1, finding(), NOMINAL).text)

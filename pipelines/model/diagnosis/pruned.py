@@ -15,8 +15,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.case import Case, held_out
-from pipelines.model.diagnosis.chance import BY_CHANCE, by_all_time, no_gain, no_name
-from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.chance import BY_CHANCE, no_gain, no_name
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import unlike
 from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
@@ -151,13 +150,9 @@ def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
     if step.best is None or step.best.log is not None:
         return False
     done = step.best.done
-    if not _open(step.before, done, len(done.model.effects) - 1, prepared.judge, case.blocks):
+    if not no_gain(step.before, done, len(done.model.effects) - 1, prepared.judge, case.blocks):
         return False
-    return not others or _open(_without(found, others, case), found.final, k, case.judge, case.blocks)
-
-
-def _open(before: Refined, after: Refined, place: int, judge: Data | None, blocks: int) -> bool:
-    return no_gain(before, after, place, judge, blocks) and not by_all_time(before, after, place, judge, blocks)
+    return not others or no_gain(_without(found, others, case), found.final, k, case.judge, case.blocks)
 
 
 def at_odds(found: Found, k: int, prepared: Prepared, case: Case) -> str:
