@@ -78,8 +78,8 @@ def _offer(one: Finding) -> str:
     command = f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\""
     if one.origin not in ("residual", "reversals") or (one.gain.validate_torque_rms.ci95[:, 1] < 0.0).any():
         return f"{command} writes the model with it"
-    return (f"On the held-out time alone no joint's gain is beyond its 95 % interval. {command} writes the model with it where that "
-            "of all joints together is; else record more with the purpose \"validate\"")
+    return (f"On the held-out time alone no joint's gain is beyond its 95 % interval. {command} writes the model with it where "
+            "that of the whole arm is; else record more with the purpose \"validate\"")
 
 
 def _frequency(one: Finding) -> float:

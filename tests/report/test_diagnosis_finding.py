@@ -58,7 +58,8 @@ def test_the_other_joint_is_named() -> None:
 @pytest.mark.parametrize(("high", "sure"), [(-0.001, True), (0.002, False)])
 def test_a_gain_that_held_out_logs_leave_open_is_not_offered_as_sure(high: float, sure: bool) -> None:
     """All time may bear out what a few seconds of held-out logs do not: `extend` waits for longer ones, and the report says so."""
-    torque = TorqueGain(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.019]), np.array([[-0.1, 0.1], [-0.1, 0.1], [-0.004, high]]))
+    change = np.array([[-0.1, 0.1], [-0.1, 0.1], [-0.004, high]])
+    torque = TorqueGain(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.019]), change)
     said = " ".join(finding_section(1, replace(finding(), gain=replace(finding().gain, validate_torque_rms=torque)), NOMINAL).text)
     assert "rrrid extend LOGS --with quadratic_drag:3" in said
     assert ("beyond its 95 % interval" in said) is not sure
