@@ -159,7 +159,8 @@ def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
     table = some[0].own_columns(some, one.motion, arm)
     for shape in table:
         shape[...] = _finite(shape)
-    return one.lay_signals(table.reshape(-1, table.shape[2]))
+    flat = table.reshape(-1, table.shape[2])
+    return one.lay_signals(flat, np.full(len(flat), (some[0].joint or 1) - 1))
 
 
 def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bool) -> tuple[Mask, list[Array]]:
@@ -189,7 +190,8 @@ def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -
     for into, table in zip(flat, tables, strict=True):
         into[...] = table[:, acting]
     found = np.zeros((len(some), k, joints, one.rows))
-    found[:, :, acting] = one.lay_signals(flat.reshape(-1, samples)).reshape(len(some), k, len(acting), one.rows)
+    laid = one.lay_signals(flat.reshape(-1, samples), np.tile(acting, len(some) * k))
+    found[:, :, acting] = laid.reshape(len(some), k, len(acting), one.rows)
     return found
 
 

@@ -38,6 +38,7 @@ class Case:
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Changed | None = None  # what has changed since the reference logs
     again: bool = True  # a cause that may act more than once at its place may be found more than once
+    white: bool = False  # its rows were whitened: little of them is signal, and every cause takes a small share
     beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
 
     @property

@@ -37,13 +37,17 @@ _RARE = 0.005  # at most, that chance gains as much: the shape was chosen by the
 _PARTS = 20  # of the held-out time, and of the fitted
 
 
-def no_name(step: Step, before: Refined, after: Refined, place: int, judge: Data | None, blocks: int) -> bool:
+def no_name(step: Step, before: Refined, after: Refined, place: int, judge: Data | None, blocks: int,
+            white: bool = False) -> bool:
     """Whether effect number `place` of `after`, which `before` lacks and `step` has found, takes no more off the held-out error
     than chance does, or so little that it is not told from an arm in order.
 
     What gained twice its threshold needs no more than that the error surely falls; what gained three times as much, that it does so
-    over all time: which shape it has was no choice among chances then, and a few seconds of held-out logs tell little.
+    over all time: which shape it has was no choice among chances then, and a few seconds of held-out logs tell little. Of whitened
+    rows little is signal: all time is asked at once.
     """
+    if white:
+        return not by_all_time(before, after, place, judge, blocks)
     times = max((trial.gain / trial.threshold for trial in step.trials if trial.accepted and trial.threshold > 0.0), default=0.0)
     if times <= _TWICE:
         return by_chance(before, after, place, judge, blocks, _LITTLE)

@@ -13,7 +13,7 @@ next to the end of a stretch, where the low-pass has to guess what was before, a
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -23,57 +23,17 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis.kept import Kept
+from pipelines.model.diagnosis.stretch import PAD, Run, run_of
+from pipelines.model.diagnosis.whitening import Whitening
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.rigid.body import Motion
-from pipelines.signal.filters import passed_both_ways
 
 __all__ = ["Data", "LogData", "gather"]
 
 Indices = npt.NDArray[np.intp]
 
-_PAD = 4.0  # periods of the cut-off a stretch is continued by
 _AMPLE = 24.0  # samples a period of the cut-off, at which columns are worked out at least
-_AT_ONCE = 8  # channels, which stay near the processor
-_END = 1.0  # periods of the cut-off left out at either end of a stretch
-
-
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """A stretch without a gap: what is done to a signal of it, in the frequency domain."""
-
-    part: slice  # of the log's kept samples
-    held: bool  # the torque is a held command: columns are averaged as it is
-    response: Array  # (bins,) low-pass, at the frequencies of the padded stretch, as far as the thinned rows go
-    average: Array  # (bins,) of the average over two samples of a smooth signal
-    size: int  # of the padded stretch
-    pad: int  # a multiple of `every`
-    every: int
-    chosen: Indices  # places in the thinned stretch that become rows
-
-    def lay(self, x: Array) -> Array:
-        """A smooth signal (channels, samples) -> (channels, rows)."""
-        return self._through(x, self.response * self.average if self.held else self.response)
-
-    def lay_command(self, tau: Array) -> Array:
-        """The same of the torque (joints, samples): of a held command ½ (u_k + u_{k-1}) is its average."""
-        if self.held:
-            tau = 0.5 * (tau + np.concatenate([tau[:, :1], tau[:, :-1]], axis=1))
-        return self._through(tau, self.response)
-
-    def _through(self, x: Array, response: Array) -> Array:
-        pad, end, out = self.pad, x.shape[1] + self.pad, np.empty((len(x), len(self.chosen)))
-        wide, places = np.zeros((min(len(x), _AT_ONCE), self.size)), self.chosen + pad // self.every
-        for first in range(0, len(x), _AT_ONCE):
-            some = x[first:first + _AT_ONCE]
-            table = wide[:len(some)]
-            table[:, pad:end] = some
-            np.subtract(2.0 * some[:, :1], some[:, pad:0:-1], out=table[:, :pad])
-            np.subtract(2.0 * some[:, -1:], some[:, -2:-pad - 2:-1], out=table[:, end:end + pad])
-            spectrum = np.fft.rfft(table, axis=1)[:, :len(response)]
-            spectrum *= response / self.every
-            out[first:first + _AT_ONCE] = np.fft.irfft(spectrum, n=self.size // self.every, axis=1)[:, places]
-        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +46,10 @@ class LogData:
     y: Array  # [N m] (joints, rows) measured torque
     weighed: npt.NDArray[np.bool_]  # (joints, rows) which rows count: those of a joint that is not too slow
     pieces: tuple[slice, ...]  # of each run among those samples
-    runs: tuple[_Run, ...]
+    runs: tuple[Run, ...]
     kept: Kept  # what was laid before, of all logs gathered with it
     place: int  # among them
+    whitening: Whitening | None = None  # that rows pass at last; `y` has
 
     @property
     def n_joints(self) -> int:
@@ -104,6 +65,18 @@ class LogData:
         """(rows,) [s] of each joint's rows."""
         return np.asarray(self.at_rows(self.motion.t), dtype=np.float64)
 
+    @cached_property
+    def stretches(self) -> tuple[slice, ...]:
+        """Of the rows of a joint, those that follow each other without a gap."""
+        gaps = [np.flatnonzero(np.diff(run.chosen) != 1) + 1 for run in self.runs]
+        first = np.cumsum([0, *(len(run.chosen) for run in self.runs)])
+        ends = np.unique(np.concatenate([first, *(start + own for start, own in zip(first, gaps, strict=False))])).tolist()
+        return tuple(slice(a, b) for a, b in pairwise(ends))
+
+    def whitened(self, whitening: Whitening, kept: Kept) -> LogData:
+        """The same with rows through `whitening`."""
+        return replace(self, y=whitening.through(self.y, range(self.n_joints), self.stretches), whitening=whitening, kept=kept)
+
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """What `x` (samples, …) is at the moments of the rows, unfiltered."""
         return np.concatenate([x[piece][run.chosen * run.every] for piece, run in self._parts])
@@ -114,7 +87,7 @@ class LogData:
         active = np.flatnonzero(flat.any(axis=1))
         out = np.zeros((len(flat), self.rows))
         if len(active):
-            out[active] = self.lay_signals(flat[active])
+            out[active] = self.lay_signals(flat[active], active // (1 if table.ndim == 2 else table.shape[2]))
         if table.ndim == 2:
             return out
         return out.reshape(table.shape[1], table.shape[2], self.rows).transpose(1, 0, 2)
@@ -123,12 +96,13 @@ class LogData:
         """What `lay()` makes, or made before under the same key; not to be written to."""
         return self.kept.of((self.place, key), lay)
 
-    def lay_signals(self, x: Array) -> Array:
-        """(channels, samples) -> (channels, rows)."""
-        return np.concatenate([run.lay(np.ascontiguousarray(x[:, piece])) for piece, run in self._parts], axis=1)
+    def lay_signals(self, x: Array, joints: Sequence[int] | Indices) -> Array:
+        """(channels, samples) of torques of the `joints` (channels,), from 0 -> (channels, rows)."""
+        rows = np.concatenate([run.lay(np.ascontiguousarray(x[:, piece])) for piece, run in self._parts], axis=1)
+        return rows if self.whitening is None else self.whitening.through(rows, joints, self.stretches)
 
     @property
-    def _parts(self) -> list[tuple[slice, _Run]]:
+    def _parts(self) -> list[tuple[slice, Run]]:
         return list(zip(self.pieces, self.runs, strict=True))
 
 
@@ -171,6 +145,22 @@ class Data:
     @property
     def rows(self) -> int:
         return len(self.joint)
+
+    def whitened(self, whitening: Whitening) -> Data:
+        """The same rows through `whitening`."""
+        kept = Kept()
+        known = None if self.known is None else self.through(whitening, self.known)
+        return replace(self, logs=tuple(one.whitened(whitening, kept) for one in self.logs), known=known)
+
+    def through(self, whitening: Whitening, x: Array) -> Array:
+        """What `x` (…, rows) is in whitened rows."""
+        flat, first, out = x.reshape(-1, x.shape[-1]), 0, []
+        for one in self.logs:
+            for joint in range(one.n_joints):
+                own = flat[:, first:first + one.rows]
+                out.append(whitening.through(own, np.full(len(own), joint, dtype=np.intp), one.stretches))
+                first += one.rows
+        return np.concatenate(out, axis=1).reshape(x.shape)
 
     def lay(self, torque: Callable[[Motion], Array]) -> Array:
         """`torque` of the motion of each log, (samples, joints) or (samples, joints, k), as (rows,) or (k, rows)."""
@@ -238,7 +228,7 @@ def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Ro
 
 def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int) -> LogData:
     stretches = [equations.stretch(run) for run in equations.runs]
-    fine = [_run(equations, run) for run in equations.runs]
+    fine = [run_of(equations, run) for run in equations.runs]
     y = np.concatenate([run.lay_command(tau.T) for run, (_, tau) in zip(fine, stretches, strict=True)], axis=1)
     skip = _skipped(equations)
     some = [(Motion(m.t[::skip], m.q[::skip], m.dq[::skip], m.ddq[::skip]), tau[::skip]) for m, tau in stretches]
@@ -246,7 +236,7 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     t, q, dq, ddq = (np.concatenate([getattr(m, name) for m, _ in some]) for name in ("t", "q", "dq", "ddq"))
     ends = np.cumsum([0, *(len(tau) for _, tau in some)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
-    runs = tuple(_run(equations, run, skip) for run in equations.runs)
+    runs = tuple(run_of(equations, run, skip) for run in equations.runs)
     slow = np.concatenate([equations.rows.slow[run][one.chosen * one.every] for run, one in zip(equations.runs, fine, strict=True)])
     asked = tau if equations.held else None  # a measured torque was there: nothing of it can have been kept back
     since = _first_known(runs[0], pieces[0])
@@ -254,12 +244,12 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     return LogData(log, equations, Motion(t, q, dq, ddq, asked, logged, since=since), y, ~slow.T, pieces, runs, kept, place)
 
 
-def _first_known(run: _Run, piece: slice) -> int:
+def _first_known(run: Run, piece: slice) -> int:
     """The sample from which on the motion is good, by a period of the low-pass before the first row."""
     if not len(run.chosen):
         return 0
     first = int(run.chosen[0]) * run.every
-    return int(max(0, min(first - run.pad // int(_PAD), piece.stop - 1)))
+    return int(max(0, min(first - run.pad // int(PAD), piece.stop - 1)))
 
 
 def _skipped(equations: LogEquations) -> int:
@@ -271,34 +261,3 @@ def _skipped(equations: LogEquations) -> int:
     highest = min(how.cutoff_hz, 0.5 / (step * how.decimation))  # rows further apart than the low-pass asks for show less
     most = int(1.0 / (_AMPLE * highest * step))
     return max((k for k in range(1, max(most, 1) + 1) if how.decimation % k == 0), default=1)
-
-
-def _run(equations: LogEquations, part: slice, skip: int = 1) -> _Run:
-    how, held = equations.conditioning, equations.held
-    rate, every = 1.0 / equations.found.good.log.sample_time, how.decimation
-    n = part.stop - part.start
-    cutoff = how.cutoff_hz
-    reach = 2 if cutoff is None else int(np.ceil(_END * rate / cutoff))
-    chosen = np.arange(-(-min(reach, n // 4) // every), (n - min(reach, n // 4)) // every)
-    chosen = chosen[~equations.rows.out[part][chosen * every]]
-    pad = every * (min(n - 2, 16 if cutoff is None else int(np.ceil(_PAD * rate / cutoff))) // every)
-    size = 2 * every * quick_size(-(-(n + 2 * pad) // (2 * every)))
-    bins = np.arange(size // 2 // every + 1)
-    turn = 2.0 * np.pi * bins / size
-    response = np.ones(len(bins)) if cutoff is None else passed_both_ways(bins * rate / size, cutoff, rate)
-    average = (114.0 + 68.0 * np.cos(turn) - 2.0 * np.cos(2.0 * turn)) / 180.0
-    return _Run(part, held, response, average, size // skip, pad // skip, every // skip, chosen)
-
-
-def quick_size(n: int) -> int:
-    """The smallest 2^a 3^b 5^c from n on: lengths of a quick Fourier transform."""
-    best = 1 << max(0, (n - 1).bit_length())
-    for five in range(8):
-        for three in range(12):
-            odd = 5**five * 3**three
-            if odd >= best:
-                break
-            size = odd << max(0, int(np.ceil(np.log2(max(n / odd, 1.0)))))
-            if n <= size < best:
-                best = size
-    return best

@@ -40,6 +40,7 @@ from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
 from pipelines.model.diagnosis.search import Explored, Found, gap_first, gives_way, glance, greatest, provisional, search
+from pipelines.model.diagnosis.second_look import looked_again
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
@@ -138,6 +139,8 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     usual = None if floored.calibration is None else following_of(floored.calibration, prepared, calibration is not None)
     mended = usual is not None and put_right(found.nominal.fit, found.final.fit, usual)
     done = settled(found, rule(found, floored.rms, known, mended), case, prepared, floored.rms, known)
+    if floored.twin is not None:
+        done = looked_again(done, case, prepared, floored.twin, chosen.most)
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 
 

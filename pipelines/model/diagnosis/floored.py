@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.own_motion import following
 from pipelines.model.diagnosis.search import Explored
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.twin import make_twin, replayable
+from pipelines.model.diagnosis.twin import Twin, make_twin, replayable
 
 __all__ = ["Floored", "floored_by"]
 
@@ -38,6 +38,7 @@ class Floored:
     thresholds: Thresholds | None
     calibration: Calibration | None
     noise: DriveNoise | None  # None where nobody knows
+    twin: Twin | None = None  # whose replicas it is, where it was made for these logs
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -45,30 +46,33 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
     """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
     if given is not None:
         refuse_unfit(given, prepared, case.families, "twin")
-    made = _calibrated(prepared, case, rough, chosen) if given is None else given
+    made, twin = _calibrated(prepared, case, rough, chosen) if given is None else (given, None)
     if made is None:
         return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
-    return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives)
+    return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
+                   twin)
 
 
-def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings) -> Calibration | None:
+def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
+                ) -> tuple[Calibration | None, Twin | None]:
     """Thresholds by the twin; None where the logs do not know their controller, or the fitted arm cannot be simulated."""
     places = replayable([log for log, _ in prepared.motions])
     if not places or not chosen.replicas:
-        return None
+        return None, None
     left, last, weight = clean(rough[-1]), rough[-1].before, rough[0].before.weight
     model = last.model
     try:
         noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
         twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas, chosen.seed)
     except InputRejected:  # such an arm cannot be simulated: D15, D17
-        return None
+        return None, None
     if twin is None:
-        return None
+        return None, None
     weighted = twin.weighted(weight)
     found = Thresholds.of_twin(*weighted, case.families, model.nominal)
-    return Calibration(
+    made = Calibration(
         origin_of("twin", [prepared.motions[place][0] for place in places], model.nominal, chosen), conditions_of(prepared), weight,
         twin.rms, twin.noise.white, bounds_of(case.families, found.gain, found.own), found.wide,
         floors_of(twin.data, twin.fits[0].left) if chosen.evidence else (),
         following(*weighted).max(axis=1), twin.noise.wander)
+    return made, twin

@@ -61,7 +61,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
         doubts |= {k: BY_CHANCE for k in ruling.named
-                   if k not in doubts and _not_told(found.steps[k], prepared, case.blocks)}
+                   if k not in doubts and _not_told(found.steps[k], prepared, case)}
     believed = [k for k in ruling.named if k not in doubts]
     apart = _apart(found, believed, case)
     kept = _turned(found, apart, believed, case)
@@ -137,11 +137,11 @@ def _unseen(found: Found, kept: list[int], final: Refined, case: Case, floor: Ar
     return [k for k in kept if not seen_in(found.steps[k], nominal, last, floor)]
 
 
-def _not_told(step: Step, prepared: Prepared, blocks: int) -> bool:
+def _not_told(step: Step, prepared: Prepared, case: Case) -> bool:
     best = step.best
     if best is None or best.log is not None:
         return False
-    return no_name(step, step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, blocks)
+    return no_name(step, step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, case.blocks, case.white)
 
 
 def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
@@ -178,7 +178,7 @@ def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) 
         for k in left:
             more = sorted((*kept, k))
             there = _without(found, more, case, final) if _apart(found, more, case) == more else None
-            if there is None or no_name(found.steps[k], final, there, more.index(k), case.judge, case.blocks):
+            if there is None or no_name(found.steps[k], final, there, more.index(k), case.judge, case.blocks, case.white):
                 others.append(k)
             else:
                 kept, final = more, there

@@ -39,6 +39,7 @@ class Refined:
     left: Array  # (rows,) [N m]
     slopes: Array  # (numbers, rows) unweighted
     names: tuple[Which, ...]  # of the slopes behind those of the base
+    known: Array | None = None  # (numbers, numbers) their covariance, where they were fitted to other rows
 
     @cached_property
     def weights(self) -> Array:
@@ -79,6 +80,8 @@ class Refined:
 
     def covariance(self) -> Array:
         """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held."""
+        if self.known is not None:
+            return self.known
         seen = np.ones(len(self.slopes), dtype=bool)
         seen[self.unseen] = False
         whole = np.zeros((len(seen), len(seen)))

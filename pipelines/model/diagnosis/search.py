@@ -30,11 +30,12 @@ from pipelines.model.diagnosis.screen import Screened, screen
 from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
 from pipelines.model.diagnosis.unnameable import unnameable
 
-__all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "glance", "greatest", "provisional", "search"]
+__all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "glance", "greatest", "last_step", "provisional",
+           "search"]
 
 _RIVALS = 6  # fitted exactly
 _CLOSE = 0.25  # of the best gain: weaker ones are no rivals
-_LEAST = 2e-3  # of the squared residual: no cause is fitted for less
+_LEAST, _LEAST_WHITE = 2e-3, 2e-4  # of the squared residual: no cause is fitted for less; of whitened rows
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
 _WORTH = 0.05  # of the squared residual of its joint
 _MISSED, _NEAR = 0.1, 0.5  # of what the second of two takes away: one in their place may miss so much; to first order
@@ -149,6 +150,12 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
     return Found(nominal, tuple(steps), now)
 
 
+def last_step(case: Case, done: Refined, number: int) -> Step:
+    """What every cause shows beside all that was found; none is fitted."""
+    screened = _screened(case, done)
+    return _step(case, Explored(done, screened, ()), _gate(case, done, screened), number, False)
+
+
 def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explored, _Gate]]) -> tuple[int, Step, Tried] | None:
     """The place of an earlier step, that step as it should have been, and what it should have found: where the same cause was found
     at two joints, the joint at which it leaves as little alone.
@@ -244,7 +251,8 @@ def _great(case: Case, now: Refined, screened: Sequence[Screened], wanted: Seque
     asked = {id(one) for one in wanted}
     able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
             or (case.again and one.shape[0].again(case.data.logs[0].motion))]
-    able = [one for one in able if one.gain[0] >= _LEAST * now.rss and one.stands_out and id(one) in asked
+    least = _LEAST_WHITE if case.white else _LEAST
+    able = [one for one in able if one.gain[0] >= least * now.rss and one.stands_out and id(one) in asked
             and one.family.shapes[0].evidence in case.nameable]
     able = sorted(able, key=lambda one: -one.gain[0])
     return [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]

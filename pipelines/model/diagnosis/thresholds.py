@@ -38,8 +38,9 @@ class Thresholds:
     several: tuple[int, ...] = ()  # which of the families these are, in the order of `wide`
 
     @classmethod
-    def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], arm: Arm) -> Thresholds:
-        """`residuals` (replicas, rows), weighted, that `fit` leaves: as `Twin.weighted` makes them."""
+    def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], arm: Arm, useless: float = USELESS) -> Thresholds:
+        """`residuals` (replicas, rows), weighted, that `fit` leaves: as `Twin.weighted` makes them; `useless`: share of the squared
+        residual of a joint that is of no use to anybody."""
         data, weight = fit.data, fit.weight
         found = screen(data, fit, families, arm, residuals)
         own = np.array([one.gain.max() for one in found])
@@ -49,9 +50,9 @@ class Thresholds:
                           for joint in range(1, len(weight) + 1)])
         left = np.asarray(np.bincount(data.joint, np.mean(residuals**2, axis=0), minlength=len(weight)), dtype=np.float64)
         place = np.array([(joint or 1) - 1 for joint in joints])
-        gain = TIMES * np.max([np.where(once, ONCE, 1.0) * own, np.where(once, 0.0, usual[place]), USELESS * left[place]], axis=0)
+        gain = TIMES * np.max([np.where(once, ONCE, 1.0) * own, np.where(once, 0.0, usual[place]), useless * left[place]], axis=0)
         several = sorted(_on_several(data, families, arm), key=lambda place: joints[place] is not None)
-        wide = Wide.of_twin(fit, residuals, [families[place] for place in several], usual, left, arm)
+        wide = Wide.of_twin(fit, residuals, [families[place] for place in several], usual, useless / USELESS * left, arm)
         return cls(gain, own, f"{len(residuals)} replicas of the twin", weight, joints, wide, tuple(several))
 
     def at(self, weight: Array) -> Thresholds:

@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.imperfections import DriveNoise, small_loads
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, law_slopes, rows_of
+from pipelines.model.diagnosis.whitening import Whitening
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
@@ -53,6 +54,14 @@ class Twin:
         """The fit of the first replica and the residuals (replicas, rows) of all, weighted, joints weighted like this."""
         first = self._weighted(0, weight)
         return first, np.array([first.residual, *(self._weighted(k, weight).residual for k in range(1, len(self.fits)))])
+
+    def through(self, whitening: Whitening) -> Twin:
+        """The same replicas in whitened rows."""
+        fits = []
+        for one in self.fits:
+            table, y = (one.data.through(whitening, x) for x in (one.table, one.y))
+            fits.append(fit_columns(one.data.whitened(whitening), table, y, one.weight))
+        return Twin(tuple(fits), self.places, self.noise)
 
     def _weighted(self, k: int, weight: Array) -> Fit:
         """Made anew when it is asked for: each would keep a basis as large as its table, and there are many replicas."""

@@ -1,0 +1,89 @@
+"""A second look where the noise is white: what slow noise hides from plain least squares.
+
+    done = looked_again(done, case, prepared, twin, most)
+
+The first look weighs every row alike. Where the drive's zero wanders slowly and a cause is quicker than that, it sees the wander.
+The second one takes out of the rows what the noise of an arm in order, the twin's, makes alike in neighbouring ones (`whitening`),
+and searches again: with thresholds of the same replicas through the same, and by the same rules. Generalised least squares (Aitken
+1935) lose nothing that plain ones see; where the second look finds all that the first has found, and more, it is believed.
+
+What it found is then told in newton metres of the rows as they are: every model with the numbers that the second look has fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.ledger import Tried
+from pipelines.model.diagnosis.own_motion import following, put_right
+from pipelines.model.diagnosis.pruned import Settled, settled
+from pipelines.model.diagnosis.refit import Refined, refine
+from pipelines.model.diagnosis.search import Found, Step, last_step, search
+from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.twin import Twin
+from pipelines.model.diagnosis.verdict import rule
+from pipelines.model.diagnosis.whitening import Whitening
+
+__all__ = ["looked_again"]
+
+_USELESS = 1e-3  # of the squared residual of a joint: of whitened rows most is noise that no model can be below
+
+
+def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
+    """What is believed after a second look: what was before, or all of that and more."""
+    if done.ruling.verdict == "unknown":
+        return done
+    again = _searched(case, prepared, twin, most)
+    if again.ruling.verdict != "cause" or not _names(done) < _names(again):
+        return done
+    return _as_they_are(again, case)
+
+
+def _searched(case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
+    whitening = Whitening.of(twin.data, np.array([one.left for one in twin.fits]))
+    judge = None if case.judge is None else case.judge.whitened(whitening)
+    there = replace(case, data=case.data.whitened(whitening), judge=judge, families=tuple(f for f in case.families if not f.event))
+    weight = 1.0 / np.maximum(refine(there.model, there.data, there.weight).rms, 1e-12)
+    same = twin.through(whitening)
+    first, residuals = same.weighted(weight)
+    bounds = Thresholds.of_twin(first, residuals, there.families, case.model.nominal, _USELESS)
+    there = replace(there, weight=weight, thresholds=bounds, white=True)
+    found = search(there, most)
+    usual = following(first, residuals).max(axis=1)
+    mended = put_right(found.nominal.fit, found.final.fit, usual)
+    ready = replace(prepared, data=there.data, judge=judge)
+    return settled(found, rule(found, same.rms, True, mended), there, ready, same.rms)
+
+
+def _names(done: Settled) -> set[tuple[str, int | None]]:
+    best = [done.found.steps[k].best for k in done.ruling.named]
+    return {(one.effect.name, one.effect.joint) for one in best if one is not None}
+
+
+def _as_they_are(again: Settled, case: Case) -> Settled:
+    """Every model on rows as they are."""
+    found = again.found
+    known: dict[int, Refined] = {}
+
+    def plain(done: Refined) -> Refined:
+        if id(done) not in known:
+            same = refine(done.model, case.data, case.weight, steps=0)
+            known[id(done)] = replace(same, known=done.covariance())
+        return known[id(done)]
+
+    def tried(one: Tried) -> Tried:
+        return replace(one, done=plain(one.done))
+
+    def step(one: Step) -> Step:
+        rivals = {id(rival): tried(rival) for rival in one.rivals}
+        best = None if one.best is None else rivals.get(id(one.best)) or tried(one.best)
+        return replace(one, before=plain(one.before), best=best, rivals=tuple(rivals.values()))
+
+    final = plain(found.final)
+    steps = [step(one) for one in found.steps if one.best is not None]
+    last = last_step(case, final, len(steps) + 1)
+    return replace(again, found=Found(plain(found.nominal), (*steps, last), final))
