@@ -27,7 +27,7 @@ def twins() -> tuple[str, str]:
 
 def among(*causes: Effect) -> Any:
     there = tuple(SimpleNamespace(cause=one.name, joint=one.joint) for one in causes)
-    return SimpleNamespace(families=there, judge=None, blocks=10)
+    return SimpleNamespace(families=there, judge=None, blocks=10, white=False)
 
 
 @pytest.fixture
