@@ -5,13 +5,15 @@
 The first look weighs every row alike. Where the drive's zero wanders slowly and a cause is quicker than that, it sees the wander.
 The second one takes out of the rows what the noise of an arm in order, the twin's, makes alike in neighbouring ones (`whitening`),
 and searches again: with thresholds of the same replicas through the same, and by the same rules. Generalised least squares (Aitken
-1935) lose nothing that plain ones see; where the second look finds all that the first has found, and more, it is believed.
+1935) lose nothing that plain ones see, and tell causes apart that are alike where the wander is. Where the second look finds as
+much at every joint as the first has found, under other names or more, it is believed.
 
 What it found is then told in newton metres of the rows as they are: every model with the numbers that the second look has fitted.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -34,11 +36,11 @@ _USELESS = 1e-3  # of the squared residual of a joint: of whitened rows most is 
 
 
 def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
-    """What is believed after a second look: what was before, or all of that and more."""
+    """What is believed after a second look: what was before, or as much at every joint by other names, or more."""
     if done.ruling.verdict == "unknown":
         return done
     again = _searched(case, prepared, twin, most)
-    if again.ruling.verdict != "cause" or not _names(done) < _names(again):
+    if again.ruling.verdict != "cause" or _names(done) == _names(again) or not _joints(done) <= _joints(again):
         return done
     return _as_they_are(again, case)
 
@@ -62,6 +64,11 @@ def _searched(case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
 def _names(done: Settled) -> set[tuple[str, int | None]]:
     best = [done.found.steps[k].best for k in done.ruling.named]
     return {(one.effect.name, one.effect.joint) for one in best if one is not None}
+
+
+def _joints(done: Settled) -> Counter[int | None]:
+    """How many causes it names at each joint."""
+    return Counter(joint for _, joint in _names(done))
 
 
 def _as_they_are(again: Settled, case: Case) -> Settled:
