@@ -140,7 +140,7 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     mended = usual is not None and put_right(found.nominal.fit, found.final.fit, usual)
     done = settled(found, rule(found, floored.rms, known, mended), case, prepared, floored.rms, known)
     if floored.twin is not None:
-        done = looked_again(done, case, prepared, floored.twin, chosen.most)
+        done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 
 

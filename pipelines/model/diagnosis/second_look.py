@@ -1,12 +1,14 @@
 """A second look where the noise is white: what slow noise hides from plain least squares.
 
-    done = looked_again(done, case, prepared, twin, most)
+    done = looked_again(done, case, prepared, twin, most, floor)
 
 The first look weighs every row alike. Where the drive's zero wanders slowly and a cause is quicker than that, it sees the wander.
 The second one takes out of the rows what the noise of an arm in order, the twin's, makes alike in neighbouring ones (`whitening`),
 and searches again: with thresholds of the same replicas through the same, and by the same rules. Generalised least squares (Aitken
 1935) lose nothing that plain ones see, and tell causes apart that are alike where the wander is. Where the second look finds as
-much at every joint as the first has found, under other names or more, it is believed.
+much at every joint as the first has found, under other names or more, it is believed. What is next to nothing beside a greater
+cause, and may as well be what that one's law does not have, has to be found by both looks. What happened once is no matter of
+noise that is slow: where the first look names such a thing, it is all.
 
 What it found is then told in newton metres of the rows as they are: every model with the numbers that the second look has fitted.
 """
@@ -18,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.ledger import Tried
@@ -27,22 +30,41 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step, last_step, search
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import rule
+from pipelines.model.diagnosis.verdict import explained, rule
 from pipelines.model.diagnosis.whitening import Whitening
 
 __all__ = ["looked_again"]
 
+_LITTLE = 1e-2  # of what stands above the floor: what only the first look has found explains no more, where it is not believed
+_LEAST = 1e-3  # of the same: what only the second look has found beside others explains at least
 _USELESS = 1e-3  # of the squared residual of a joint: of whitened rows most is noise that no model can be below
 
 
-def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
-    """What is believed after a second look: what was before, or as much at every joint by other names, or more."""
-    if done.ruling.verdict == "unknown":
+def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most: int, floor: Array) -> Settled:
+    """What is believed after a second look: what was before, or as much at every joint by other names, or more; or less by what
+    was next to nothing.
+
+    Args:
+        floor: (joints,) [N m] of rows as they are.
+    """
+    once = {family.cause for family in case.families if family.event}
+    if done.ruling.verdict == "unknown" or any(cause in once for cause, _ in _names(done)):
         return done
     again = _searched(case, prepared, twin, most)
-    if again.ruling.verdict != "cause" or _names(done) == _names(again) or not _joints(done) <= _joints(again):
+    if again.ruling.verdict != "cause" or _names(done) == _names(again):
         return done
-    return _as_they_are(again, case)
+    plain = _as_they_are(again, case)
+    return plain if _believed(done, plain, floor) else done
+
+
+def _believed(first: Settled, second: Settled, floor: Array) -> bool:
+    """Whether the second look, told of rows as they are, takes the place of the first."""
+    before, now = _names(first), _names(second)
+    if now < before:
+        return _share(first, before - now, floor) < _LITTLE
+    if before and before < now:
+        return _share(second, now - before, floor) >= _LEAST
+    return _joints(first) <= _joints(second)
 
 
 def _searched(case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
@@ -64,6 +86,16 @@ def _searched(case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
 def _names(done: Settled) -> set[tuple[str, int | None]]:
     best = [done.found.steps[k].best for k in done.ruling.named]
     return {(one.effect.name, one.effect.joint) for one in best if one is not None}
+
+
+def _share(done: Settled, names: set[tuple[str, int | None]], floor: Array) -> float:
+    """What the causes of these names explain together of what stands above the floor, in rows as they are."""
+    nominal, total = done.found.nominal.rms, 0.0
+    for k in done.ruling.named:
+        step = done.found.steps[k]
+        if step.best is not None and (step.best.effect.name, step.best.effect.joint) in names:
+            total += explained(step.before.rms, step.best.done.rms, nominal, floor)
+    return total
 
 
 def _joints(done: Settled) -> Counter[int | None]:
