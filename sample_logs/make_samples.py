@@ -1,24 +1,32 @@
 """Make the sample logs and the example model: python -m sample_logs.make_samples [FOLDER…]
 
-Every run gives the same logs, digest by digest; those of the virtual test bench with the same MuJoCo on the same kind of
-processor, which takes some minutes. With folders named, only these are made.
+Every run gives the same logs, digest by digest; those of the virtual test bench, which take some minutes, with the same MuJoCo
+and where LAPACK rounds the same (`rounds_alike`): its code differs from processor to processor, and dry friction makes a count of
+an encoder of a last bit. With folders named, only these are made.
 """
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from collections.abc import Callable, Iterator
+from importlib.metadata import version
 
+from pipelines.bench.machine import SAMPLE_TIME
+from pipelines.bench.plan import plan_of
+from pipelines.bench.spec import build
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
+from sample_logs.bench_session import machine
 from sample_logs.make_changed import changed_logs
 from sample_logs.make_closed_form import closed_form_logs
 from sample_logs.make_healthy import healthy_logs
 from sample_logs.make_model import HERE, example_text
 
-__all__ = ["FOLDERS", "MUJOCO", "main"]
+__all__ = ["FOLDERS", "main", "rounds_alike"]
 
-MUJOCO = "4.0.0"  # that made the committed logs; another rounds the last bit otherwise
+_MUJOCO = "4.0.0"  # that made the committed logs; another rounds the last bit otherwise
+_AXES = "7a1fa61904f35503"  # digest of the principal axes of the machine's bodies, as LAPACK found them there
 FOLDERS: dict[str, Callable[[], Iterator[tuple[str, ExperimentLog]]]] = {
     "rrr-closed-form": lambda: iter(closed_form_logs().items()), "rrr-healthy": healthy_logs, "rrr-changed": changed_logs}
 
@@ -37,6 +45,13 @@ def main(names: list[str]) -> None:
         for file, log in logs():
             write_log(HERE / name / file, log)
             print(f"{name}/{file}", flush=True)
+
+
+def rounds_alike() -> bool:
+    """Whether MuJoCo and LAPACK are, here, those that made the committed logs of the bench, to the last bit."""
+    model = build(plan_of(machine().robot), SAMPLE_TIME).model
+    axes = hashlib.sha256(model.body_inertia.tobytes() + model.body_iquat.tobytes()).hexdigest()
+    return version("mujoco") == _MUJOCO and axes.startswith(_AXES)
 
 
 if __name__ == "__main__":

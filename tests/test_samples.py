@@ -6,7 +6,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,7 @@ from sample_logs.make_changed import changed_logs
 from sample_logs.make_closed_form import NOISE, SAMPLE_TIME, Fourier, averaged_torque, closed_form_logs, torque_step
 from sample_logs.make_healthy import healthy_logs
 from sample_logs.make_model import synthetic_arm
-from sample_logs.make_samples import FOLDERS, MUJOCO
+from sample_logs.make_samples import FOLDERS, rounds_alike
 
 FILES = ["excitation-1.h5", "excitation-2.h5", "free-1.h5", "friction-1.h5", "friction-2.h5", "friction-3.h5",
          "hold-1.h5"]
@@ -55,12 +54,12 @@ def test_committed_logs_are_what_the_script_makes(rebuilt: dict[str, ExperimentL
 @pytest.mark.parametrize(("name", "made"), [("rrr-healthy/hold-1", healthy_logs), ("rrr-changed/writing-6", changed_logs)])
 def test_a_bench_log_is_what_the_script_makes(name: str, made: Callable[[str], Iterator[tuple[str, ExperimentLog]]],
                                               samples: Path) -> None:
-    """The same digest from the committed file and from the machine recorded anew; by another MuJoCo the same motion to the
-    noise."""
+    """The same digest from the committed file and from the machine recorded anew; by another MuJoCo, or on a processor whose LAPACK
+    rounds otherwise, the same motion to the noise."""
     file, log = next(made(name.split("/")[1]))
     assert name.endswith(file.removesuffix(".h5"))
     committed = open_log(samples / f"{name}.h5").log
-    if version("mujoco") == MUJOCO:
+    if rounds_alike():
         assert digest_of(committed) == digest_of(log)
     assert np.abs(committed.q - log.q).max() < 2e-4
 
@@ -68,11 +67,15 @@ def test_a_bench_log_is_what_the_script_makes(name: str, made: Callable[[str], I
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLDERS)
 def test_every_log_is_what_the_script_makes(name: str, samples: Path) -> None:
-    """All three folders: the same files, digest by digest."""
+    """All three folders: the same files, digest by digest where the bench rounds alike."""
     logs = dict(FOLDERS[name]())
+    alike = rounds_alike() or name == "rrr-closed-form"
     assert sorted(logs) == sorted(path.name for path in (samples / name).iterdir())
     for file, log in logs.items():
-        assert digest_of(open_log(samples / name / file).log) == digest_of(log), file
+        committed = open_log(samples / name / file).log
+        if alike:
+            assert digest_of(committed) == digest_of(log), file
+        assert np.abs(committed.q - log.q).max() < 2e-4, file
 
 
 def test_nothing_in_the_changed_logs_tells_what_changed(samples: Path) -> None:

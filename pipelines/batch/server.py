@@ -15,7 +15,8 @@ from pipelines.batch.process import one_thread
 
 __all__ = ["warm_up"]
 
-_NEEDED: Final = ("pipelines.batch.work", "h5py")  # the latter is else imported by each worker, with its first log
+# The last is else imported by each worker, with its first log.
+_NEEDED: Final = ("pipelines.batch.newborn", "pipelines.batch.work", "h5py")
 
 
 def warm_up(module: str) -> ForkServerContext:

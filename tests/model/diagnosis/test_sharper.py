@@ -52,8 +52,11 @@ def passed(x: Array, cutoff: float) -> Array:
 
 def test_friction_is_looked_up_with_the_speed_that_it_had(recorded: tuple[ExperimentLog, Recording, Machine], motions: Motions,
                                                           cutoff: float) -> None:
-    """The bench's own friction law, at the reconstructed and at the true speed: what the equations see of the difference halves
-    at every joint."""
+    """The bench's own friction law, at the reconstructed and at the true speed: what the equations see of the difference is less
+    at every joint, and halves, by far, where it is most beside the noise of the drive.
+
+    How far it falls at a joint that has little hangs on the noise: .38 to .88 of it stayed at joint 2 from run to run, which is no claim.
+    """
     _, recording, machine = recorded
 
     def missed(motions: Motions) -> Array:
@@ -64,7 +67,11 @@ def test_friction_is_looked_up_with_the_speed_that_it_had(recorded: tuple[Experi
         return np.asarray(np.sqrt(np.mean(np.square(passed(apart, cutoff)), axis=0)))
 
     before, after = missed(motions), missed(sharpened(motions, recipe(cutoff)))
-    assert (after < 0.55 * before).all()
+    assert (after < before).all()
+    noise = np.array(machine.amplifier_noise)
+    assert int(np.argmax(before / noise)) == 0
+    assert after[0] < 0.45 * before[0]
+    assert np.linalg.norm(after / noise) < 0.5 * np.linalg.norm(before / noise)
     assert before[0] > 0.01  # half of what an arm in order leaves of this joint
 
 

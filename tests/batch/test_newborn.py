@@ -1,0 +1,43 @@
+"""A worker whose batch ends while it starts says nothing; one that cannot start for another reason does."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.cli.commands import REPO
+
+_STARTED = """
+import _multiprocessing
+import os
+from pipelines.batch.server import warm_up
+from tests.batch.test_newborn import Unready
+
+context = warm_up("pipelines.inspect")
+shared = {shared}
+{gone}
+worker = context.Process(target=print, args=(shared,))
+worker.start()
+worker.join()
+os._exit(worker.exitcode)
+"""
+
+
+class Unready:
+    """Cannot be brought into another process."""
+
+    def __reduce__(self) -> tuple[type[int], tuple[str]]:
+        return int, ("no number",)
+
+
+@pytest.mark.parametrize(("shared", "gone", "told"), [
+    ("context.Lock()", "_multiprocessing.sem_unlink(shared._semlock.name)", ""), ("Unready()", "", "ValueError")])
+def test_only_what_is_gone_with_the_batch_is_not_told(shared: str, gone: str, told: str) -> None:
+    words = [sys.executable, "-c", _STARTED.format(shared=shared, gone=gone)]
+    done = subprocess.run(words, env=os.environ | {"PYTHONPATH": str(REPO)}, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 1
+    assert told in done.stderr
+    assert bool(told) == ("Traceback" in done.stderr), done.stderr
