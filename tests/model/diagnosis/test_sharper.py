@@ -55,7 +55,8 @@ def test_friction_is_looked_up_with_the_speed_that_it_had(recorded: tuple[Experi
     """The bench's own friction law, at the reconstructed and at the true speed: what the equations see of the difference is less
     at every joint, and halves, by far, where it is most beside the noise of the drive.
 
-    How far it falls at a joint that has little hangs on the noise: .38 to .88 of it stayed at joint 2 from run to run, which is no claim.
+    How far it falls at a joint that has little hangs on the noise, which is no claim: .38 to .88 of it stayed at joint 2 from run
+    to run.
     """
     _, recording, machine = recorded
 
