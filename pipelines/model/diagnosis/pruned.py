@@ -26,6 +26,7 @@ from pipelines.model.diagnosis.momentary import ONLY_THEN, only_then
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, held_out_high, seen_in, too_little, without_steps
+from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Settled", "at_odds", "settled", "vague"]
@@ -56,7 +57,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    doubts = {k: ONLY_THEN if only_then(found.final, k) else
+    elsewhere = {k: at_which(found.steps[k]) for k in ruling.named}
+    doubts = {k: ONLY_THEN if only_then(found.final, k) else elsewhere[k] or
               at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
@@ -89,7 +91,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=final), replace(ruling, named=tuple(kept), doubts=doubts), simulated)
     alone = without_steps(found, floor, known)
     alone = _elsewhere(alone, found, case, floor, known)
-    reason = f"{alone.reason}: {next(iter(doubts.values()), '')}" if alone.verdict == "unknown" else alone.reason
+    reason = next((why for why in elsewhere.values() if why), f"{alone.reason}: {next(iter(doubts.values()), '')}")
+    reason = reason if alone.verdict == "unknown" else alone.reason
     return Settled(replace(found, final=found.nominal), replace(alone, reason=reason, doubts=doubts), ())
 
 

@@ -1,0 +1,54 @@
+"""Two drives of a planar arm: only the ratio of their torques shows, and no joint is blamed for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.hidden_effects.cases import SealedCase
+from benchmarks.hidden_effects.sessions import record_case
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from tests.diagnose.sessions import but
+
+WRONG = 1.1
+
+
+@pytest.fixture(scope="module")
+def planar() -> tuple[ExperimentLog, ...]:
+    """A planar arm in order."""
+    return record_case(SealedCase("healthy", (), 3, 11, "short", robot="planar")).logs
+
+
+def scaled(log: ExperimentLog, joint: int) -> ExperimentLog:
+    """What the recorder writes where it takes the torque of a joint for a tenth more."""
+    tau = log.tau.copy()
+    tau[:, joint - 1] *= WRONG
+    return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=tau)})
+
+
+def diagnosed(logs: tuple[ExperimentLog, ...], *causes: str) -> Diagnosis:
+    return diagnose(Logs.by_role(logs), DiagnosisSettings(replicas=4, most=1, without=but(*causes), evidence=False, limits=False))
+
+
+@pytest.mark.parametrize("joint", [1, 2])
+def test_a_torque_scale_of_one_of_two_joints_is_told_of_neither(planar: tuple[ExperimentLog, ...], joint: int) -> None:
+    """Another name that explains it as well would be wrong half of the time; what would tell is said."""
+    found = diagnosed(tuple(scaled(log, joint) for log in planar), "torque_gain", "torque_offset")
+    assert found.verdict == "unknown"
+    assert not found.findings
+    assert "at joint 1" in found.reason
+    assert "at joint 2" in found.reason
+    assert "known load" in found.reason
+
+
+def test_what_is_seen_at_its_joint_alone_has_its_name_there(planar: tuple[ExperimentLog, ...]) -> None:
+    """Torque that is offset at one of the same joints."""
+    offset = tuple(replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=log.tau + [0.0, 0.3])})
+                   for log in planar)
+    found = diagnosed(offset, "torque_gain", "torque_offset")
+    assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 2)]
