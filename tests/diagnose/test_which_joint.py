@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from benchmarks.hidden_effects.cases import SealedCase
@@ -48,7 +49,8 @@ def test_a_torque_scale_of_one_of_two_joints_is_told_of_neither(planar: tuple[Ex
 
 def test_what_is_seen_at_its_joint_alone_has_its_name_there(planar: tuple[ExperimentLog, ...]) -> None:
     """Torque that is offset at one of the same joints."""
-    offset = tuple(replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=log.tau + [0.0, 0.3])})
-                   for log in planar)
-    found = diagnosed(offset, "torque_gain", "torque_offset")
+    def offset(log: ExperimentLog) -> ExperimentLog:
+        return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=log.tau + np.array([0.0, 0.3]))})
+
+    found = diagnosed(tuple(offset(log) for log in planar), "torque_gain", "torque_offset")
     assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 2)]

@@ -27,7 +27,8 @@ def at_which(step: Step) -> str:
     best = step.best
     if best is None or best.log is not None or best.effect.joint is None:
         return ""
-    others = [one.effect for one in step.rivals if _elsewhere(one, best) and _as_good(one, best, step) and not _one_torque(one, best)]
+    others = [one.effect for one in step.rivals
+              if _elsewhere(one, best) and _as_good(one, best, step) and not _one_torque(one, best)]
     if not others:
         return ""
     title, experiment = best.effect.title, best.effect.experiment
