@@ -19,7 +19,8 @@ _before = sys.excepthook
 
 
 def _told(kind: type[BaseException], problem: BaseException, trace: TracebackType | None) -> None:
-    starting = any(frame.f_globals.get("__name__") == "multiprocessing.spawn" for frame, _ in walk_tb(trace))
+    places = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(trace)]
+    starting = "multiprocessing.spawn" in places and places[-1].startswith("multiprocessing.")
     if not (starting and issubclass(kind, _GONE)):
         _before(kind, problem, trace)
 

@@ -25,7 +25,7 @@ def prediction_weights(covariance: Array, ridge: float = 0.0) -> Array:
 
     Args:
         covariance: (p + 1,) at lags 0 … p.
-        ridge: white power added, as a share of the signal's: errors of a smooth signal are not raised by more than 1 / ridge.
+        ridge: white power added, as a share of the signal's: that of what a smooth signal lacks rises by no more than 1 / ridge.
     """
     from scipy.linalg import solve_toeplitz
 

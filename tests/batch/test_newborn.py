@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -14,7 +16,7 @@ _STARTED = """
 import _multiprocessing
 import os
 from pipelines.batch.server import warm_up
-from tests.batch.test_newborn import Unready
+from tests.batch.test_newborn import Elsewhere, Unready
 
 context = warm_up("pipelines.inspect")
 shared = {shared}
@@ -33,8 +35,20 @@ class Unready:
         return int, ("no number",)
 
 
+def lost(path: str) -> None:
+    Path(path).read_text(encoding="utf-8")
+
+
+class Elsewhere:
+    """Needs a file that is not there."""
+
+    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
+        return lost, ("/nowhere/at/all",)
+
+
 @pytest.mark.parametrize(("shared", "gone", "told"), [
-    ("context.Lock()", "_multiprocessing.sem_unlink(shared._semlock.name)", ""), ("Unready()", "", "ValueError")])
+    ("context.Lock()", "_multiprocessing.sem_unlink(shared._semlock.name)", ""), ("Unready()", "", "ValueError"),
+    ("Elsewhere()", "", "/nowhere/at/all")])
 def test_only_what_is_gone_with_the_batch_is_not_told(shared: str, gone: str, told: str) -> None:
     words = [sys.executable, "-c", _STARTED.format(shared=shared, gone=gone)]
     done = subprocess.run(words, env=os.environ | {"PYTHONPATH": str(REPO)}, capture_output=True, text=True, check=False)

@@ -3,59 +3,112 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from pipelines.bench import experiments
+from pipelines.bench.faults.cogging import Cogging
+from pipelines.bench.machine import draw_machine
+from pipelines.bench.session import record
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.diagnosis import diagnose as whole
+from pipelines.model.diagnosis import second_look
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from tests.diagnose.sessions import but, session
+from tests.diagnose.sessions import but
+from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 
 JOINT = 2
-WANDER, FADES = 0.1, 0.1  # [N m] std, [s] in which its zero forgets where it was
-WAVES = 30.0  # a radian
+WANDER, FADES = 0.1, 0.1  # [N m] std, [s] in which the drive's zero forgets where it was
+RIPPLE = 0.1  # [N m]
 
 
-def wandering(log: ExperimentLog, seed: int, ripple: float) -> ExperimentLog:
-    """The log with a drive whose zero wanders as an autoregression of first order, and a ripple of so many N m over the angle."""
+def wandering(log: ExperimentLog, seed: int) -> ExperimentLog:
+    """The log of a drive whose zero wanders as an autoregression of first order."""
     pole = np.exp(-log.sample_time / FADES)
     white = np.random.default_rng(seed).standard_normal(log.n_samples + 5000)
-    zero = WANDER * lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)[5000:]
     tau = log.tau.copy()
-    tau[:, JOINT - 1] += zero + ripple * np.sin(WAVES * log.q[:, JOINT - 1] + 0.4)
+    tau[:, JOINT - 1] += WANDER * lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)[5000:]
     return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=tau)})
 
 
-def diagnosed(ripple: float) -> Diagnosis:
-    logs = [wandering(log, k, ripple) for k, log in enumerate(session(seconds=6.0))]
+def diagnosed(ripple: float, waves: float, seed: int) -> Diagnosis:
+    """Of two excitations of six seconds on an arm that has felt the ripple, so many `waves` a turn."""
+    machine = draw_machine(7, "fault")
+    faults = (Cogging(JOINT, waves, ripple, phase=0.8, second_phase=2.1),) if ripple else ()
+    plans = [replace(experiments.excitation(machine, seed + k, 6.0, 1), name=f"excitation-{k + 1}", role=role)
+             for k, role in enumerate(("identify", "validate"))]
+    logs = [wandering(log, 10 * seed + k) for k, log in enumerate(record(machine, faults, plans, seed))]
     return diagnose(Logs.by_role(logs), DiagnosisSettings(
         replicas=4, most=2, without=but("cogging", "encoder_eccentricity", "torque_offset"), evidence=False, limits=False))
 
 
-def test_a_ripple_below_slow_noise_is_named_at_a_second_look(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As large as the wander, but thirty waves a radian. What it brings is told in newton metres of the rows as they are: on the
-    held-out log its own power, and not that of whitened rows, of which most is noise."""
-    ripple = 0.1
-    found = diagnosed(ripple)
+@pytest.mark.parametrize(("waves", "seed"), [(90.0, 1), (120.0, 4)])
+def test_a_ripple_below_slow_noise_is_named_at_a_second_look(waves: float, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As large as the wander, but quicker. What it brings is told in newton metres of the rows as they are: on the held-out log
+    its own power, with its second harmonic, and not that of whitened rows, of which most is noise."""
+    found = diagnosed(RIPPLE, waves, seed)
     assert [(one.cause, one.joint) for one in found.findings] == [("cogging", JOINT)]
     size = found.findings[0].parameters["amplitude"]
     assert size.std is not None
-    assert abs(size.value - ripple) < 3.0 * size.std < ripple
+    assert abs(size.value - RIPPLE) < 3.0 * size.std < 0.3 * RIPPLE
     gain = found.findings[0].gain.validate_torque_rms
-    np.testing.assert_allclose(np.sqrt(gain.before**2 - gain.after**2)[JOINT - 1], ripple / np.sqrt(2.0), rtol=0.3)
+    taken = (gain.before**2 - gain.after**2)[JOINT - 1]
+    np.testing.assert_allclose(np.sqrt(taken), RIPPLE / np.sqrt(2.0), rtol=0.3)
 
-    def once(done: Any, *_: Any) -> Any:
-        return done
+    monkeypatch.setattr(whole, "looked_again", lambda done, *_: done)
+    once = diagnosed(RIPPLE, waves, seed)
+    assert once.verdict == "nothing-wrong"
+    np.testing.assert_allclose(found.residual_rms.validate, once.residual_rms.validate)  # of the nominal model of either
 
-    monkeypatch.setattr(whole, "looked_again", once)
-    assert diagnosed(ripple).verdict == "nothing-wrong"
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_slow_noise_alone_is_nothing_wrong(seed: int) -> None:
+    assert diagnosed(0.0, 0.0, seed).verdict == "nothing-wrong"
 
 
-def test_slow_noise_alone_is_nothing_wrong() -> None:
-    assert diagnosed(0.0).verdict == "nothing-wrong"
+def looked(*causes: tuple[Any, Any]) -> Any:
+    """A search that names each of these, and what it left of three joints with a floor of 0.01."""
+    found = searched(left(0.1, 0.1, 0.01), *causes)
+    return SimpleNamespace(found=found, ruling=SimpleNamespace(named=range(len(causes))))
+
+
+HUMP, DRAG, OTHER, THERE = effect("stribeck", 1), effect("quadratic_drag", 1), effect("concave_friction", 1), effect("stribeck", 2)
+
+
+@pytest.mark.parametrize(("first", "second", "believed"), [
+    ((), ((HUMP, left(0.011, 0.1, 0.01)),), True),  # where nothing was
+    (((HUMP, left(0.02, 0.1, 0.01)),), ((OTHER, left(0.011, 0.1, 0.01)),), True),  # another name, that leaves less
+    (((HUMP, left(0.011, 0.1, 0.01)),), ((OTHER, left(0.09, 0.1, 0.01)),), False),  # that explains next to nothing
+    (((HUMP, left(0.011, 0.1, 0.01)),), ((THERE, left(0.1, 0.01, 0.01)),), False),  # at another joint alone
+    (((HUMP, left(0.02, 0.1, 0.01)),), ((HUMP, left(0.02, 0.1, 0.01)), (THERE, left(0.02, 0.01, 0.01))), True),  # one more
+    (((HUMP, left(0.0101, 0.1, 0.01)),), ((HUMP, left(0.0101, 0.1, 0.01)), (DRAG, left(0.01, 0.1, 0.01))), False),  # a trifle more
+    (((HUMP, left(0.0101, 0.1, 0.01)), (DRAG, left(0.01, 0.1, 0.01))), ((HUMP, left(0.0101, 0.1, 0.01)),), True),  # a trifle less
+    (((HUMP, left(0.02, 0.1, 0.01)), (THERE, left(0.02, 0.01, 0.01))), ((HUMP, left(0.02, 0.1, 0.01)),), False)])  # half of it less
+def test_a_second_look_is_believed_where_it_explains_as_much(first: Any, second: Any, believed: bool) -> None:
+    assert second_look._believed(looked(*first), looked(*second), FLOOR) is believed
+
+
+@pytest.mark.parametrize(("steps", "even"), [((0.01, 0.01, 0.01), True), ((0.01, 0.02, 0.01), False), ((0.01, 0.01, 0.02), False)])
+def test_rows_of_different_spacing_have_no_second_look(steps: tuple[float, float, float], even: bool) -> None:
+    """Of fitted, held-out and simulated logs."""
+    fitted, held_out, twin = (SimpleNamespace(logs=(SimpleNamespace(rows=50, t=step * np.arange(50)),)) for step in steps)
+    case: Any = SimpleNamespace(data=fitted, judge=held_out)
+    assert second_look._evenly(case, SimpleNamespace(data=twin)) is even  # type: ignore[arg-type]
+    assert second_look._evenly(SimpleNamespace(data=fitted, judge=None), SimpleNamespace(data=fitted))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("verdict", "names"), [("unknown", ()), ("cause", (effect("cogging", 1),))])
+def test_what_is_unknown_stays_so_and_what_happened_once_is_all(verdict: str, names: tuple[Any, ...],
+                                                                monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(second_look, "_searched", lambda *_: pytest.fail("looked again"))
+    done = looked(*((one, left(0.01, 0.1, 0.01)) for one in names))
+    done.ruling.verdict = verdict
+    case: Any = SimpleNamespace(families=(SimpleNamespace(cause="cogging", event=True),))
+    assert second_look.looked_again(done, case, None, None, 4, FLOOR) is done  # type: ignore[arg-type]

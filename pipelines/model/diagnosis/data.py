@@ -66,12 +66,13 @@ class LogData:
         return np.asarray(self.at_rows(self.motion.t), dtype=np.float64)
 
     @cached_property
-    def stretches(self) -> tuple[slice, ...]:
-        """Of the rows of a joint, those that follow each other without a gap."""
+    def stretches(self) -> tuple[tuple[slice, ...], ...]:
+        """Of each joint's rows, those that follow each other without a gap, and that all count or all do not."""
         gaps = [np.flatnonzero(np.diff(run.chosen) != 1) + 1 for run in self.runs]
         first = np.cumsum([0, *(len(run.chosen) for run in self.runs)])
-        ends = np.unique(np.concatenate([first, *(start + own for start, own in zip(first, gaps, strict=False))])).tolist()
-        return tuple(slice(a, b) for a, b in pairwise(ends))
+        ends = np.concatenate([first, *(start + own for start, own in zip(first, gaps, strict=False))])
+        turns = [np.flatnonzero(np.diff(own.astype(np.int8))) + 1 for own in self.weighed]
+        return tuple(tuple(slice(a, b) for a, b in pairwise(np.union1d(ends, own).astype(int).tolist())) for own in turns)
 
     def whitened(self, whitening: Whitening, kept: Kept) -> LogData:
         """The same with rows through `whitening`."""

@@ -16,7 +16,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.dissipation import dissipating, driving
 from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.linear import covariance, solved, superfluous
+from pipelines.model.diagnosis.linear import covariance, left_out, solved, superfluous
 from pipelines.model.diagnosis.nominal import Fit, rigid_rows
 from pipelines.model.diagnosis.slopes import Which, slopes_of
 
@@ -26,6 +26,7 @@ _STEPS = 8
 _SHARES = (1.0, 0.4, 0.1)  # of a step, until one leaves less
 _RIDGES = (0.0, 1e-4, 1e-2)  # of unit columns: two numbers that do nearly the same would be moved far apart
 _GAIN = 1e-5  # of the squared residual: less is no progress
+_PARTS = 30  # blocks of time, of about a second: longer than noise remembers
 _INVISIBLE = 1e-3  # η below which a number is one that the others are as well
 
 
@@ -76,16 +77,26 @@ class Refined:
     @cached_property
     def unseen(self) -> list[int]:
         """Which slopes, of effects, the others are as well: those numbers stay where they were, for these logs do not tell them."""
+        if self.known is not None:  # where they were fitted they were held
+            return [k for k in range(len(self.model.beta), len(self.slopes)) if self.names[k - len(self.model.beta)][0] == 1
+                    and self.known[k, k] == 0.0]
         return _superfluous(self.slopes * self.weights, len(self.model.beta), self.names)
 
     def covariance(self) -> Array:
-        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held."""
+        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held.
+
+        Of a number that blocks of time left out in turn move by more than that, what they say is its deviation: noise is not all
+        that is left.
+        """
         if self.known is not None:
             return self.known
         seen = np.ones(len(self.slopes), dtype=bool)
         seen[self.unseen] = False
-        whole = np.zeros((len(seen), len(seen)))
-        whole[np.ix_(seen, seen)] = covariance((self.slopes * self.weights)[seen], self.residual)
+        table, whole = (self.slopes * self.weights)[seen], np.zeros((len(seen), len(seen)))
+        noise = covariance(table, self.residual)
+        std = np.sqrt(np.maximum(np.diag(noise), 1e-300))
+        wider = np.maximum(left_out(table, self.residual, self.data.blocks(_PARTS)) / std, 1.0)
+        whole[np.ix_(seen, seen)] = noise * wider * wider[:, None]
         return whole
 
 

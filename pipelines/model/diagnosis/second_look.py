@@ -5,12 +5,14 @@
 The first look weighs every row alike. Where the drive's zero wanders slowly and a cause is quicker than that, it sees the wander.
 The second one takes out of the rows what the noise of an arm in order, the twin's, makes alike in neighbouring ones (`whitening`),
 and searches again: with thresholds of the same replicas through the same, and by the same rules. Generalised least squares (Aitken
-1935) lose nothing that plain ones see, and tell causes apart that are alike where the wander is. Where the second look finds as
-much at every joint as the first has found, under other names or more, it is believed. What is next to nothing beside a greater
-cause, and may as well be what that one's law does not have, has to be found by both looks. What happened once is no matter of
-noise that is slow: where the first look names such a thing, it is all.
+1935) lose nothing that plain ones see, where the noise is that of the twin, and tell causes apart that are alike where the wander
+is. Where the second look finds as many causes at every joint as the first has found, under other names or more, and they leave no
+more of the rows as they are, it is believed. What is next to nothing beside a greater cause, and may as well be what that one's law
+does not have, has to be found by both looks. What happened once is no matter of noise that is slow: where the first look names such
+a thing, it is all. So it is where logs have rows of different spacing: no one filter makes the noise of all of them white.
 
-What it found is then told in newton metres of the rows as they are: every model with the numbers that the second look has fitted.
+What it found is then told in newton metres of the rows as they are: beside the nominal model of the first look, every model with
+the numbers that the second one has fitted.
 """
 
 from __future__ import annotations
@@ -23,20 +25,21 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.inputs import Prepared
-from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.own_motion import following, put_right
 from pipelines.model.diagnosis.pruned import Settled, settled
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step, last_step, search
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import explained, rule
+from pipelines.model.diagnosis.verdict import excess, explained, rule
 from pipelines.model.diagnosis.whitening import Whitening
 
 __all__ = ["looked_again"]
 
 _LITTLE = 1e-2  # of what stands above the floor: what only the first look has found explains no more, where it is not believed
 _LEAST = 1e-3  # of the same: what only the second look has found beside others explains at least
+_MORE, _FEW = 1.1, 0.1  # times what the first look leaves above the floor, and floors: the second one leaves no more
+_ALIKE = 1.02  # times the shortest spacing of rows, that the longest is
 _USELESS = 1e-3  # of the squared residual of a joint: of whitened rows most is noise that no model can be below
 
 
@@ -48,12 +51,12 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
         floor: (joints,) [N m] of rows as they are.
     """
     once = {family.cause for family in case.families if family.event}
-    if done.ruling.verdict == "unknown" or any(cause in once for cause, _ in _names(done)):
+    if done.ruling.verdict == "unknown" or any(cause in once for cause, _ in _names(done)) or not _evenly(case, twin):
         return done
     again = _searched(case, prepared, twin, most)
     if again.ruling.verdict != "cause" or _names(done) == _names(again):
         return done
-    plain = _as_they_are(again, case)
+    plain = _as_they_are(again, done, case)
     return plain if _believed(done, plain, floor) else done
 
 
@@ -62,13 +65,21 @@ def _believed(first: Settled, second: Settled, floor: Array) -> bool:
     before, now = _names(first), _names(second)
     if now < before:
         return _share(first, before - now, floor) < _LITTLE
-    if before and before < now:
-        return _share(second, now - before, floor) >= _LEAST
-    return _joints(first) <= _joints(second)
+    if before and before < now and _share(second, now - before, floor) < _LEAST:
+        return False
+    left = [excess(one.found.final.rms, floor) for one in (first, second)]
+    return _joints(first) <= _joints(second) and left[1] <= _MORE * left[0] + _FEW
+
+
+def _evenly(case: Case, twin: Twin) -> bool:
+    """Whether the rows of all logs are as far apart."""
+    every = (*case.data.logs, *(() if case.judge is None else case.judge.logs), *twin.data.logs)
+    steps = [float(np.median(np.diff(one.t))) for one in every if one.rows > 1]
+    return max(steps) <= _ALIKE * min(steps)
 
 
 def _searched(case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
-    whitening = Whitening.of(twin.data, np.array([one.left for one in twin.fits]))
+    whitening = Whitening.of(twin.data, np.array([replace(one).left for one in twin.fits]))
     judge = None if case.judge is None else case.judge.whitened(whitening)
     there = replace(case, data=case.data.whitened(whitening), judge=judge, families=tuple(f for f in case.families if not f.event))
     weight = 1.0 / np.maximum(refine(there.model, there.data, there.weight).rms, 1e-12)
@@ -103,26 +114,24 @@ def _joints(done: Settled) -> Counter[int | None]:
     return Counter(joint for _, joint in _names(done))
 
 
-def _as_they_are(again: Settled, case: Case) -> Settled:
-    """Every model on rows as they are."""
+def _as_they_are(again: Settled, first: Settled, case: Case) -> Settled:
+    """Every model on rows as they are, beside the nominal one of the `first` look; numbers are as sure as white rows say."""
     found = again.found
-    known: dict[int, Refined] = {}
 
-    def plain(done: Refined) -> Refined:
-        if id(done) not in known:
-            same = refine(done.model, case.data, case.weight, steps=0)
-            known[id(done)] = replace(same, known=done.covariance())
-        return known[id(done)]
-
-    def tried(one: Tried) -> Tried:
-        return replace(one, done=plain(one.done))
+    def plain(done: Refined, weight: Array | None = None) -> Refined:
+        if done is found.nominal:
+            return first.found.nominal
+        left = case.data.rms(case.data.y - done.model.torque(case.data))
+        return refine(done.model, case.data, 1.0 / np.maximum(left, 1e-12) if weight is None else weight, steps=0)
 
     def step(one: Step) -> Step:
-        rivals = {id(rival): tried(rival) for rival in one.rivals}
-        best = None if one.best is None else rivals.get(id(one.best)) or tried(one.best)
-        return replace(one, before=plain(one.before), best=best, rivals=tuple(rivals.values()))
+        before = plain(one.before)
+        rivals = {id(rival): replace(rival, done=plain(rival.done, before.weight)) for rival in one.rivals}
+        best = one.best and (rivals.get(id(one.best)) or replace(one.best, done=plain(one.best.done, before.weight)))
+        return replace(one, before=before, best=best, rivals=tuple(rivals.values()))
 
-    final = plain(found.final)
+    final = replace(plain(found.final), known=found.final.covariance())
     steps = [step(one) for one in found.steps if one.best is not None]
+    steps[0] = replace(steps[0], screened=first.found.steps[0].screened)  # of all causes, what rows as they are can tell
     last = last_step(case, final, len(steps) + 1)
-    return replace(again, found=Found(plain(found.nominal), (*steps, last), final))
+    return replace(again, found=Found(first.found.nominal, (*steps, last), final))

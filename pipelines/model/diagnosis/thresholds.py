@@ -1,7 +1,8 @@
 """What a cause has to exceed before it is believed: what the twin, in which nothing is wrong, shows of it and of its like.
 
 A threshold is three times the largest of: the most that any replica gives the cause itself; what half the causes at the same place
-get, which keeps the luck of few replicas out; and a hundredth of what is left at the joint, which is of no use to anybody. Of what
+get, which keeps the luck of few replicas out; and a hundredth of what is left at the joint, of white rows a thousandth, which is of
+no use to anybody. Of what
 happened once, which no other log bears out, twice the most that any replica gives counts.
 """
 

@@ -1,7 +1,7 @@
 """Rows whose noise is white: what neighbouring rows share of it is taken out of torque and columns alike.
 
     whitening = Whitening.of(data, residuals)       from what a model leaves of an arm in order
-    whitening.through(x, joints, stretches)         (channels, rows) as much as the rows before do not tell
+    whitening.through(x, joints, stretches)         (channels, rows) as much as the rows before do not tell; stretches of each joint
 
 A drive's zero wanders slowly, and a low-pass makes neighbours of rows alike: what is left of an arm in order has a colour. Where
 noise is slow and a cause quick, least squares of such rows weigh most what tells least. With a the best prediction of a row's noise
@@ -44,7 +44,9 @@ class Whitening:
         first = 0
         for one in data.logs:
             for joint in range(one.n_joints):
-                for stretch in one.stretches:
+                for stretch in one.stretches[joint]:
+                    if not one.weighed[joint, stretch.start]:
+                        continue
                     x = residuals[:, first + stretch.start:first + stretch.stop]
                     rows[joint] += x.size
                     for lag in range(min(_ORDER + 1, x.shape[1])):
@@ -53,12 +55,13 @@ class Whitening:
         means = products / np.maximum(rows, 1.0)[:, None]
         return cls(np.array([prediction_weights(own, _RIDGE) for own in means]))
 
-    def through(self, x: Array, joints: Sequence[int] | npt.NDArray[np.intp], stretches: Sequence[slice]) -> Array:
-        """(channels, rows) of `x`, each channel a torque of one of the `joints` (channels,); every stretch for itself."""
+    def through(self, x: Array, joints: Sequence[int] | npt.NDArray[np.intp], stretches: Sequence[Sequence[slice]]) -> Array:
+        """(channels, rows) of `x`, each channel a torque of one of the `joints` (channels,); every one of the `stretches` of its
+        joint for itself."""
         out = np.empty_like(x)
         which = np.asarray(joints)
         for joint in np.unique(which):
             own = np.flatnonzero(which == joint)
-            for stretch in stretches:
+            for stretch in stretches[joint]:
                 out[own, stretch] = prediction_errors(self.weights[joint], x[own, stretch])
         return out

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
-from pipelines.model.diagnosis.linear import covariance, deviations, solved, superfluous
+from pipelines.model.diagnosis.linear import covariance, deviations, left_out, solved, superfluous
 
 
 def _table(rows: int = 400, seed: int = 3) -> np.ndarray:
@@ -67,3 +67,54 @@ def test_deviations_are_those_that_repeated_noise_shows() -> None:
         said.append(deviations(table, noise - found[-1] @ table))
     assert np.allclose(np.mean(said, axis=0), np.std(found, axis=0), rtol=0.15)
     assert np.allclose(np.diag(covariance(table, noise)), deviations(table, noise) ** 2)
+
+
+def _repeated(lacking: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How two coefficients scatter over repetitions, and what noise alone and blocks left out say of that, on the mean; a law that
+    the model lacks pulls by so much in another direction every 60 rows."""
+    rng = np.random.default_rng(0)
+    phase = np.linspace(0.0, 300.0, 6000)
+    table = np.stack([np.sin(phase), np.ones_like(phase)])
+    blocks = np.arange(phase.size) * 30 // phase.size
+    found, noise, left = [], [], []
+    for _ in range(200):
+        slow = np.repeat(rng.standard_normal((2, 100)), 60, axis=1)  # for a third of a block, and of three times the lags
+        y = rng.standard_normal(phase.size) + lacking * np.sum(slow * table, axis=0)
+        found.append(solved(table, y))
+        rest = y - found[-1] @ table
+        noise.append(deviations(table, rest))
+        left.append(left_out(table, rest, blocks))
+    return np.std(found, axis=0), np.mean(noise, axis=0), np.mean(left, axis=0)
+
+
+def test_blocks_left_out_tell_what_a_law_lacks() -> None:
+    """Coefficients that other time asks for otherwise: neighbouring rows tell two thirds of the scatter, blocks all."""
+    scatter, noise, left = _repeated(lacking=0.5)
+    assert (noise < 0.75 * scatter).all()
+    np.testing.assert_allclose(left, scatter, rtol=0.1)
+
+
+def test_of_noise_alone_blocks_left_out_tell_as_much() -> None:
+    scatter, noise, left = _repeated(lacking=0.0)
+    np.testing.assert_allclose(noise, scatter, rtol=0.1)
+    np.testing.assert_allclose(left, scatter, rtol=0.1)
+
+
+def test_blocks_left_out_are_refits_without_them() -> None:
+    """To first order it is the very refit: the model is linear."""
+    table, rng = _table()[:3], np.random.default_rng(5)
+    y = rng.standard_normal(table.shape[1])
+    blocks = np.arange(table.shape[1]) * 8 // table.shape[1]
+    whole = solved(table, y)
+    refits = np.array([scipy.linalg.lstsq(table[:, blocks != b].T, y[blocks != b])[0] for b in range(8)])
+    expected = np.sqrt(7.0 / 8.0 * np.sum((refits - refits.mean(axis=0)) ** 2, axis=0))
+    np.testing.assert_allclose(left_out(table, y - whole @ table, blocks), expected, rtol=1e-6)
+
+
+def test_what_one_block_alone_tells_has_no_say() -> None:
+    """A column that is zero but in one block: the others do not move it, and noise is all that is known of it."""
+    table = np.stack([np.ones(400), np.where(np.arange(400) < 50, 1.0, 0.0)])
+    residual = np.random.default_rng(6).standard_normal(400)
+    residual -= solved(table, residual) @ table
+    found = left_out(table, residual, np.arange(400) // 50)
+    assert np.isfinite(found).all()

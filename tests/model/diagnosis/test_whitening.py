@@ -35,7 +35,9 @@ def covariance(rows: int) -> Any:
 def rows_of(*stretches: slice, joints: int = 1) -> Any:
     """One log with rows of so many joints."""
     count = stretches[-1].stop
-    return SimpleNamespace(n_joints=joints, logs=[SimpleNamespace(n_joints=joints, rows=count, stretches=stretches)])
+    weighed = np.ones((joints, count), dtype=bool)
+    return SimpleNamespace(n_joints=joints, logs=[SimpleNamespace(n_joints=joints, rows=count, stretches=(stretches,) * joints,
+                                                                  weighed=weighed)])
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +47,7 @@ def learnt() -> Whitening:
 
 def test_noise_is_white_and_keeps_its_size(learnt: Whitening) -> None:
     """Neighbours that shared half of their power share nothing, of noise that was not asked before."""
-    x = learnt.through(wander(np.random.default_rng(2), 40), [0] * 40, (slice(0, ROWS),))
+    x = learnt.through(wander(np.random.default_rng(2), 40), [0] * 40, [(slice(0, ROWS),)])
     shared = [np.mean(x[:, lag:] * x[:, :-lag]) / np.mean(x**2) for lag in range(1, 15)]
     np.testing.assert_allclose(shared, 0.0, atol=0.02)
     np.testing.assert_allclose(np.sqrt(np.mean(x**2)), SIZE, rtol=0.03)
@@ -56,7 +58,7 @@ def test_it_is_the_inverse_of_the_factor_of_the_covariance(learnt: Whitening) ->
     factor = cholesky(covariance(300), lower=True)
     x = wander(np.random.default_rng(3), 5, 300)
     dense = SIZE * solve_triangular(factor, x.T, lower=True).T
-    np.testing.assert_allclose(learnt.through(x, [0] * 5, (slice(0, 300),)), dense, atol=0.06 * SIZE)
+    np.testing.assert_allclose(learnt.through(x, [0] * 5, [(slice(0, 300),)]), dense, atol=0.06 * SIZE)
 
 
 def test_a_quick_signal_is_told_better_by_far() -> None:
@@ -69,8 +71,8 @@ def test_a_quick_signal_is_told_better_by_far() -> None:
     signal = np.sin(2.0 * np.pi * i / 10.0) * (1.0 + 4.0 * (i > 200)) + 8.0 * np.cos(i / 60.0)
     draws = wander(rng, 1000, rows)
     plain = draws @ signal / (signal @ signal)
-    one = white.through(signal[None], [0], (slice(0, rows),))[0]
-    general = white.through(draws, [0] * 1000, (slice(0, rows),)) @ one / (one @ one)
+    one = white.through(signal[None], [0], [(slice(0, rows),)])[0]
+    general = white.through(draws, [0] * 1000, [(slice(0, rows),)]) @ one / (one @ one)
     inverse = np.linalg.inv(covariance(rows))
     best = 1.0 / np.sqrt(signal @ inverse @ signal)
     assert np.std(general) < 0.6 * np.std(plain)
@@ -80,20 +82,29 @@ def test_a_quick_signal_is_told_better_by_far() -> None:
 def test_stretches_do_not_tell_each_other_anything(learnt: Whitening) -> None:
     """Behind a gap rows begin anew, and each joint has a noise of its own."""
     x = wander(np.random.default_rng(5), 1, 200)
-    whole = learnt.through(x, [0], (slice(0, 120), slice(120, 200)))
-    np.testing.assert_array_equal(whole[:, 120:], learnt.through(x[:, 120:], [0], (slice(0, 80),)))
+    whole = learnt.through(x, [0], [(slice(0, 120), slice(120, 200))])
+    np.testing.assert_array_equal(whole[:, 120:], learnt.through(x[:, 120:], [0], [(slice(0, 80),)]))
 
 
 def test_a_joint_without_noise_stays_as_it_is() -> None:
     two = rows_of(slice(0, 500), joints=2)
     found = Whitening.of(two, np.concatenate([wander(np.random.default_rng(6), 3, 500), np.zeros((3, 500))], axis=1))
     x = wander(np.random.default_rng(7), 1, 500)
-    np.testing.assert_array_equal(found.through(x, [1], (slice(0, 500),)), x)
+    np.testing.assert_array_equal(found.through(x, [1], [(), (slice(0, 500),)]), x)
 
 
-@pytest.fixture(scope="module")
-def data() -> Data:
-    return prepare(Logs((hidden(1),)), DiagnosisSettings()).data
+@pytest.fixture(scope="module", params=[0.0, 0.3])
+def data(request: pytest.FixtureRequest) -> Data:
+    """Of all rows, and of those of a joint that is not slow."""
+    return prepare(Logs((hidden(1),)), DiagnosisSettings(min_speed=(request.param,))).data
+
+
+def test_rows_that_do_not_count_are_no_neighbours(data: Data) -> None:
+    """Zeros in their place make no difference: a replica has them, a log has what it had."""
+    whitening = Whitening.of(data, wander(np.random.default_rng(9), 6, data.rows))
+    x = wander(np.random.default_rng(10), 3, data.rows)
+    whole, masked = (np.where(data.counts, data.through(whitening, one), 0.0) for one in (x, np.where(data.counts, x, 0.0)))
+    np.testing.assert_array_equal(whole, masked)
 
 
 def test_torque_and_columns_pass_alike(data: Data) -> None:
