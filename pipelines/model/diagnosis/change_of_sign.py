@@ -76,12 +76,25 @@ def _left(prepared: Prepared) -> list[Array]:
 def plainer_of(found: Diagnosis, again: Diagnosis) -> Diagnosis:
     """The one that finds less, and of as much the one whose curve is fitted, `again`, even where that is without a name: what
     was `found` are names that the curve may have given. Where `found` has no name, an answer; where it is what has changed, a
-    name, for the curve was the same before."""
+    name, for the curve was the same before. Of the same names, `found` where it leaves clearly less held out: a curve may have been
+    fitted to what the law of a cause has."""
     if found.verdict == "unknown":
         return found if again.verdict == "unknown" else again
     if again.verdict == "unknown" and found.question == "what has changed":
         return found
+    if _names(found) == _names(again) and _less(found, again):
+        return found
     return min(again, found, key=lambda one: len(one.findings))
+
+
+def _names(found: Diagnosis) -> set[tuple[str, int | None]]:
+    return {(one.cause, one.joint) for one in found.findings}
+
+
+def _less(one: Diagnosis, other: Diagnosis) -> bool:
+    """Whether one leaves clearly less of some held-out joint, and the other of none."""
+    mine, theirs = one.after_rms.validate, other.after_rms.validate
+    return bool((mine < LESS * theirs).any() and not (theirs < LESS * mine).any())
 
 
 def _turning(law: Finding, found: Diagnosis) -> bool:

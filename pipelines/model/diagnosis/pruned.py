@@ -39,6 +39,7 @@ _LEAST = 0.002  # of the squared residual, where nothing else says what a cause 
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
 _SHAPE = "it only mends the shape of what was found before it at the joint"
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
+_IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
 _STOOD = "what was found after it at the joint leaves less without it"
 
 
@@ -77,7 +78,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         kept.remove(idle)
         doubts[idle] = "beside the others it takes nothing off the held-out error"
         final = _without(found, kept, case, final)
-    while kept and (why := _harm(found, final, case)):
+    while kept and (why := _harm(found, final, case) or ("" if _possible(final) else _IMPOSSIBLE)):
         doubts[kept.pop()] = why
         final = _without(found, kept, case, final)
     if not known and kept and (unsure := _unseen(found, kept, final, case, floor)):
@@ -215,7 +216,7 @@ def _turned(found: Found, kept: list[int], believed: list[int], case: Case) -> l
         for j in (j for j in kept if j < k and _mistaken(found, j, k, case)):
             other = sorted({*kept, k} - {j})
             here, there = (_without(found, some, case) for some in (kept, other))
-            if there.rss < _DECIDED * here.rss and held_out(there, case) < _DECIDED * held_out(here, case):
+            if _possible(there) and there.rss < _DECIDED * here.rss and held_out(there, case) < _DECIDED * held_out(here, case):
                 kept = other
                 break
     return kept
@@ -247,12 +248,19 @@ def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | No
         if one.log is not None:
             continue
         rest = _without(found, [other for other in kept if other != k], case, final)
+        if not _possible(rest):  # what another would have to be without it, it cannot be
+            continue
         missed = (rest.rss - final.rss) / max(_bound(case, one.effect, final, bounds), 1e-300)
         if held_out(rest, case) <= (1.0 + _PAYS) * error:
             missed = min(missed, 0.999)
         if missed < share:
             least, share = k, missed
     return least
+
+
+def _possible(done: Refined) -> bool:
+    """Whether the numbers of every cause lie in their ranges: fitted beside others, or without them, a hump may become a dip."""
+    return all(one.possible for one in done.model.effects)
 
 
 def _bound(case: Case, effect: Effect, final: Refined, bounds: Array | None) -> float:

@@ -16,7 +16,7 @@ FLOOR = np.array([0.01, 0.01, 0.01])
 
 
 def left(*rms: float) -> Any:
-    return SimpleNamespace(rms=np.array(rms))
+    return SimpleNamespace(rms=np.array(rms), model=SimpleNamespace(effects=()))
 
 
 def searched(nominal: Any, *causes: tuple[Effect, Any]) -> Any:
@@ -25,7 +25,7 @@ def searched(nominal: Any, *causes: tuple[Effect, Any]) -> Any:
     for effect, after in causes:
         steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=after, effect=effect)))
         before = after
-    model = SimpleNamespace(effects=tuple(SimpleNamespace(effect=effect, log=None) for effect, _ in causes))
+    model = SimpleNamespace(effects=tuple(SimpleNamespace(effect=effect, log=None, possible=True) for effect, _ in causes))
     return SimpleNamespace(nominal=nominal, steps=steps, final=SimpleNamespace(rms=before.rms, model=model))
 
 

@@ -166,6 +166,18 @@ def test_of_two_diagnoses_the_one_that_finds_less_holds_and_an_answer_before_non
     assert plainer_of(changed, one) is one
 
 
+@pytest.mark.parametrize(("first", "second", "held"), [
+    ((0.010, 0.010), (0.016, 0.010), 0), ((0.010, 0.010), (0.0102, 0.010), 1), ((0.010, 0.016), (0.016, 0.010), 1),
+    ((0.016, 0.010), (0.010, 0.010), 1)])
+def test_of_the_same_names_the_one_that_leaves_clearly_less_holds(first: tuple[float, ...], second: tuple[float, ...],
+                                                                 held: int) -> None:
+    """Held out, at some joint, and more at none; else the one whose curve is fitted."""
+    both = [told("cause", ("concave_friction:1",)) for _ in range(2)]
+    for one, left in zip(both, (first, second), strict=True):
+        one.after_rms = SimpleNamespace(validate=np.array(left))  # type: ignore[misc, assignment]
+    assert plainer_of(*both) is both[held]
+
+
 @pytest.mark.parametrize("question", ["what is wrong", "what has changed"])
 @pytest.mark.parametrize(("speed", "asked"), [(0.02, True), (0.3, False)])
 def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(speed: float, asked: bool, question: str) -> None:

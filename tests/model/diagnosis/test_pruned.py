@@ -103,18 +103,26 @@ def test_held_out_motion_is_asked_only_where_it_can_tell(judge: Any, changed: An
     assert pruned._elsewhere(said, searched(left(0.01, 0.01, 0.01)), case, FLOOR, known) is said
 
 
+def model_of(**numbers: Any) -> Any:
+    """A fitted model with one cause, whose numbers it can have."""
+    return SimpleNamespace(model=SimpleNamespace(effects=[SimpleNamespace(possible=True)]), **numbers)
+
+
 def test_the_cause_that_is_missed_least_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the first the residual grows by ten thresholds, without the second by half of one: the second is idle."""
     found = searched(left(0.5, 0.05, 0.01), (effect("cogging", 1), left(0.01, 0.05, 0.01)),
                      (effect("torque_offset", 2), left(0.01, 0.01, 0.01)))
     final: Any = SimpleNamespace(rss=100.0, weight=np.ones(3))
-    without = {(1,): SimpleNamespace(rss=200.0), (0,): SimpleNamespace(rss=105.0)}
+    without = {(1,): model_of(rss=200.0), (0,): model_of(rss=105.0)}
     monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last: without[tuple(kept)])
     monkeypatch.setattr(pruned, "held_out", lambda done, case: done.rss)
     families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="torque_offset", joint=2))
     thresholds = SimpleNamespace(at=lambda weight: SimpleNamespace(gain=np.array([10.0, 10.0])))
     case: Any = SimpleNamespace(families=families, thresholds=thresholds)
     assert pruned._idle(found, [0, 1], case, final) == 1
+    without[0,].model.effects[0].possible = False  # a hump that would have to be a dip without it
+    assert pruned._idle(found, [0, 1], case, final) is None
+    without[0,].model.effects[0].possible = True
     thresholds.at = lambda weight: SimpleNamespace(gain=np.array([10.0, 1.0]))
     assert pruned._idle(found, [0, 1], case, final) is None
 
@@ -123,7 +131,7 @@ def test_a_cause_that_brings_nothing_held_out_is_idle_however_much_it_fits(monke
     found = searched(left(0.5, 0.05, 0.01), (effect("cogging", 1), left(0.01, 0.05, 0.01)),
                      (effect("torque_offset", 2), left(0.01, 0.01, 0.01)))
     final: Any = SimpleNamespace(rss=100.0, weight=np.ones(3))
-    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last: SimpleNamespace(rss=1000.0, kept=kept))
+    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last: model_of(rss=1000.0, kept=kept))
     monkeypatch.setattr(pruned, "held_out", lambda done, case: 2.0 if getattr(done, "kept", None) == [1] else 1.0)
     families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="torque_offset", joint=2))
     case: Any = SimpleNamespace(families=families, thresholds=None)
@@ -210,6 +218,25 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(rest: float, ve
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", ruled, ""), case, case, FLOOR)
     assert done.ruling.verdict == verdict
     assert done.ruling.named == ((1,) if verdict == "cause" else ())
+
+
+def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Found as it may be; fitted with what was found before it, its amplitude has the wrong sign."""
+    made = searched(left(0.1, 0.01, 0.01), (effect("cogging", 1), left(0.02, 0.01, 0.01)),
+                    (effect("stribeck", 2), left(0.01, 0.01, 0.01)))
+    for step in made.steps:
+        step.best.log, step.other = None, None
+    for name, answer in {"_simulated": (), "at_which": "", "at_odds": "", "_strays": "", "_not_told": False, "_harm": "",
+                         "_apart": [0, 1], "_idle": None}.items():
+        monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
+    monkeypatch.setattr(pruned, "_turned", lambda found, kept, *_: kept)
+    dip = SimpleNamespace(effects=(SimpleNamespace(possible=True), SimpleNamespace(possible=False)))
+    both, one = SimpleNamespace(rms=np.array([0.01, 0.01, 0.01]), model=dip), left(0.02, 0.01, 0.01)
+    monkeypatch.setattr(pruned, "_without", lambda found, kept, *_: both if len(kept) == 2 else one)
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None)
+    done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
+    assert done.ruling.named == (0,)
+    assert done.ruling.doubts == {1: pruned._IMPOSSIBLE}
 
 
 @pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])
