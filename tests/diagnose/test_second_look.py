@@ -107,7 +107,7 @@ def test_rows_of_different_spacing_have_no_second_look(steps: tuple[float, float
 @pytest.mark.parametrize(("verdict", "names"), [("unknown", ()), ("cause", (effect("cogging", 1),))])
 def test_what_is_unknown_stays_so_and_what_happened_once_is_all(verdict: str, names: tuple[Any, ...],
                                                                 monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(second_look, "_searched", lambda *_: pytest.fail("looked again"))
+    monkeypatch.setattr(second_look, "_in_white", lambda *_: pytest.fail("looked again"))
     done = looked(*((one, left(0.01, 0.1, 0.01)) for one in names))
     done.ruling.verdict = verdict
     case: Any = SimpleNamespace(families=(SimpleNamespace(cause="cogging", event=True),))

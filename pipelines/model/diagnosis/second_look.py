@@ -51,9 +51,15 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
         floor: (joints,) [N m] of rows as they are.
     """
     once = {family.cause for family in case.families if family.event}
-    if done.ruling.verdict == "unknown" or any(cause in once for cause, _ in _names(done)) or not _evenly(case, twin):
+    if done.ruling.verdict == "unknown" or any(name and name[0] in once for name in _names(done)) or not _evenly(case, twin):
         return done
-    again = _searched(case, prepared, twin, most)
+    there, whitened, usual = _in_white(case, twin)
+    found = search(there, most)
+    if {_name(step) for step in found.steps if step.best is not None} == _names(done):
+        return done  # what is named would be the same, and its simulation is dear
+    mended = put_right(found.nominal.fit, found.final.fit, usual)
+    ready = replace(prepared, data=there.data, judge=there.judge)
+    again = settled(found, rule(found, whitened.rms, True, mended), there, ready, whitened.rms)
     if again.ruling.verdict != "cause" or _names(done) == _names(again):
         return done
     plain = _as_they_are(again, done, case)
@@ -78,7 +84,8 @@ def _evenly(case: Case, twin: Twin) -> bool:
     return max(steps) <= _ALIKE * min(steps)
 
 
-def _searched(case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
+def _in_white(case: Case, twin: Twin) -> tuple[Case, Twin, Array]:
+    """The case and its twin in whitened rows; (joints,) the most that any replica's residual follows a joint's own motion there."""
     whitening = Whitening.of(twin.data, np.array([replace(one).left for one in twin.fits]))
     judge = None if case.judge is None else case.judge.whitened(whitening)
     there = replace(case, data=case.data.whitened(whitening), judge=judge, families=tuple(f for f in case.families if not f.event))
@@ -86,32 +93,30 @@ def _searched(case: Case, prepared: Prepared, twin: Twin, most: int) -> Settled:
     same = twin.through(whitening)
     first, residuals = same.weighted(weight)
     bounds = Thresholds.of_twin(first, residuals, there.families, case.model.nominal, _USELESS)
-    there = replace(there, weight=weight, thresholds=bounds, white=True)
-    found = search(there, most)
-    usual = following(first, residuals).max(axis=1)
-    mended = put_right(found.nominal.fit, found.final.fit, usual)
-    ready = replace(prepared, data=there.data, judge=judge)
-    return settled(found, rule(found, same.rms, True, mended), there, ready, same.rms)
+    return replace(there, weight=weight, thresholds=bounds, white=True), same, following(first, residuals).max(axis=1)
 
 
-def _names(done: Settled) -> set[tuple[str, int | None]]:
-    best = [done.found.steps[k].best for k in done.ruling.named]
-    return {(one.effect.name, one.effect.joint) for one in best if one is not None}
+def _names(done: Settled) -> set[tuple[str, int | None] | None]:
+    return {_name(done.found.steps[k]) for k in done.ruling.named}
 
 
-def _share(done: Settled, names: set[tuple[str, int | None]], floor: Array) -> float:
+def _name(step: Step) -> tuple[str, int | None] | None:
+    return None if step.best is None else (step.best.effect.name, step.best.effect.joint)
+
+
+def _share(done: Settled, names: set[tuple[str, int | None] | None], floor: Array) -> float:
     """What the causes of these names explain together of what stands above the floor, in rows as they are."""
     nominal, total = done.found.nominal.rms, 0.0
     for k in done.ruling.named:
         step = done.found.steps[k]
-        if step.best is not None and (step.best.effect.name, step.best.effect.joint) in names:
+        if step.best is not None and _name(step) in names:
             total += explained(step.before.rms, step.best.done.rms, nominal, floor)
     return total
 
 
 def _joints(done: Settled) -> Counter[int | None]:
     """How many causes it names at each joint."""
-    return Counter(joint for _, joint in _names(done))
+    return Counter(name[1] for name in _names(done) if name)
 
 
 def _as_they_are(again: Settled, first: Settled, case: Case) -> Settled:
