@@ -6,7 +6,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing.context import ForkServerContext
 from multiprocessing.forkserver import ensure_running
 from typing import Final
@@ -30,8 +34,23 @@ def warm_up(module: str) -> ForkServerContext:
     one_thread()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([*_NEEDED, module, *_main()])
-    ensure_running()
+    with _deaf():
+        ensure_running()
     return context
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """What is started meanwhile does not hear Ctrl-C, which is this process's to answer: it would end in a traceback out of
+    whatever it was just importing."""
+    if threading.current_thread() is not threading.main_thread():  # no other thread may have handlers
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _main() -> list[str]:

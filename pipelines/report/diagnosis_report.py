@@ -66,7 +66,7 @@ def _verdict(result: Result) -> str:
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         return f"Nothing{since}, as far as these logs can tell: what they could have shown stands below.{caveat}"
     if result.verdict == "unknown":
-        return f"Something is wrong that has no name here: {without_keys(result.reason)}."
+        return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(words for _, words in together(more))}" if more else ""
@@ -104,7 +104,7 @@ def _unknown(result: Result) -> list[Section]:
         return []
     near = sorted(_nearest(result.ledger).items(), key=lambda one: -one[1])[:5]
     names = ", ".join(f"{named(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
-    tried = f" The nearest explanations, none of them good enough: {names}." if near else ""
+    tried = f" The nearest explanations, none of which is named: {names}." if near else ""
     return [Section("Why there is no name", (
         as_sentence(without_keys(result.reason)) + tried, *_follows(result),
         "A wrong name costs more than none. What follows shows where and when the residual stands above its floor."))]

@@ -55,3 +55,27 @@ def test_only_what_is_gone_with_the_batch_is_not_told(shared: str, gone: str, to
     assert done.returncode == 1
     assert told in done.stderr
     assert bool(told) == ("Traceback" in done.stderr), done.stderr
+
+
+_INTERRUPTED = """
+import os, signal, time
+signal.signal(signal.SIGINT, lambda *_: None)
+from pipelines.batch.server import warm_up
+
+warm_up("pipelines.run")
+time.sleep(0.3)  # what it imports takes longer
+os.killpg(0, signal.SIGINT)
+context = warm_up("pipelines.run")
+worker = context.Process(target=print, args=("here",))
+worker.start()
+worker.join()
+os._exit(worker.exitcode)
+"""
+
+
+def test_what_workers_are_forked_from_does_not_hear_an_interruption_while_it_imports() -> None:
+    """Ctrl-C goes to the whole group; it is this process's to answer, and workers go on as long as that wants them."""
+    done = subprocess.run([sys.executable, "-c", _INTERRUPTED], env=os.environ | {"PYTHONPATH": str(REPO)}, capture_output=True,
+                          text=True, check=False, start_new_session=True)
+    assert (done.returncode, done.stdout) == (0, "here\n")
+    assert not done.stderr

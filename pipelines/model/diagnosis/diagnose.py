@@ -53,7 +53,8 @@ __all__ = ["diagnose"]
 Tell = Callable[[str], None]
 
 _MOVED = ("the base parameters have moved since the reference logs, and no cause that is known moves them so: one set for "
-          "before and after leaves {:.2g} times what a set for each leaves; look at the tool, and at the zeros of the encoders")
+          "before and after leaves {:.2g} times what a set for each leaves; look at the tool, at the zeros of the encoders, and at "
+          "the torque constants of all drives")
 
 
 def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | None = None, tell: Tell | None = None,

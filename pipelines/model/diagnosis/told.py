@@ -118,7 +118,7 @@ def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool
         caveat = f": {ruling.reason}" if ruling.reason else ""
         return f"Nothing is wrong with this arm, as far as these logs can tell{caveat}."
     if ruling.verdict == "unknown":
-        return f"Something is wrong that has no name here: {ruling.reason}."
+        return f"Something is wrong, and no cause is named: {ruling.reason}."
     first = named[0]
     more = f"; and {len(named) - 1} more" if len(named) > 1 else ""
     turns = revolute if first.joint is None else revolute[first.joint - 1:first.joint]

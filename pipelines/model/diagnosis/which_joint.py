@@ -1,6 +1,6 @@
 """Whether logs tell at which joint a cause is.
 
-    why = at_which(step)        empty where they do
+    why = at_which(step, compared)        empty where they do
 
 Of two joints' torque scales only the ratio shows: a drive that gives a tenth too little is the other that gives a ninth too much,
 and masses that nobody knows fit either. A name at the wrong joint is worse than none, so that there is none then. What is the same
@@ -19,22 +19,39 @@ __all__ = ["at_which"]
 
 _AS_LITTLE = 0.01  # of what the best leaves, fitted and held out, another leaves more at most
 _AS_MUCH = 0.05  # of what the best takes away, another takes less at most
+_GIVE = "give logs from before it happened, of role reference"
+_SEE = "see by `rrrid estimate-bps` at which of them base parameters and friction are other than in the reference logs"
 _ONE_TORQUE = 0.9  # cosine from which two are the same torque
 
 
-def at_which(step: Step) -> str:
-    """Why the cause that `step` has found cannot be told at its joint; empty where it can."""
+def at_which(step: Step, compared: bool = False) -> str:
+    """Why the cause that `step` has found cannot be told at its joint; empty where it can.
+
+    Args:
+        compared: whether there are reference logs. The later logs have masses and friction of their own here: which joint's have
+            moved is another question, that those logs may answer.
+    """
     best = step.best
     if best is None or best.log is not None or best.effect.joint is None:
         return ""
-    others = [one.effect for one in step.rivals
-              if _elsewhere(one, best) and _as_good(one, best, step) and not _one_torque(one, best)]
+    others = [one for one in step.rivals if _elsewhere(one, best) and _as_good(one, best, step) and not _one_torque(one, best)]
     if not others:
         return ""
-    title, experiment = best.effect.title, best.effect.experiment
-    places = " or ".join(f"at joint {one.joint}" for one in (best.effect, *others))
-    return (f"{title[:1].lower()}{title[1:]} {places} explains it, and these logs do not tell at which; to tell: "
-            f"{experiment[:1].lower()}{experiment[1:].rstrip('.')}")
+    title, first = best.effect.title, _SEE if compared else _GIVE
+    places = " or ".join(f"at joint {one.effect.joint}{_number(one)}" for one in (best, *others))
+    return (f"{_lower(title)} {places} explains it, and this look does not tell at which. {best.effect.remedy} "
+            f"To tell: {first}; or {_lower(best.effect.experiment).rstrip('.')}")
+
+
+def _lower(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
+
+
+def _number(one: Tried) -> str:
+    """What it would be there: its first number."""
+    effect = one.done.model.effects[-1]
+    value = effect.values.get(effect.effect.parameters[0].name)
+    return "" if value is None else f" ({effect.effect.parameters[0].name} {value:.3g})"
 
 
 def _elsewhere(one: Tried, best: Tried) -> bool:

@@ -208,7 +208,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(rest: float, ve
         step.best.effect, step.best.log = SimpleNamespace(last=False), None
         step.other = None
     monkeypatch.setattr(pruned, "_simulated", lambda *args: ())
-    monkeypatch.setattr(pruned, "at_which", lambda step: "")
+    monkeypatch.setattr(pruned, "at_which", lambda *_: "")
     monkeypatch.setattr(pruned, "at_odds", lambda found, k, *args: "logs do not agree" if k == 0 else "")
     monkeypatch.setattr(pruned, "_strays", lambda *args: "")
     monkeypatch.setattr(pruned, "_not_told", lambda *args: False)
