@@ -45,6 +45,19 @@ def test_a_torque_scale_of_one_of_two_joints_is_told_of_neither(planar: tuple[Ex
     assert "at joint 1" in found.reason
     assert "at joint 2" in found.reason
     assert "known load" in found.reason
+    assert "reference" in found.reason
+    assert f"at joint {joint} (gain_error -0.09" in found.reason
+
+
+@pytest.mark.parametrize("joint", [1, 2])
+def test_reference_logs_tell_at_which_joint_it_is(planar: tuple[ExperimentLog, ...], joint: int) -> None:
+    """Masses are what they were: those of the other joint would have had to grow by a tenth."""
+    before = tuple(replace(log, name=f"{log.name}-before", role="reference") for log in planar if log.role == "identify")
+    found = diagnosed((*before, *(scaled(log, joint) for log in planar)), "torque_gain", "torque_offset")
+    assert [(one.cause, one.joint) for one in found.findings] == [("torque_gain", joint)]
+    error = found.findings[0].parameters["gain_error"]
+    assert error.std is not None
+    assert abs(error.value - (1.0 / WRONG - 1.0)) < 3.0 * error.std < 0.005  # applied is less than logged
 
 
 def test_what_is_seen_at_its_joint_alone_has_its_name_there(planar: tuple[ExperimentLog, ...]) -> None:

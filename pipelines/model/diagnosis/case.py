@@ -11,6 +11,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.candidates import Arms, Family
 from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.elsewhere import Shared
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.refit import Refined
@@ -37,6 +38,7 @@ class Case:
     blocks: int = 10
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Changed | None = None  # what has changed since the reference logs
+    shared: Shared | None = None  # at which of several joints it has, masses being what they were
     again: bool = True  # a cause that may act more than once at its place may be found more than once
     white: bool = False  # its rows were whitened: little of them is signal, and every cause takes a small share
     beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing

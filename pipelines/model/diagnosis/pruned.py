@@ -58,7 +58,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    elsewhere = {k: at_which(found.steps[k], case.changed is not None) for k in ruling.named}
+    elsewhere = {k: at_which(found.steps[k], case.shared) for k in ruling.named}
     doubts = {k: ONLY_THEN if only_then(found.final, k) else elsewhere[k] or
               at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}

@@ -20,6 +20,7 @@ import numpy as np
 from pipelines.model.diagnosis.borne_out import borne_out, not_borne_out
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.curves import with_curves_anew
+from pipelines.model.diagnosis.elsewhere import at_its_joint
 from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole, plainer
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import fit_columns
@@ -286,6 +287,8 @@ def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, 
         refused |= {id(one.screened) for one in tried if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
         tried = [one for one in tried if id(one.screened) not in refused]
     best = (chosen or fewest(tried)) if more else None
+    if best is not None and case.shared is not None:
+        best = at_its_joint(best, tried, now, case.shared)
     other = unnameable(gate.passed, best, explored.tried, now, case)
     best = None if other is not None else best
     trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number, refused)

@@ -29,6 +29,7 @@ from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.effects.base import Effect
 
 __all__ = ["Known", "Moved", "Probed", "Since", "since_reference"]
 
@@ -88,16 +89,23 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         return Probe.of(found, judge, seen, (data, fit, later)), bounds(every, [True] * len(every), fit, later, chance)
 
     acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
-    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed,
-                beside=(*before, *acting))
     kept = len(columns.kept)
 
-    def moved(found: Refined, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
+    def sessions(found: Refined) -> Sessions:
         """The numbers of what was found stay free: they were fitted beside base parameters that could do a part of it."""
         rows, _ = joined(reference, less(prepared.data, found.of_effects))
-        beside = np.concatenate([common, _slopes(found, later)])
-        two = Sessions(rows, later, base[:kept], nominal[kept:], beside, whole.weight)
-        return absorbed(two, arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)
+        return Sessions(rows, later, base[:kept], nominal[kept:], np.concatenate([common, _slopes(found, later)]), whole.weight)
+
+    def of_one_set(found: Refined, effect: Effect) -> float:
+        two = sessions(found)
+        left = two.fit(moved=False, more=two.acting(effect, arm)).residual
+        return float(left @ left)
+
+    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed, shared=of_one_set,
+                beside=(*before, *acting))
+
+    def moved(found: Refined, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
+        return absorbed(sessions(found), arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)
 
     pairs = list(zip(standing, sizes, strict=True))
     return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed)
