@@ -101,8 +101,8 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         left = two.fit(moved=False, more=two.acting(effect, arm)).residual
         return float(left @ left)
 
-    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed, shared=of_one_set,
-                beside=(*before, *acting))
+    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed,
+                shared=of_one_set, beside=(*before, *acting))
 
     def moved(found: Refined, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
         return absorbed(sessions(found), arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)
