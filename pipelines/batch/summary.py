@@ -92,7 +92,8 @@ def _verdict(summary: Summary) -> str:
     total, wrong, found = len(summary.records), summary.count("rejected", "failed"), summary.count("found")
     said = f"{total} items: {total - wrong - found} in order"
     said += f", in {found} something was found" if found else ""
-    said += f", {wrong} {'was' if wrong == 1 else 'were'} rejected or failed" if wrong else ""
+    how = "rejected, failed or not done" if summary.interrupted else "rejected or failed"
+    said += f", {wrong} {'was' if wrong == 1 else 'were'} {how}" if wrong else ""
     begun = "Interrupted; what is missing is done with --resume. " if summary.interrupted else ""
     begun += "Nothing was held against the baseline. " if _unmet(summary) else ""
     moved = [(c, d) for d in summary.drifts if _beyond_chance(d) for c in d.figures if c.moved]

@@ -49,7 +49,7 @@ def _above(found: Diagnosis, one: Evidence, rated: Sequence[float], units: Units
         rows.append((j + 1, torques[j], _digits(share), torques[joints + j],
                      _digits(100.0 * float(one.above_floor[j])), band))
     columns = ("joint", f"residual, rms [{units.torque}]", "residual [% of rated]", f"floor [{units.torque}]",
-               "power above the floor [%]", "mostly between [Hz]")
+               "power above the floor [%]", "mostly at [Hz]")
     return Table(columns, tuple(rows), "Of the nominal model, refitted to these logs.")
 
 
