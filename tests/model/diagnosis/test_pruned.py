@@ -214,7 +214,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(rest: float, ve
     monkeypatch.setattr(pruned, "_not_told", lambda *args: False)
     monkeypatch.setattr(pruned, "_harm", lambda *args: "")
     monkeypatch.setattr(pruned, "_without", lambda *args: left(rest, 0.01, 0.01))
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None)
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None)
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", ruled, ""), case, case, FLOOR)
     assert done.ruling.verdict == verdict
     assert done.ruling.named == ((1,) if verdict == "cause" else ())
@@ -233,7 +233,7 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     dip = SimpleNamespace(effects=(SimpleNamespace(possible=True), SimpleNamespace(possible=False)))
     both, one = SimpleNamespace(rms=np.array([0.01, 0.01, 0.01]), model=dip), left(0.02, 0.01, 0.01)
     monkeypatch.setattr(pruned, "_without", lambda found, kept, *_: both if len(kept) == 2 else one)
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None)
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None)
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
     assert done.ruling.named == (0,)
     assert done.ruling.doubts == {1: pruned._IMPOSSIBLE}
