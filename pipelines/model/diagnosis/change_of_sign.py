@@ -5,6 +5,7 @@
                                 friction changes its sign
     loosened(prepared)          the same rows, for laws that fit the curve as well
     shows(prepared, other)      whether these leave less
+    clearly_less(one, other)    whether one model does, and nowhere clearly more
     plainer_of(found, again)    which of the two diagnoses holds
 
 It is asked after a look by the laws as they are, and not from the start: a torque that is late, or another joint's, bends the
@@ -27,10 +28,10 @@ from pipelines.model.diagnosis.parsimony import different
 from pipelines.model.diagnosis.result import Diagnosis, Finding
 from pipelines.model.effects import find_effect
 
-__all__ = ["LESS", "SEVERAL", "loosened", "of_one_law", "plainer_of", "shows", "wrong_law"]
+__all__ = ["SEVERAL", "clearly_less", "loosened", "of_one_law", "plainer_of", "shows", "wrong_law"]
 
 SEVERAL = 2  # joints
-LESS = 0.95
+_LESS = 0.95
 _WIDTHS = 10.0  # by then tanh and the root have come to their level, within half a per cent
 
 
@@ -63,7 +64,7 @@ def of_one_law(causes: Iterable[tuple[str, int | None]]) -> bool:
 
 def shows(prepared: Prepared, other: Prepared) -> bool:
     """Whether the `loosened` laws, `other`, leave clearly less of some joint, fitted or held out."""
-    return any(bool((less < LESS * most).any()) for less, most in zip(_left(other), _left(prepared), strict=True))
+    return any(bool((less < _LESS * most).any()) for less, most in zip(_left(other), _left(prepared), strict=True))
 
 
 def _left(prepared: Prepared) -> list[Array]:
@@ -82,7 +83,7 @@ def plainer_of(found: Diagnosis, again: Diagnosis) -> Diagnosis:
         return found if again.verdict == "unknown" else again
     if again.verdict == "unknown" and found.question == "what has changed":
         return found
-    if _names(found) == _names(again) and _less(found, again):
+    if _names(found) == _names(again) and clearly_less(found.after_rms.validate, again.after_rms.validate):
         return found
     return min(again, found, key=lambda one: len(one.findings))
 
@@ -91,10 +92,9 @@ def _names(found: Diagnosis) -> set[tuple[str, int | None]]:
     return {(one.cause, one.joint) for one in found.findings}
 
 
-def _less(one: Diagnosis, other: Diagnosis) -> bool:
-    """Whether one leaves clearly less of some held-out joint, and the other of none."""
-    mine, theirs = one.after_rms.validate, other.after_rms.validate
-    return bool((mine < LESS * theirs).any() and not (theirs < LESS * mine).any())
+def clearly_less(one: Array, other: Array) -> bool:
+    """Whether one leaves clearly less of some joint, and the other of none; each (joints,) [N m] rms."""
+    return bool((one < _LESS * other).any() and not (other < _LESS * one).any())
 
 
 def _turning(law: Finding, found: Diagnosis) -> bool:

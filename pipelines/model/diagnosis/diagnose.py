@@ -45,6 +45,7 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
 from pipelines.model.diagnosis.verdict import Ruling, rule
+from pipelines.model.diagnosis.words import within
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 
@@ -209,7 +210,7 @@ def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared,
         why = "the base parameters have moved as it moves them, beside something that has no name"
         return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
     if (like := _alike(moved.effect, told.findings)) is not None:
-        why = f"the base parameters have moved, but {like.title[:1].lower()}{like.title[1:]}, which was found, moves them too"
+        why = f"the base parameters have moved, but {within(like.title)}, which was found, moves them too"
         return _not_accepted(told, moved.effect.name, moved.effect.joint, why)
     if why := moved.unsure:
         if told.findings:

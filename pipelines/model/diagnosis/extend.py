@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.candidates import Family, families, place_of, who
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.chance import BY_CHANCE
-from pipelines.model.diagnosis.change_of_sign import LESS, loosened, shows
+from pipelines.model.diagnosis.change_of_sign import clearly_less, loosened, shows
 from pipelines.model.diagnosis.drive_noise import white
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding
@@ -107,8 +107,7 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
 
 def _better(found: Extended, again: Extended) -> Extended:
     """`again`, with the curve of friction fitted, where that leaves clearly less of some joint held out and of none more."""
-    ratio = again.after.validate / np.maximum(found.after.validate, 1e-300)
-    return again if (ratio < LESS).any() and (ratio < 1.0 / LESS).all() else found
+    return again if clearly_less(again.after.validate, found.after.validate) else found
 
 
 def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSettings, say: Callable[[str], None],

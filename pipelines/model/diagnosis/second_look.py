@@ -18,6 +18,7 @@ the numbers that the second one has fitted.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +37,8 @@ from pipelines.model.diagnosis.whitening import Whitening
 
 __all__ = ["looked_again"]
 
+Name = tuple[str, int | None]  # a cause and its joint
+
 _LITTLE = 1e-2  # of what stands above the floor: what only the first look has found explains no more, where it is not believed
 _LEAST = 1e-3  # of the same: what only the second look has found beside others explains at least
 _MORE, _FEW = 1.1, 0.1  # times what the first look leaves above the floor, and floors: the second one leaves no more
@@ -51,11 +54,11 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
         floor: (joints,) [N m] of rows as they are.
     """
     once = {family.cause for family in case.families if family.event}
-    if done.ruling.verdict == "unknown" or any(name and name[0] in once for name in _names(done)) or not _evenly(case, twin):
+    if done.ruling.verdict == "unknown" or any(cause in once for cause, _ in _names(done)) or not _evenly(case, twin):
         return done
     there, whitened, usual = _in_white(case, twin)
     found = search(there, most)
-    if {_name(step) for step in found.steps if step.best is not None} == _names(done):
+    if _of(found.steps) == _names(done):
         return done  # what is named would be the same, and its simulation is dear
     mended = put_right(found.nominal.fit, found.final.fit, usual)
     ready = replace(prepared, data=there.data, judge=there.judge)
@@ -96,27 +99,27 @@ def _in_white(case: Case, twin: Twin) -> tuple[Case, Twin, Array]:
     return replace(there, weight=weight, thresholds=bounds, white=True), same, following(first, residuals).max(axis=1)
 
 
-def _names(done: Settled) -> set[tuple[str, int | None] | None]:
-    return {_name(done.found.steps[k]) for k in done.ruling.named}
+def _names(done: Settled) -> set[Name]:
+    return _of(done.found.steps[k] for k in done.ruling.named)
 
 
-def _name(step: Step) -> tuple[str, int | None] | None:
-    return None if step.best is None else (step.best.effect.name, step.best.effect.joint)
+def _of(steps: Iterable[Step]) -> set[Name]:
+    return {(best.effect.name, best.effect.joint) for step in steps if (best := step.best) is not None}
 
 
-def _share(done: Settled, names: set[tuple[str, int | None] | None], floor: Array) -> float:
+def _share(done: Settled, names: set[Name], floor: Array) -> float:
     """What the causes of these names explain together of what stands above the floor, in rows as they are."""
     nominal, total = done.found.nominal.rms, 0.0
     for k in done.ruling.named:
         step = done.found.steps[k]
-        if step.best is not None and _name(step) in names:
+        if _of([step]) & names and step.best is not None:
             total += explained(step.before.rms, step.best.done.rms, nominal, floor)
     return total
 
 
 def _joints(done: Settled) -> Counter[int | None]:
     """How many causes it names at each joint."""
-    return Counter(name[1] for name in _names(done) if name)
+    return Counter(joint for _, joint in _names(done))
 
 
 def _as_they_are(again: Settled, first: Settled, case: Case) -> Settled:

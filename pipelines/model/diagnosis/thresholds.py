@@ -2,8 +2,7 @@
 
 A threshold is three times the largest of: the most that any replica gives the cause itself; what half the causes at the same place
 get, which keeps the luck of few replicas out; and a hundredth of what is left at the joint, of white rows a thousandth, which is of
-no use to anybody. Of what
-happened once, which no other log bears out, twice the most that any replica gives counts.
+no use to anybody. Of what happened once, which no other log bears out, twice the most that any replica gives counts.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pipelines.model.diagnosis.elsewhere import Shared, as_good_elsewhere, as_likely
 from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.search import Step
+from pipelines.model.diagnosis.words import within
 
 __all__ = ["at_which"]
 
@@ -26,12 +27,8 @@ def at_which(step: Step, shared: Shared | None = None) -> str:
         return ""
     places = " or ".join(f"at joint {one.effect.joint}{_number(one)}" for one in (best, *others))
     before = "" if shared is not None else "give logs from before it happened, of role reference; or "
-    return (f"{_lower(best.effect.title)} {places} explains it, and these logs do not tell at which. {best.effect.remedy} "
-            f"To tell: {before}{_lower(best.effect.experiment).rstrip('.')}")
-
-
-def _lower(sentence: str) -> str:
-    return sentence[:1].lower() + sentence[1:]
+    return (f"{within(best.effect.title)} {places} explains it, and these logs do not tell at which. {best.effect.remedy} "
+            f"To tell: {before}{within(best.effect.experiment)}")
 
 
 def _number(one: Tried) -> str:

@@ -2,6 +2,7 @@
 
     where(finding)                 " at joint 2 (from joint 1)"
     taken_in(finding, left)        ", most of which the nominal model had taken in"
+    within(title)                  a title, or a sentence, within another
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Finding, Value
 
-__all__ = ["other_joint", "taken_in", "where"]
+__all__ = ["other_joint", "taken_in", "where", "within"]
 
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
@@ -28,6 +29,11 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
     """"from joint 1"; empty where a cause has to do with no other joint."""
     found = ((word, parameters[name].value) for name, word in _OTHER.items() if name in parameters)
     return next((f"{word} joint {joint:g}" for word, joint in found if isinstance(joint, int | float)), "")
+
+
+def within(words: str) -> str:
+    """A title or a sentence as a part of another: without its capital and its full stop."""
+    return words[:1].lower() + words[1:].rstrip(".")
 
 
 def taken_in(one: Finding, left: Array) -> str:
