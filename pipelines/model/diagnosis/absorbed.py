@@ -6,7 +6,8 @@ A load moves them. What else they can imitate they take in as well, and nothing 
 a joint whose weight turns through a small angle is some more weight. But masses do not change by themselves: where one law, acting
 after the reference only, leaves the base parameters where they were, it is the simpler story. The move is that of all columns of
 the rigid body with coefficients of their own before and after; a cause explains it as far as the parameters no longer move beside
-its columns, which are zero before (an analysis of covariance, Fisher 1932).
+its columns, which are zero before (an analysis of covariance, Fisher 1932). Where it moves some of them by masses that they do not tell,
+a longer link those beyond it, these are numbers of its own.
 """
 
 from __future__ import annotations
@@ -64,6 +65,13 @@ class Sessions:
         """(k, rows) its columns, zero in the reference."""
         return np.where(self.later, lay_one(self.data, effect, arm), 0.0)
 
+    def moving(self, directions: Array, arm: Arm) -> Array:
+        """(k, rows) base parameters that move in these `directions` (base parameters, k) after the reference."""
+        if not directions.shape[1]:
+            return np.zeros((0, self.data.rows))
+        laid = self.data.lay(lambda motion: arm.body.regressor(motion.q, motion.dq, motion.ddq) @ directions)
+        return np.where(self.later, laid, 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Absorbed:
@@ -75,7 +83,9 @@ class Absorbed:
     std: dict[str, float]  # of the values that were fitted
     explained: float  # of the difference between one set of base parameters and two
     gain: float  # squared weighted residual that it takes away beside one set, in parts of that difference
+    moves: Array | None = None  # (base parameters,) moved beside the cause's own torque, by what its values do not say
     rivals: tuple[Effect, ...] = ()  # elsewhere, that explain it as well: no name then
+    unsaid: int = 0  # numbers that its values do not say
     times: float = 1.0  # what two sets of base parameters leave, one set for both leaves: the residual, not squared
 
     @property
@@ -86,7 +96,7 @@ class Absorbed:
     @property
     def count(self) -> int:
         """Numbers that were fitted."""
-        return len(self.std) + len(self.effect.free)
+        return len(self.std) + len(self.effect.free) + self.unsaid
 
     @property
     def unsure(self) -> str:
@@ -157,9 +167,13 @@ def _power(fit: Fit) -> float:
 
 
 def _laws(two: Sessions, one: Fit, families: Sequence[Family], arm: Arm, move: Move) -> Iterator[Effect]:
-    """Each law in the shape that takes away most beside one set of base parameters, where that may be enough."""
+    """Each law in the shape that takes away most beside one set of base parameters, where that may be enough; in every shape where
+    it moves some of them in ways that its columns do not show."""
     for family in families:
         if family.event:
+            continue
+        if family.shapes[0].moving(arm) is not None:
+            yield from family.shapes
             continue
         best, most = family.shapes[0], 0.0
         for laid in lay_family(two.data, family, arm):
@@ -173,12 +187,16 @@ def _laws(two: Sessions, one: Fit, families: Sequence[Family], arm: Arm, move: M
 
 def _tried(effect: Effect, two: Sessions, arm: Arm, move: Move, least: float, numbers: int | None) -> Absorbed | None:
     """One cause; the first so many of its `numbers` have to be sure, or any of them."""
-    columns = two.acting(effect, arm)
+    columns, moving = two.acting(effect, arm), effect.moving(arm)
+    own = len(columns)
+    if moving is not None:
+        columns = np.concatenate([columns, two.moving(moving, arm)])
     fit = two.fit(moved=False, more=columns)
     power, left = move.power + move.whole, _power(fit)
     share = 1.0 - (left - _power(two.fit(moved=True, more=columns))) / move.power
-    amplitudes = fit.beta[-len(columns):]
-    std = deviations(fit.table * fit.weights, fit.residual)[-len(columns):]
+    every = fit.beta[-len(columns):]
+    amplitudes = every[:own]
+    std = deviations(fit.table * fit.weights, fit.residual)[-len(columns):][:own]
     if share < least or not (np.abs(amplitudes) >= _SURE * std)[:numbers].any():
         return None
     values = effect.values(amplitudes)
@@ -186,7 +204,9 @@ def _tried(effect: Effect, two: Sessions, arm: Arm, move: Move, least: float, nu
         return None
     names = [q.name for q in effect.parameters if not q.shape]
     gain = (power - left) / move.power
-    return Absorbed(effect, values, _reported(effect, amplitudes, std), dict(zip(names, std.tolist(), strict=False)), share, gain)
+    moves = None if moving is None else moving @ every[own:]
+    return Absorbed(effect, values, _reported(effect, amplitudes, std), dict(zip(names, std.tolist(), strict=False)), share, gain,
+                    moves, unsaid=len(columns) - own)
 
 
 def chosen(found: Sequence[Absorbed], move: Move) -> Absorbed | None:

@@ -2,7 +2,8 @@
 
 The parameters fitted to the later logs hold the load. Less what the load adds to them, they are those of the bare arm, which is the
 model that the reference logs gave; held-out logs say how wrong that has become, and how right the bare arm with the load is: a law
-that they imitate in the fitted motion, they need not imitate in another.
+that they imitate in the fitted motion, they need not imitate in another. A longer link also has masses beyond it on a longer lever,
+which the bare arm has not and the arm with it keeps.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import rigid_rows
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Finding
+from pipelines.model.rigid.body import Motion
 
 __all__ = ["Carried", "carried"]
 
@@ -60,7 +62,8 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     left = bare_left, held_out_left(done, None, blocks) if judge is None else bare_left - _torque(moved, done, judge)
     torque = torque_gain_of(rows, *left)
     acting = Acting.of(effect, moved.values, moved.std, revolute=effect.joint is None or bare.arm.robot.revolute[effect.joint - 1])
-    arms = [acted(arm, standing) for arm in (bare.arm, bare.arm.extended(acting))]
+    masses = np.zeros(len(whole.base)) if moved.moves is None else moved.moves
+    arms = [acted(arm, standing) for arm in (bare.arm, _with_base(bare.arm, masses).extended(acting))]
     simulated = simulation_errors(arms, prepared.judging or prepared.motions)
     doubt = "" if (torque.ci95[:, 1] < 0.0).any() else "what moved in the base parameters does not show on held-out torque"
     doubt = doubt or worse_log(rows, *left) or farther(*simulated)
@@ -68,14 +71,26 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     finding = Finding(effect.name, effect.joint, effect.title, moved.parameters, moved.explained, 0.0, (), None,
                       gain_of(torque, *simulated), "base parameters", size, of_rated,
                       proof(before, done, joint + 1) if draw else None)
-    place = {i: k for k, i in enumerate(done.model.columns.kept)}
-    base = tuple(replace(p, value=p.value - float(shift[place[i]])) if i in place else p for i, p in enumerate(whole.base))
-    return Carried(finding, replace(whole, base=base, effects=(*whole.effects, acting)), arms[0], left[0], doubt)
+    by = masses.copy()
+    by[list(done.model.columns.kept)] -= shift
+    arm = _with_base(whole, by)
+    return Carried(finding, replace(arm, effects=(*arm.effects, acting)), arms[0], left[0], doubt)
+
+
+def _with_base(arm: Arm, by: Array) -> Arm:
+    """The arm with each of its base parameters moved `by` (parameters,)."""
+    return replace(arm, base=tuple(replace(p, value=p.value + float(x)) for p, x in zip(arm.base, by, strict=True)))
 
 
 def _torque(moved: Absorbed, done: Refined, data: Data) -> Array:
     """(rows,) [N m] that the cause adds to the torque of the arm."""
-    return data.lay(lambda motion: moved.effect.torque(motion, done.model.nominal, moved.values))
+    arm = done.model.nominal
+
+    def torque(motion: Motion) -> Array:
+        own = moved.effect.torque(motion, arm, moved.values)
+        return own if moved.moves is None else own + arm.body.regressor(motion.q, motion.dq, motion.ddq) @ moved.moves
+
+    return data.lay(torque)
 
 
 def _size(load: Array, data: Data) -> tuple[float, int, float]:

@@ -29,6 +29,7 @@ What a search over effects asks, so that it need not know any of them:
     believable           whether an arm with it could have moved as it did: one that is clipped all the time follows nothing
     per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
     again                whether one place may have it more than once: waves of several orders along one turn
+    moving               ways in which it moves base parameters that its own numbers do not say: reference logs show these
     acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
     reported             the parameters as causes.md names them
 
@@ -120,6 +121,10 @@ class Effect(ABC):
     def again(self, motion: Motion) -> bool:
         """Whether it may act more than once at its place, in different shapes that this motion tells apart."""
         return False
+
+    def moving(self, arm: ArmModel) -> Array | None:
+        """(base parameters, k): directions in which it moves them beyond its columns, each by a number that nobody knows."""
+        return None
 
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
         """The samples in which it acts, where it acts for a moment only."""

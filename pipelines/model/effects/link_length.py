@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
-from pipelines.model.rigid.altered import carry_over, with_longer_link
+from pipelines.model.rigid.altered import carry_over, masses_beyond, with_longer_link
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LinkLength"]
@@ -52,6 +52,10 @@ class LinkLength(Effect):
         """Every link but the last, whose length no torque tells."""
         for link in range(1, arm.n_joints):
             yield replace(self, link=float(link))
+
+    def moving(self, arm: ArmModel) -> Array:
+        """Masses beyond the link turn on a longer lever, and how heavy each is base parameters do not say."""
+        return masses_beyond(arm.body, int(self.link))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         true = self.at(values)._altered(arm, values["error"])

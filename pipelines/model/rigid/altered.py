@@ -20,10 +20,12 @@ from pipelines.model.rigid.chain import inverse_dynamics, regressor
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.rigid.geometry import Placement, SerialChain, serial_chain
 
-__all__ = ["carry_over", "chain_of", "gravity_torque", "standard_of", "tip_parameters", "with_gravity",
+__all__ = ["carry_over", "chain_of", "gravity_torque", "masses_beyond", "standard_of", "tip_parameters", "with_gravity",
            "with_longer_link"]
 
 _STATES = 40
+_STEP = 1e-3  # [m] of the difference by a length
+_NONE = 1e-4  # of the largest: what is left by rounding and the step
 _MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx yy zz xy xz yz
 
 
@@ -35,13 +37,20 @@ def _standard_to_base(body: RigidBody) -> Array:
     """B (parameters, 10 · joints): base parameters p = B φ of standard parameters φ."""
     if isinstance(body, BaseArm):
         return body.base.combine
-    chain, rng = chain_of(body), np.random.default_rng(7)
-    n = chain.n_joints
-    q, dq, ddq = rng.uniform(-3.0, 3.0, (_STATES, n)), rng.normal(size=(_STATES, n)), rng.normal(size=(_STATES, n))
-    ours, all_ten = body.regressor(q, dq, ddq), regressor(chain, q, dq, ddq)
-    found = np.linalg.lstsq(ours.reshape(_STATES * n, -1), all_ten.reshape(_STATES * n, -1), rcond=None)[0]
+    found = _in_base(body, regressor(chain_of(body), *_states(body)))
     found[np.abs(found) < 1e-12] = 0.0
-    return np.asarray(found)
+    return found
+
+
+def _states(body: RigidBody) -> tuple[Array, Array, Array]:
+    n, rng = body.robot.n_joints, np.random.default_rng(7)
+    return rng.uniform(-3.0, 3.0, (_STATES, n)), rng.normal(size=(_STATES, n)), rng.normal(size=(_STATES, n))
+
+
+def _in_base(body: RigidBody, torque: Array) -> Array:
+    """(parameters, columns): the base parameters that have these torques (states, joints, columns) at `_states`."""
+    ours = body.regressor(*_states(body))
+    return np.asarray(np.linalg.lstsq(ours.reshape(-1, ours.shape[2]), torque.reshape(-1, torque.shape[2]), rcond=None)[0])
 
 
 _KNOWN: list[tuple[RigidBody, Array]] = []  # bodies asked about last, newest first: a fit asks about the same again and again
@@ -106,6 +115,22 @@ def with_longer_link(body: RigidBody, link: int, by: float) -> RigidBody:
 def carry_over(body: RigidBody, other: RigidBody) -> Array:
     """(parameters of other, parameters of body): base parameters of the same links in the other arm."""
     return np.asarray(_standard_to_base(other) @ _shifted(chain_of(body), chain_of(other)) @ _links_behind(body))
+
+
+def masses_beyond(body: RigidBody, link: int) -> Array:
+    """(parameters, k): the directions in which a longer link `link` moves the base parameters beyond `carry_over`, by masses of the
+    links behind it that the base parameters of the arm as described do not tell."""
+    bare = _standard_to_base(body)
+    _, size, directions = np.linalg.svd(bare)
+    untold = directions[int(np.sum(size > 1e-9 * size[0])):].T
+
+    def torque(by: float) -> Array:
+        chain = chain_of(with_longer_link(body, link, by))
+        return np.asarray(regressor(chain, *_states(body)) @ _shifted(chain_of(body), chain) @ untold)
+
+    moved = _in_base(body, (torque(_STEP) - torque(-_STEP)) / (2.0 * _STEP))
+    found, size, _ = np.linalg.svd(moved, full_matrices=False)
+    return np.asarray(found[:, size > _NONE * max(float(size.max(initial=0.0)), _NONE)])
 
 
 def _shifted(chain: SerialChain, other: SerialChain) -> Array:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.arm import Acting
+from pipelines.log.robot import format_robot
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis import diagnose as diagnose_module
 from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
 from pipelines.model.diagnosis.diagnose import diagnose
@@ -25,13 +26,17 @@ from pipelines.model.effects.payload import Payload
 from pipelines.model.effects.spring import Spring
 from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.effects.torque_offset import TorqueOffset
+from pipelines.model.rigid.altered import chain_of, with_longer_link
+from pipelines.model.rigid.chain import inverse_dynamics
 from sample_logs.make_closed_form import quantised, recorded, torque_step
 from tests.model.diagnosis.arms import arm
 from tests.model.estimation.experiments import Quick, motion_of
+from tests.model.rigid.serial_arms import physical_links
 
 TRIED = ("quadratic_drag", "torque_offset", "torque_gain", "asymmetric_friction", "payload")
 SETTINGS = DiagnosisSettings(without=tuple(name for name in effect_names() if name not in TRIED), evidence=False, limits=False)
 OFFSET = 30.0 / 2048  # [N m] one step of the converter of joint 2
+BODIES = 0.1 * physical_links(3, np.random.default_rng(3))
 LITTLE = 0.2  # of the usual angles: over so few, weight hardly changes
 
 
@@ -134,6 +139,47 @@ def test_a_load_that_is_not_accepted_leaves_no_arm_in_order(mass: float, verdict
                           (loaded(4, 0.0, "reference"), loaded(5, 0.0, "reference"))), SETTINGS)
     assert (found.verdict, found.findings) == (verdict, ())
     assert [one.reason for one in found.rejected if one.cause == "payload"] == (["it is farther"] if mass else [])
+
+
+def lengthened_arm(error: float) -> Arm:
+    """Link 2 longer than described by `error` [m], its links solid bodies."""
+    bare = arm()
+    body = with_longer_link(bare.body, 2, error) if error else bare.body
+    rng = np.random.default_rng(5)
+    states = rng.uniform(-3.0, 3.0, (40, 3)), rng.normal(size=(40, 3)), rng.normal(size=(40, 3))
+    torque = inverse_dynamics(chain_of(body), *states, BODIES)
+    p = np.linalg.lstsq(body.regressor(*states).reshape(120, -1), torque.ravel(), rcond=None)[0]
+    return bare.with_body(body, p)
+
+
+def lengthened(seed: int, error: float, role: str = "identify") -> ExperimentLog:
+    return recorded(lengthened_arm(error), turning_little(seed), 8.0, np.random.default_rng([4, seed]), name=f"{role}-{seed}",
+                    experiment="excitation", role=role, period=10.0, robot_text=format_robot(arm().robot))
+
+
+@pytest.mark.parametrize("error", [-1.3e-3, 1.3e-3])
+def test_a_longer_link_is_told_by_the_masses_beyond_it(error: float) -> None:
+    """Within a session base parameters take nearly all of it in. How heavy what is beyond the link is they do not say, so that they
+    move by numbers of their own; with these the length puts them back, and a load, for all its ten numbers, does not. The model
+    with it is as right as one fitted to the later logs alone."""
+    brief = replace(SETTINGS, without=tuple(name for name in SETTINGS.without if name != "link_length"))
+    found = diagnose(Logs((lengthened(1, error), lengthened(2, error)), (lengthened(3, error, "validate"),),
+                          (lengthened(4, 0.0, "reference"), lengthened(5, 0.0, "reference"))), brief)
+    assert [(one.cause, one.origin) for one in found.findings] == [("link_length", "base parameters")]
+    told = found.findings[0].parameters
+    assert told["link"].value == 2
+    assert isinstance(told["error"].value, float)
+    assert isinstance(told["error"].std, float)
+    assert abs(told["error"].value - error) < max(3.0 * told["error"].std, 0.05 * abs(error))
+    gain = found.findings[0].gain.validate_torque_rms
+    assert gain.ci95[1, 1] < 0.0
+    assert found.extended is not None
+    alone = diagnose(Logs((lengthened(1, error), lengthened(2, error))), SETTINGS).nominal
+    assert alone is not None
+    fine = turning_little(3)(np.linspace(1.0, 7.0, 500))
+    true = lengthened_arm(error).torque(fine)
+    now, plain, before = (float(np.linalg.norm(one.torque(fine) - true)) for one in (found.extended, alone, lengthened_arm(0.0)))
+    assert now < 1.1 * plain < 0.8 * before
 
 
 def story(effect: Effect, explained: float, numbers: int) -> Absorbed:

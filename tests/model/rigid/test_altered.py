@@ -6,7 +6,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.model.rigid.altered import carry_over, gravity_torque, standard_of, tip_parameters, with_gravity, with_longer_link
+from pipelines.model.rigid.altered import (
+    carry_over,
+    gravity_torque,
+    masses_beyond,
+    standard_of,
+    tip_parameters,
+    with_gravity,
+    with_longer_link,
+)
 from pipelines.model.rigid.body import RigidBody
 from pipelines.model.rigid.choose import rigid_body
 from tests.model.rigid.serial_arms import Arm, physical_links
@@ -91,6 +99,36 @@ def test_a_longer_link(loaded: Arm) -> None:
         assert fitted(longer, loaded, carried)[1] < 1e-9 * np.abs(wanted).max()
     with pytest.raises(ValueError, match="no joint beyond"):
         with_longer_link(body, loaded.n, 0.01)
+
+
+def test_masses_beyond_a_longer_link(loaded: Arm) -> None:
+    """What a little more of a link changes is that of the base parameters carried over, and of masses beyond it in the directions
+    given: of any masses, by Pinocchio. Without these it is not, wherever there are any."""
+    body, step = rigid_body(loaded.robot), 1e-4
+    states = loaded.states(SAMPLES, 5)
+    y, p = body.regressor(*states), fitted(body, loaded, torque_of(loaded))[0]
+    needed = 0
+    for link in range(1, loaded.n):
+        place = loaded.model.jointPlacements[link + 1]
+        before = place.translation.copy()
+        length = np.linalg.norm(before)
+        towards = before / length if loaded.robot.convention == "urdf" and length > 0.0 else np.array([1.0, 0.0, 0.0])
+        found = []
+        for by in (step, -step):
+            loaded.model.jointPlacements[link + 1].translation = before + by * towards
+            longer = with_longer_link(body, link, by)
+            found.append(torque_of(loaded) - longer.torque(*states, carry_over(body, longer) @ p))
+        loaded.model.jointPlacements[link + 1].translation = before
+        missed = ((found[0] - found[1]) / (2.0 * step)).ravel()
+        directions = masses_beyond(body, link)
+        columns = (y @ directions).reshape(missed.size, -1)
+        scale = np.abs(torque_of(loaded)).max()
+        left = missed - columns @ np.linalg.lstsq(columns, missed, rcond=None)[0]
+        assert np.abs(left).max() < 1e-5 * scale
+        assert directions.shape[1] < len(body.parameters)
+        assert bool(directions.size) == bool(np.abs(missed).max() > 1e-5 * scale)
+        needed += directions.shape[1]
+    assert needed > 0
 
 
 def test_no_change_is_none(loaded: Arm) -> None:
