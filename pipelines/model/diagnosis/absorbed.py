@@ -6,8 +6,8 @@ A load moves them. What else they can imitate they take in as well, and nothing 
 a joint whose weight turns through a small angle is some more weight. But masses do not change by themselves: where one law, acting
 after the reference only, leaves the base parameters where they were, it is the simpler story. The move is that of all columns of
 the rigid body with coefficients of their own before and after; a cause explains it as far as the parameters no longer move beside
-its columns, which are zero before (an analysis of covariance, Fisher 1932). Where it moves some of them by masses that they do not tell,
-a longer link those beyond it, these are numbers of its own.
+its columns, which are zero before (an analysis of covariance, Fisher 1932). Where it moves some of them by masses that they do not
+tell, a longer link those beyond it, these are numbers of its own.
 """
 
 from __future__ import annotations
