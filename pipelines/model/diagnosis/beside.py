@@ -10,7 +10,7 @@ refitted together with everything else where motion knows them: where the refit 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.numbers import standard_deviations
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Gain
+from pipelines.model.effects.base import Effect
 from pipelines.model.parameter import Parameter
 
 __all__ = ["Held", "Judged", "Part", "acted", "beside", "judged", "less", "torque_of"]
@@ -127,9 +128,10 @@ def torque_of(acting: Sequence[Acting], arm: Arm, data: Data) -> Array:
     return data.lay(lambda motion: arm.extended(*acting).torque(motion) - arm.torque(motion))
 
 
-def less(data: Data, torque: Array) -> Data:
-    """The same rows less a torque (rows,) [N m] that is known."""
-    return replace(data, known=torque if data.known is None else data.known + torque)
+def less(data: Data, torque: Array, effects: Iterable[Effect] = ()) -> Data:
+    """The same rows less a torque (rows,) [N m] that is known: of these `effects`, where some of them are friction."""
+    rubbing = data.rubbing | {one.joint for one in effects if one.friction and one.joint is not None}
+    return replace(data, known=torque if data.known is None else data.known + torque, rubbing=rubbing)
 
 
 def _with(case: Case, prepared: Prepared, acting: Acting) -> tuple[Case, Prepared]:

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -109,7 +109,7 @@ def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target:
 def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
     weights = weight[data.joint]
     rigid = rigid_rows(data, model.columns)
-    model = replace(model, beta=dissipating(model.beta, model.columns.laws))
+    model = replace(model, beta=dissipating(model.beta, model.columns.laws, data.rubbing))
     laid = model.laid(data)
     left = y - model.torque(data, laid)
     now = float(np.sum(np.square(left * weights)))
@@ -117,7 +117,7 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
     for _ in range(steps):
         better = False
         for ridge in _RIDGES:
-            shift = _within(model, names, slopes * weights, left * weights, ridge)
+            shift = _within(model, names, slopes * weights, left * weights, ridge, data.rubbing)
             for share in _SHARES:
                 there = model.moved(share * shift, names)
                 laid = there.laid(data)
@@ -137,18 +137,18 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
     return Refined(model, data, weight, left, slopes, tuple(names))
 
 
-def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float) -> Array:
+def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float, known: Collection[int]) -> Array:
     """The step for every number. The others do without one that would leave its range, and stays at its end; without friction that
     would drive its joint; and without one of an effect that the rest of the model does as well: rounding would move it anywhere."""
     first = len(model.beta)
     stuck = _superfluous(table, first, names)
     shift = _without(table, y, ridge, stuck)
     beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
-    held = driving(model.beta, shift, model.columns.laws)
+    held = driving(model.beta, shift, model.columns.laws, known)
     while beyond or held:
         shift = _without(table, y + model.beta[held] @ table[held], ridge, [*stuck, *beyond, *held])
         shift[held] = -model.beta[held]
-        more = driving(model.beta, shift, model.columns.laws)  # of those that were free until then
+        more = driving(model.beta, shift, model.columns.laws, known)  # of those that were free until then
         if not more:
             break
         held = sorted({*held, *more})

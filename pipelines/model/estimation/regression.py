@@ -35,6 +35,7 @@ _SEED = 20040509
 _BLOCK = 32768  # samples of the log worked on at once
 _SETTLE = 10.0  # periods of the cut-off after which a fourth-order low-pass has forgotten to 1e-10
 _TOUCHED = 1.0  # periods of the cut-off to either side over which one bad sample spreads
+_MATTERS = 1e-4  # of the largest torque within a drive's limit: by so much rows may hang on what was given beyond it
 _LOST = 3.0  # times the usual standard deviation of a position, beyond which it is not known
 _MEMORY = 0.05  # [s] of the smoother, where no low-pass has a longer one
 
@@ -152,7 +153,7 @@ class LogEquations:
         reach = 2 if cutoff is None else int(np.ceil(_TOUCHED / (cutoff * good.log.sample_time)))
         for run in self.runs:
             count = np.cumsum(np.concatenate([np.zeros(reach + 1), touched[run], np.zeros(reach)]))
-            out[run] = count[2 * reach + 1:] > count[:-2 * reach - 1]
+            out[run] = (count[2 * reach + 1:] > count[:-2 * reach - 1]) | self._by_what_was_given(run)
         if (mean := self.found.mean) is not None:  # the rest are copies
             out[:mean.first] = out[mean.last:] = True
         return Rows(out, np.abs(self.found.motion.dq[good.kept]) < np.array(self.conditioning.min_speed))
@@ -242,6 +243,17 @@ class LogEquations:
         parts = [np.where(slow[:, j, None], 0.0, s[keep] if scale == 1.0 else scale * s[keep]) for j, s in enumerate(stacks)]
         return (motion.t[keep + begin], tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts),
                 tuple(np.ascontiguousarray(p[:, -1]) for p in parts), tuple(~slow.T) if slow.any() else None)
+
+    def _by_what_was_given(self, run: slice) -> npt.NDArray[np.bool_]:
+        """(samples,) where it matters whether a drive gave what was asked beyond its limit: a peak far above it reaches farther
+        through the low-pass than a bad sample does."""
+        good, low_pass = self.found.good, self.conditioning.low_pass
+        beyond, lost = good.saturated[run], (good.missing | good.spikes)[run]
+        if low_pass is None or not beyond.any():
+            return np.zeros(len(beyond), dtype=bool)
+        asked = _bridged(good.log.tau[run], lost)
+        differ = np.abs(zero_phase(asked - _bridged(asked, beyond | lost), low_pass))
+        return np.asarray((differ > _MATTERS * np.where(beyond, 0.0, np.abs(asked)).max(axis=0)).any(axis=1))
 
     @cached_property
     def _unknown(self) -> npt.NDArray[np.bool_]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.dissipation import dissipating, driving
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
@@ -47,3 +48,19 @@ def test_only_laws_of_friction_are_held() -> None:
     laws = (Coulomb(1), Viscous(1), TorqueOffset(1))
     assert dissipating(np.array([-1.0, 2.0, -3.0, -4.0]), laws).tolist() == [-1.0, 2.0, 0.0, -4.0]
     assert driving(np.array([0.0, 1.0, 0.5, 1.0]), np.array([-9.0, -0.5, -0.6, -9.0, -9.0]), laws) == [2]
+
+
+def test_of_what_is_left_of_friction_either_sign_may_be() -> None:
+    """A standing law at joint 1 that was taken too large and subtracted: the rest of its dry friction drives, and is fitted so."""
+    prepared = prepare(Logs((turned(3, {7.0: 0.0}, 0.0),)), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    data = prepared.data
+    more = data.lay(lambda motion: np.tanh(40.0 * motion.dq) * 0.5)
+    done = []
+    for effects in ((), (Coulomb(1),)):
+        there = less(data, more, effects)
+        columns, fit = fit_nominal(there, prepared.columns)
+        done.append(refine(Exact.start(columns, fit), there, fit.weight))
+    held, free = (one.model.beta[1] for one in done)
+    assert held == 0.0
+    assert free < -0.1
+    assert done[1].rss < 0.1 * done[0].rss
