@@ -35,18 +35,23 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
     if not (often > _FAR).any():
         return s.ok("S05", "torque is of the size that its limits allow", signal="tau")
     j = int(np.argmax(often))
-    most = float((_quantile(s.good.log.tau, _PEAK) / limit).max())
+    peak = _quantile(s.good.log.tau, _PEAK) / limit
     fitting = [unit for unit in _SMALLER[s.log.robot.joints[j].revolute]
-               if _SMALL <= most * UNITS[unit].factor <= _SLACK]
+               if _SMALL <= float(np.nanmax(peak)) * UNITS[unit].factor <= _SLACK]
     factors = " or ".join(f"{unit} ({1.0 / UNITS[unit].factor:g} times too large)" for unit in fitting)
     declared = s.unit("tau", j)
-    told = f"write so to the file: {_to_declare(s, 'tau', fitting[0])}; or " if fitting else ""
+    guesses, remedies = [f"this looks like {factors}"] if fitting else [], []
+    if fitting:
+        remedies.append(f"write so to the file: {_to_declare(s, 'tau', fitting[0])}")
+    if ((peak >= _SMALL) & (peak <= 1.0)).any():  # in a smaller unit the torque of every joint is too large, unless it hardly moves
+        guesses.append("its controller winds up, for other joints are within theirs")
+        remedies.append("leave out the stretches in which the joint does not follow")
+    guess = ", or ".join(guesses) or "unit or limit is wrong"
+    told = "; or ".join((*remedies, "correct the torque limits of the robot's description (--robot)"))
     return [s.say("S05", "warn" if s.log.torque == "measured" else "reject",
                   f"tau is declared in {declared}, but a tenth of joint {j + 1}'s samples are beyond "
                   f"{often[j]:.0f} times its limit of {limit[j]:.4g} {declared}, which no drive gives: "
-                  f"{f'this looks like {factors}' if fitting else 'unit or limit is wrong'}",
-                  signal="tau", joint=j, gate=True,
-                  remedy=f"{told}correct the torque limits of the robot's description (--robot)")]
+                  f"{guess}", signal="tau", joint=j, gate=True, remedy=told)]
 
 
 def torque_in_recipe() -> str:

@@ -37,5 +37,6 @@ def driving(beta: Array, shift: Array, laws: Sequence[Effect], known: Collection
 
 
 def _bounded(count: int, laws: Sequence[Effect], known: Collection[int]) -> npt.NDArray[np.bool_]:
-    own = [law.friction and law.joint not in known and quantity.low == 0.0 for law in laws for quantity in law.parameters if not quantity.shape]
+    own = [law.friction and law.joint not in known and quantity.low == 0.0
+           for law in laws for quantity in law.parameters if not quantity.shape]
     return np.array([False] * (count - len(own)) + own, dtype=bool)

@@ -89,6 +89,17 @@ def test_a_limit_that_is_passed_for_moments_is_no_wrong_unit() -> None:
         assert levels["RRID-S05"] == expected
 
 
+@pytest.mark.parametrize(("joints", "winds_up"), [(slice(0, 1), True), (slice(None), False)])
+def test_one_joint_beyond_its_limit_may_have_a_controller_that_winds_up(joints: slice, winds_up: bool) -> None:
+    """S05: in N mm the torque of every joint is too large; of one joint alone it is said what else it may be."""
+    log = good_log()
+    tau = np.clip(log.tau, *(sign * 0.5 * torque_limit(log) for sign in (-1.0, 1.0)))
+    tau[:, joints] *= 1000.0
+    told = next(c for c in check_log(with_signal(log, tau=tau)) if c.code == "RRID-S05")
+    assert told.level == "reject"
+    assert ("N mm (1000 times too large)" in told.message, "winds up" in told.message) == (True, winds_up)
+
+
 @pytest.mark.parametrize("share", [0.01, 0.03, 0.2])
 def test_jitter_is_measured(share: float) -> None:
     """Stamps wander by ±`share` of a sample: the intervals then vary by share √(2/3) rms, within 5 %."""
