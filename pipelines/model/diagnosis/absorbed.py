@@ -7,7 +7,7 @@ a joint whose weight turns through a small angle is some more weight. But masses
 after the reference only, leaves the base parameters where they were, it is the simpler story. The move is that of all columns of
 the rigid body with coefficients of their own before and after; a cause explains it as far as the parameters no longer move beside
 its columns, which are zero before (an analysis of covariance, Fisher 1932). Where it moves some of them by masses that they do not
-tell, a longer link those beyond it, these are numbers of its own.
+tell, as a longer link does by those beyond it, these are numbers of its own.
 """
 
 from __future__ import annotations
@@ -84,8 +84,8 @@ class Absorbed:
     explained: float  # of the difference between one set of base parameters and two
     gain: float  # squared weighted residual that it takes away beside one set, in parts of that difference
     moves: Array | None = None  # (base parameters,) moved beside the cause's own torque, by what its values do not say
-    rivals: tuple[Effect, ...] = ()  # elsewhere, that explain it as well: no name then
-    unsaid: int = 0  # numbers that its values do not say
+    unknowns: int = 0  # numbers behind `moves`
+    rivals: tuple[Effect, ...] = ()  # elsewhere, or of other kind, that explain it as well: no name then
     times: float = 1.0  # what two sets of base parameters leave, one set for both leaves: the residual, not squared
 
     @property
@@ -96,12 +96,12 @@ class Absorbed:
     @property
     def count(self) -> int:
         """Numbers that were fitted."""
-        return len(self.std) + len(self.effect.free) + self.unsaid
+        return len(self.std) + len(self.effect.free) + self.unknowns
 
     @property
     def unsure(self) -> str:
         """Why it is not named; empty where nothing speaks against it."""
-        places = [place_of(one.name, one.joint) for one in (self.effect, *self.rivals)]
+        places = [_place(one) for one in (self.effect, *self.rivals)]
         if not self.rivals and self.effect.evidence == "base parameters" and self.explained < _ALTOGETHER:
             return f"the base parameters have moved much as {places[0]} moves them, but not altogether"
         return f"the base parameters have moved as {' or '.join(places)} moves them" if self.rivals else ""
@@ -206,20 +206,37 @@ def _tried(effect: Effect, two: Sessions, arm: Arm, move: Move, least: float, nu
     gain = (power - left) / move.power
     moves = None if moving is None else moving @ every[own:]
     return Absorbed(effect, values, _reported(effect, amplitudes, std), dict(zip(names, std.tolist(), strict=False)), share, gain,
-                    moves, unsaid=len(columns) - own)
+                    moves, unknowns=len(columns) - own)
 
 
 def chosen(found: Sequence[Absorbed], move: Move) -> Absorbed | None:
     """Of those that explain nearly as much as the best, the one with fewest numbers; with rivals, where as good a one is elsewhere,
-    or has as few."""
+    or has as few.
+
+    Masses that nobody knows let a longer link pass for much that is none, a load on a link say: it has to explain as much as the
+    best, as far as five standard deviations tell, and what does so too is its rival.
+    """
     if not found:
         return None
     best = max(one.gain for one in found)
-    margin = max(_PARSIMONY, _TELLS / max(move.variances, 1e-300))
-    near = sorted((one for one in found if one.gain >= best - margin), key=lambda one: (one.count, -one.gain))
+    told = _TELLS / max(move.variances, 1e-300)
+    near = [one for one in found if one.gain >= best - (told if one.unknowns else max(_PARSIMONY, told))]
+    near.sort(key=lambda one: (one.count, -one.gain))
     first = near[0]
-    rivals = tuple(one.effect for one in near[1:] if one.effect.joint != first.effect.joint or one.count == first.count)
-    return replace(first, rivals=rivals)
+    rivals = [one for one in near[1:] if _elsewhere(one.effect, first.effect) or one.count == first.count
+              or (first.unknowns and one.gain >= best - told)]
+    return replace(first, rivals=tuple(one.effect for one in rivals))
+
+
+def _elsewhere(one: Effect, other: Effect) -> bool:
+    """At another joint, or of another link."""
+    return one.joint != other.joint or (one.name == other.name and one != other)
+
+
+def _place(effect: Effect) -> str:
+    """"torque_gain:2", "link_length of link 2"."""
+    of = "".join(f" of {q.name} {getattr(effect, q.name):g}" for q in effect.parameters if q.shape and q.discrete)
+    return place_of(effect.name, effect.joint) + of
 
 
 def _reported(effect: Effect, amplitudes: Array, std: Array) -> dict[str, Value]:

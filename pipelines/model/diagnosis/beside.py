@@ -27,6 +27,7 @@ from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.numbers import standard_deviations
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Gain
+from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.parameter import Parameter
 
@@ -129,9 +130,15 @@ def torque_of(acting: Sequence[Acting], arm: Arm, data: Data) -> Array:
 
 
 def less(data: Data, torque: Array, effects: Iterable[Effect] = ()) -> Data:
-    """The same rows less a torque (rows,) [N m] that is known: of these `effects`, where some of them are friction."""
-    rubbing = data.rubbing | {one.joint for one in effects if one.friction and one.joint is not None}
+    """The same rows less a known torque (rows,) [N m], that of `effects`: joints at which one of them is friction, or could be
+    mistaken for it, are remembered."""
+    rubbing = data.rubbing | {one.joint for one in effects if one.joint is not None and _rubs(one)}
     return replace(data, known=torque if data.known is None else data.known + torque, rubbing=rubbing)
+
+
+def _rubs(effect: Effect) -> bool:
+    nominal = (kind for kind in all_effects() if kind.friction and kind.evidence == "none")
+    return effect.friction or any(kind.name in effect.twins or effect.name in kind.twins for kind in nominal)
 
 
 def _with(case: Case, prepared: Prepared, acting: Acting) -> tuple[Case, Prepared]:

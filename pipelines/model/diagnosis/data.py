@@ -114,7 +114,7 @@ class Data:
     logs: tuple[LogData, ...]
     first: int = 0  # number of the first log among all that are diagnosed: of what happens in one log only
     known: Array | None = None  # (rows,) [N m] torque that is subtracted: of standing effects
-    rubbing: frozenset[int] = frozenset()  # joints, from 1, of which some friction is in that
+    rubbing: frozenset[int] = frozenset()  # joints, from 1, whose friction is partly in `known`
 
     @property
     def n_joints(self) -> int:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.absorbed import Absorbed, Unexplained
@@ -119,7 +120,10 @@ def _looked_at(prepared: Prepared, chosen: DiagnosisSettings, say: Tell, calibra
     seen = glance(case)
     if first.stiff is not None and not first.stiff.named and gives_way(seen):
         say("looking for a gap below the frequencies at which it rings")
-        slow = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
+        try:
+            slow = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
+        except InputRejected:  # T04, D05: too little is left below so low a low-pass; this look is one more
+            return _Seen(first, case, prepared, provisional(case, seen))
         there = _nameable(_case(slow, chosen), first.stiff)
         rough = provisional(there)
         if gap_first(rough[0]):
@@ -240,5 +244,6 @@ def _alike(effect: Effect, found: Iterable[Finding]) -> Finding | None:
 def _with_load(found: Found, case: Case, now: Prepared, before: Array, noise: DriveNoise | None, seed: int) -> Array:
     """(joints,) [N m] floor of the later logs, whose arm is heavier: it reverses more slowly; `before` where nobody can tell."""
     arm = acted(found.nominal.model.arm, case.beside)
-    own = None if noise is None else motion_floor(found.nominal.model, arm, noise, now.motions, case.data, now, before, seed)
+    own = None if noise is None else motion_floor(found.nominal.model, arm, noise, now.motions, case.data, now, before, seed,
+                                                  case.beside)
     return before if own is None else np.maximum(own, before)

@@ -4,7 +4,7 @@
     places = driving(beta, shift, laws)        those that a step would take below
 
 A negative viscous friction leaves a little less where it was fitted, and is wrong at every other speed. Not so at joints part of
-whose friction is known and was subtracted from the rows, a standing law's say: what is left of it may have either sign.
+whose friction is known and was subtracted from the rows, for example that of a standing law: what is left may have either sign.
 """
 
 from __future__ import annotations

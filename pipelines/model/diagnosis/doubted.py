@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.own_motion import following, standing_out
+from pipelines.model.diagnosis.own_motion import following, lasting, standing_out
 from pipelines.model.diagnosis.pruned import Settled
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 
@@ -54,7 +54,7 @@ def unlike_motion(done: Settled, usual: Array) -> Settled:
     if done.ruling.verdict != "nothing-wrong":
         return done
     nominal = done.found.nominal
-    joints = standing_out(following(nominal.fit, nominal.residual[None])[:, 0], usual)
+    joints = lasting(nominal.fit, nominal.residual, standing_out(following(nominal.fit, nominal.residual[None])[:, 0], usual))
     if not joints:
         return done
     where = " and of ".join(f"joint {j + 1}" for j in joints)

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
-from pipelines.model.arm import Arm
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.drive_noise import drive_noise
 from pipelines.model.diagnosis.exact import Exact
@@ -40,7 +40,7 @@ Indices = npt.NDArray[np.intp]
 
 
 def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, data: Data, prepared: Prepared, before: Array,
-                 seed: int) -> Array | None:
+                 seed: int, standing: Sequence[Acting] = ()) -> Array | None:
     """(joints,) [N m] root mean square; None where a log has no controller, or the arm in order cannot be simulated.
 
     Args:
@@ -49,8 +49,11 @@ def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, da
         noise: of the drives.
         motions: the logs, held out or fitted; `data` their rows.
         before: (joints,) [N m] what the reference logs leave, where there are any.
+        standing: effects of the machine beside the model; what of its friction they are, the arm in order has too.
     """
-    order = _InOrder(replace(model, effects=()), arm, noise, prepared.recipe, seed)
+    bare = replace(model, effects=())
+    plant = bare.nominal.extended(*(one for one in standing if one.effect.friction))
+    order = _InOrder(bare, plant, arm, noise, prepared.recipe, seed)
     asked = [(motions, data)]
     if prepared.reference is not None:
         asked.append((prepared.referring, prepared.reference))
@@ -96,6 +99,7 @@ class _InOrder:
     """An arm without a fault, and how it is looked at."""
 
     bare: Exact
+    plant: Arm  # the same with what stands of its friction
     arm: Arm
     noise: DriveNoise
     recipe: Recipe
@@ -103,19 +107,19 @@ class _InOrder:
 
     def steps(self, logs: Sequence[ExperimentLog]) -> dict[float, Step]:
         """Those of the integrator, for each sample time: what suffices for an arm in a log suffices in the next."""
-        plant, first = Plant.of(self.bare.nominal), {log.sample_time: log for log in reversed(logs)}
+        plant, first = Plant.of(self.plant), {log.sample_time: log for log in reversed(logs)}
         return {time: choose_step(plant, Experiment.of_log(log), self._drives) for time, log in first.items()}
 
     def powers(self, pieces: Sequence[_Piece], steps: Mapping[float, Step]) -> list[tuple[Array, Indices]]:
         """Of each log (joints,) [N m^2] sum of squares of what the model leaves of its own replica, and of how many rows."""
         experiments = [Experiment.of_log(one.log) for one in pieces]
-        done = simulate_together(self.bare.nominal, experiments, self._drives, (self.seed,), steps)
+        done = simulate_together(self.plant, experiments, self._drives, (self.seed,), steps)
         return [self._power(one, simulated) for one, simulated in zip(pieces, done, strict=True)]
 
     def _power(self, piece: _Piece, done: Simulated) -> tuple[Array, Indices]:
         copy, seen = replica((piece.log, piece.found), done, 0, self.recipe), piece.rows.logs[piece.place].equations.rows
         own = gather((copy,), self.bare.columns, self.recipe, [seen], piece.place)
-        return own.power(own.y + own.lay_each(imperfect(self.arm, self.noise, own, self.seed)) - self.bare.torque(own))
+        return own.power(own.y + own.lay_each(imperfect(self.arm, self.noise, own, self.seed)) - own.lay(self.plant.torque))
 
     @property
     def _drives(self) -> Noise:

@@ -1,6 +1,7 @@
 """Whether what a model leaves of a joint follows from the motion of that joint, in a shape that no cause need have.
 
     share = following(fit, residuals)           (joints, residuals)
+    joints = lasting(fit, residual, joints)     those of which all time tells the same
 
 Gravity, damping, inertia and centrifugal torque of a joint are of the form g + B v + J a + D v². An arm in order leaves nothing of
 that kind, nor where each of the four may go to and fro with the joint's own angle,
@@ -9,42 +10,69 @@ that kind, nor where each of the four may go to and fro with the joint's own ang
 
 With c⊥ the part of these columns that the model cannot imitate, the share is what they take off the squared residual of the joint
 over what they leave of it, up to a factor the F statistic of Seber & Lee 2003, (4.9). It does not hang on how large the noise is.
-Noise of a drive has a colour and reversals leave something, so that no table of F is asked but the twin's replicas.
+Noise of a drive has a colour and reversals leave something, so that no table of F is asked but the twin's replicas. Noise that is
+slower than theirs follows some motion farther by chance, though not again: what is left of a block of time by the numbers that the
+rest asks for (Stone 1974) has to be less then than with signs drawn at random.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
 
+from pipelines.fit.flips import by_flips
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["following", "put_right", "standing_out"]
+__all__ = ["following", "lasting", "put_right", "standing_out"]
 
 _TIMES = 3.0  # the most that any replica shows: of 78 joints of arms in order none showed more than 1.6 times that
 _LEAST = 0.1  # less is of no use to anybody
 _SEEN = 1e-2  # of unit columns: directions that the model imitates farther are left alone
+_PARTS = 20  # blocks of time
+_CHANCE = 0.05  # at most, that chance gains as much
 
 
 def following(fit: Fit, residuals: Array) -> Array:
     """(joints, residuals) of `residuals` (m, rows), weighted and orthogonal to the fit."""
     data = fit.data
-    revolute = data.logs[0].log.robot.revolute
     found = np.zeros((data.n_joints, len(residuals)))
     for j in range(data.n_joints):
-        table = data.lay(partial(_columns, joint=j, turning=revolute[j]))
-        whole = np.linalg.norm(table * fit.weights, axis=1)
-        unit = fit.project(table) / np.where(whole > 0.0, whole, 1.0)[:, None]
-        values, vectors = np.linalg.eigh(unit @ unit.T)
-        seen = values > _SEEN**2
-        basis = (vectors[:, seen] / np.sqrt(values[seen])).T @ unit
         power = np.sum(np.square(residuals[:, data.joint == j]), axis=1)
-        gain = np.sum(np.square(residuals @ basis.T), axis=1)
+        gain = np.sum(np.square(residuals @ _basis(fit, j).T), axis=1)
         found[j] = gain / np.maximum(power - gain, 1e-12 * power + 1e-300)
     return found
+
+
+def lasting(fit: Fit, residual: Array, joints: Iterable[int]) -> list[int]:
+    """Those of the `joints`, from 0, of which `residual` (rows,), weighted and orthogonal to the fit, follows the motion in time
+    that its numbers were not fitted to."""
+    place = fit.data.blocks(_PARTS)
+    blocks = [place == k for k in range(int(place.max()) + 1)]
+    found = []
+    for joint in joints:
+        basis = _basis(fit, joint)
+        gram = np.stack([basis[:, own] @ basis[:, own].T for own in blocks])
+        moment = np.stack([basis[:, own] @ residual[own] for own in blocks])
+        asked = [np.linalg.lstsq(gram.sum(axis=0) - g, moment.sum(axis=0) - m, rcond=_SEEN)[0]
+                 for g, m in zip(gram, moment, strict=True)]
+        gains = [2.0 * float(a @ m) - float(a @ g @ a) for a, g, m in zip(asked, gram, moment, strict=True)]
+        if by_flips(np.array(gains)) <= _CHANCE:
+            found.append(joint)
+    return found
+
+
+def _basis(fit: Fit, joint: int) -> Array:
+    """(k, rows) orthonormal: of the columns at a joint, from 0, what the model cannot imitate."""
+    table = fit.data.lay(partial(_columns, joint=joint, turning=fit.data.logs[0].log.robot.revolute[joint]))
+    whole = np.linalg.norm(table * fit.weights, axis=1)
+    unit = fit.project(table) / np.where(whole > 0.0, whole, 1.0)[:, None]
+    values, vectors = np.linalg.eigh(unit @ unit.T)
+    seen = values > _SEEN**2
+    return np.asarray((vectors[:, seen] / np.sqrt(values[seen])).T @ unit)
 
 
 def standing_out(share: Array, usual: Array) -> list[int]:

@@ -71,9 +71,9 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     whole = fit_columns(data, np.concatenate([apart(nominal, later), common]))
     shared = whole.beta[2 * len(nominal):]
     sizes = _split(shared, standing)
-    known_laws = [one.effect for one in standing]
-    now = less(prepared.data, _known(prepared.data, standing, sizes, arm), known_laws)
-    judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm), known_laws)
+    before_and_after = [one.effect for one in standing]
+    now = less(prepared.data, _known(prepared.data, standing, sizes, arm), before_and_after)
+    judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm), before_and_after)
     start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
 
     left = whole.left[~later]

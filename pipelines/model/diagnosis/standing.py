@@ -125,7 +125,7 @@ def joined(reference: Data, later: Data) -> tuple[Data, Mask]:
     parts = (reference, later)
     known = None if all(part.known is None for part in parts) else np.concatenate(
         [np.zeros(part.rows) if part.known is None else part.known for part in parts])
-    data = Data((*reference.logs, *later.logs), known=known)
+    data = Data((*reference.logs, *later.logs), known=known, rubbing=reference.rubbing | later.rubbing)
     return data, data.log_of >= len(reference.logs)
 
 

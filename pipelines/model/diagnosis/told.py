@@ -88,7 +88,7 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: Floored
         return done, responded, None
     final = responded.final
     own = motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
-                       floored.rms, chosen.seed)
+                       floored.rms, chosen.seed, case.beside)
     if own is None:
         return done, responded, None
     if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:

@@ -21,6 +21,7 @@ from pipelines.fit.equations import Block
 from pipelines.log.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.estimation.conditioning import Conditioning
+from pipelines.model.estimation.peaks import bridged, near_peaks
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.rrr import ACTING, RRR
@@ -35,7 +36,6 @@ _SEED = 20040509
 _BLOCK = 32768  # samples of the log worked on at once
 _SETTLE = 10.0  # periods of the cut-off after which a fourth-order low-pass has forgotten to 1e-10
 _TOUCHED = 1.0  # periods of the cut-off to either side over which one bad sample spreads
-_MATTERS = 1e-4  # of the largest torque within a drive's limit: by so much rows may hang on what was given beyond it
 _LOST = 3.0  # times the usual standard deviation of a position, beyond which it is not known
 _MEMORY = 0.05  # [s] of the smoother, where no low-pass has a longer one
 
@@ -113,7 +113,7 @@ class Rows:
     """Which samples of the mended log make equations."""
 
     out: npt.NDArray[np.bool_]  # (samples,) none: spoilt, vague, or so near to it that the low-pass spreads it here
-    slow: npt.NDArray[np.bool_]  # (samples, joints) none of this joint
+    slow: npt.NDArray[np.bool_]  # (samples, joints) none of this joint: too slow, or too near to torque that it may not have got
 
     def __and__(self, other: Rows) -> Rows:
         """Samples that make equations in both."""
@@ -153,10 +153,11 @@ class LogEquations:
         reach = 2 if cutoff is None else int(np.ceil(_TOUCHED / (cutoff * good.log.sample_time)))
         for run in self.runs:
             count = np.cumsum(np.concatenate([np.zeros(reach + 1), touched[run], np.zeros(reach)]))
-            out[run] = (count[2 * reach + 1:] > count[:-2 * reach - 1]) | self._by_what_was_given(run)
+            out[run] = count[2 * reach + 1:] > count[:-2 * reach - 1]
         if (mean := self.found.mean) is not None:  # the rest are copies
             out[:mean.first] = out[mean.last:] = True
-        return Rows(out, np.abs(self.found.motion.dq[good.kept]) < np.array(self.conditioning.min_speed))
+        slow = np.abs(self.found.motion.dq[good.kept]) < np.array(self.conditioning.min_speed)
+        return Rows(out, slow | near_peaks(good, self.runs, self.conditioning.low_pass, ~(out[:, None] | slow)))
 
     @cached_property
     def counts(self) -> npt.NDArray[np.intp]:
@@ -244,17 +245,6 @@ class LogEquations:
         return (motion.t[keep + begin], tuple(np.ascontiguousarray(p[:, :-1].T) for p in parts),
                 tuple(np.ascontiguousarray(p[:, -1]) for p in parts), tuple(~slow.T) if slow.any() else None)
 
-    def _by_what_was_given(self, run: slice) -> npt.NDArray[np.bool_]:
-        """(samples,) where it matters whether a drive gave what was asked beyond its limit: a peak far above it reaches farther
-        through the low-pass than a bad sample does."""
-        good, low_pass = self.found.good, self.conditioning.low_pass
-        beyond, lost = good.saturated[run], (good.missing | good.spikes)[run]
-        if low_pass is None or not beyond.any():
-            return np.zeros(len(beyond), dtype=bool)
-        asked = _bridged(good.log.tau[run], lost)
-        differ = np.abs(zero_phase(asked - _bridged(asked, beyond | lost), low_pass))
-        return np.asarray((differ > _MATTERS * np.where(beyond, 0.0, np.abs(asked)).max(axis=0)).any(axis=1))
-
     @cached_property
     def _unknown(self) -> npt.NDArray[np.bool_]:
         """(samples, joints) of the mended log: no motion, or a vague one."""
@@ -281,18 +271,9 @@ class LogEquations:
         if not (spoilt | unknown).any():
             return motion, tau
         # Where the acceleration is vague the position need not be: friction with a memory starts from where the joint was.
-        q = _bridged(motion.q, unknown & self._lost[wide])
-        dq, ddq = (_bridged(x, unknown) for x in (motion.dq, motion.ddq))
-        return Motion(motion.t, q, dq, ddq), _bridged(tau, spoilt)
-
-
-def _bridged(x: Array, bad: npt.NDArray[np.bool_]) -> Array:
-    """`x` (samples, joints) with straight lines where it is bad; zero where a joint has nothing good."""
-    out, place = x.copy(), np.arange(len(x))
-    for j in np.flatnonzero(bad.any(axis=0)):
-        ill = bad[:, j]
-        out[ill, j] = 0.0 if ill.all() else np.interp(place[ill], place[~ill], x[~ill, j])
-    return out
+        q = bridged(motion.q, unknown & self._lost[wide])
+        dq, ddq = (bridged(x, unknown) for x in (motion.dq, motion.ddq))
+        return Motion(motion.t, q, dq, ddq), bridged(tau, spoilt)
 
 
 def _part(found: Reconstructed, stretch: slice) -> Motion:

@@ -25,7 +25,7 @@ __all__ = ["carry_over", "chain_of", "gravity_torque", "masses_beyond", "standar
 
 _STATES = 40
 _STEP = 1e-3  # [m] of the difference by a length
-_NONE = 1e-4  # of the largest: what is left by rounding and the step
+_NONE = 1e-4  # of the largest: what rounding leaves
 _MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx yy zz xy xz yz
 
 

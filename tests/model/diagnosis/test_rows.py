@@ -58,6 +58,20 @@ def test_no_row_hangs_on_torque_beyond_the_limit_of_a_drive() -> None:
     assert there.logs[0].rows > 0.6 * there.logs[1].rows
 
 
+@pytest.mark.parametrize("cutoff_hz", [10.0, 25.0])
+def test_frequent_peaks_leave_rows_of_every_joint(cutoff_hz: float) -> None:
+    """Torque of joint 1 is beyond its limit every 0.4 s: of the others no row hangs on it, and of its own some stay."""
+    def peaks(motion: Motion) -> np.ndarray:
+        load = np.zeros_like(motion.q)
+        for at in np.arange(0.3, 8.0, 0.4):
+            load[:, 0] += 300.0 * np.exp(-0.5 * ((motion.t - at) / 0.01) ** 2)
+        return load
+
+    data = prepare(Logs((hidden(1, peaks), hidden(2))), DiagnosisSettings(cutoff_hz=cutoff_hz)).data
+    assert all(one.weighed.any(axis=1).all() for one in data.logs if one.rows)
+    assert data.logs[0].weighed[1:].all()
+
+
 def test_logs_and_joints_follow_each_other(prepared: Prepared) -> None:
     data = prepared.data
     assert data.rows == sum(3 * one.rows for one in data.logs)

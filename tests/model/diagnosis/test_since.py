@@ -9,9 +9,10 @@ import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.effects import effect_names
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import arm, hidden
@@ -118,3 +119,22 @@ def test_a_load_cannot_be_told_without_reference_logs() -> None:
     hidden_by = next(one for one in found.not_testable if one.cause == "payload")
     assert "p3" in hidden_by.reason
     assert "reference" in hidden_by.reason
+
+
+def dragged(motion: Motion) -> Array:
+    """Quadratic drag of 0.4 N m s²/rad² at joint 2, before and after."""
+    out = np.zeros_like(motion.q)
+    out[:, 1] = 0.4 * motion.dq[:, 1] * np.abs(motion.dq[:, 1])
+    return out
+
+
+def test_what_stands_of_friction_frees_the_rest_of_it() -> None:
+    """The law that stands is subtracted from the later logs; what is left of friction at its joint may have either sign there."""
+    logs = Logs((hidden(1, dragged),), (hidden(2, dragged),), (before(hidden(4, dragged)), before(hidden(5, dragged))))
+    prepared = prepare(logs, SETTINGS)
+    assert prepared.reference is not None
+    since = since_reference(prepared, prepared.reference, SETTINGS)
+    assert [(one.cause, one.joint) for one in since.standing] == [("quadratic_drag", 2)]
+    assert since.case.data.rubbing == {2}
+    assert since.case.judge is not None
+    assert since.case.judge.rubbing == {2}
