@@ -280,4 +280,4 @@ def test_without_a_floor_a_cause_is_seen_in_what_was_held_out(after: float, unse
     held = {id(found.nominal): np.array([0.6, 0.2, 0.02]), id(found.final): np.array([0.6, after, 0.02])}
     monkeypatch.setattr(pruned, "held_out_left", lambda done, judge, blocks: held[id(done)])
     case: Any = SimpleNamespace(judge=SimpleNamespace(rms=lambda rms: rms), blocks=10)
-    assert pruned._unseen(found, [0], found.final, case, 1e-3 * np.ones(3)) == unseen
+    assert pruned._unseen(found, [0], found.final, case, 0.015 * np.ones(3)) == unseen

@@ -135,7 +135,7 @@ def test_thresholds_follow_the_weights() -> None:
 
 def test_without_a_floor_a_trifle_beside_a_great_cause_has_no_name() -> None:
     """A drift of 1 N m at joint 1 whose law leaves 0.02: what takes a tenth off that may mend the law; at joint 2 it is a cause."""
-    first, floor = left(0.02, 0.05, 0.01), 1e-3 * np.ones(3)
+    first, floor = left(0.02, 0.05, 0.01), 4e-3 * np.ones(3)
     nominal = left(1.0, 0.05, 0.01)
     other = (ViscousDrift(1), Stribeck(1))
     assert rule(found(nominal, first, left(0.018, 0.05, 0.01), effects=other), floor, known=False).named == (0,)
@@ -160,9 +160,18 @@ def test_without_a_floor_a_joint_that_stands_in_the_noise_makes_no_cause_of_a_tr
 @pytest.mark.parametrize(("rest", "named"), [(0.02, (0,)), (0.044, (0,)), (0.046, ()), (0.049, ())])
 def test_without_a_floor_a_name_takes_a_fifth_of_its_joint(rest: float, named: tuple[int, ...]) -> None:
     """Of 0.05 N m, 0.044 are less than four fifths of the power, 0.046 more: most of what is wrong there is something else."""
-    ruling = rule(found(left(0.01, 0.05, 0.01), left(0.01, rest, 0.01)), 1e-3 * np.ones(3), known=False)
+    ruling = rule(found(left(0.01, 0.05, 0.01), left(0.01, rest, 0.01)), 4e-3 * np.ones(3), known=False)
     assert ruling.named == named
     assert (0 in ruling.doubts) is not bool(named)
+
+
+@pytest.mark.parametrize(("rest", "verdict"), [(0.5, "cause"), (1.0, "unknown"), (1.8, "unknown")])
+def test_without_a_floor_what_leaves_a_joint_far_above_the_noise_takes_nearly_all_of_it(rest: float, verdict: str) -> None:
+    """Of 2 N m in 0.02 of noise, half and more is left of something that has no name: it stands 50 times above the noise."""
+    ruling = rule(found(left(0.02, 2.0, 0.02), left(0.02, rest, 0.02)), 0.02 * np.ones(3), known=False)
+    assert ruling.verdict == verdict
+    assert ruling.named == ((0,) if verdict == "cause" else ())
+    assert ("joint 2 far above the noise" in ruling.reason) == (verdict == "unknown")
 
 
 def test_without_a_floor_a_joint_in_the_noise_is_no_fifth_of_what_the_arm_shows() -> None:
