@@ -241,9 +241,12 @@ def _place(effect: Effect) -> str:
 
 def _reported(effect: Effect, amplitudes: Array, std: Array) -> dict[str, Value]:
     here, above = effect.reported(effect.values(amplitudes)), effect.reported(effect.values(amplitudes + std))
-    units = {q.name: q.unit for q in effect.parameters}
+    units, given = {q.name: q.unit for q in effect.parameters}, {q.name for q in effect.parameters if q.shape}
     found: dict[str, Value] = {}
     for name, value in here.items():
+        if name in given:
+            found[name] = Value(value, None, units[name])
+            continue
         unit = next((unit for own, unit in units.items() if own == name or own.startswith(f"{name}_")), "1")
         off = np.abs(np.atleast_1d(above[name]) - np.atleast_1d(value))
         found[name] = Value(value, tuple(off.tolist()) if isinstance(value, tuple) else float(off[0]), unit)

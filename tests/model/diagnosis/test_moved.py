@@ -188,6 +188,7 @@ def test_the_model_of_a_longer_link_is_as_right_as_one_fitted_after_it() -> None
     now = altered(1.5e-3)
     found = compared(now, (*TRIED, "link_length"))
     assert [(one.cause, one.origin) for one in found.findings] == [("link_length", "base parameters")]
+    assert found.findings[0].parameters["link"].std is None
     assert found.findings[0].gain.validate_torque_rms.ci95[1, 1] < 0.0
     alone = diagnose(Logs((turned(now, 1), turned(now, 2))), SETTINGS).nominal
     assert alone is not None
