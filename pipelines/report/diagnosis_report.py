@@ -17,6 +17,7 @@ from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
+    all_together,
     as_sentence,
     floor_words,
     held_out_floor,
@@ -30,6 +31,7 @@ from pipelines.report.diagnosis_words import (
     together,
     told_values,
     torque_of,
+    what_stays,
     without_keys,
 )
 from pipelines.report.diagnosis_words import torque_errors as errors_table
@@ -71,10 +73,11 @@ def _verdict(result: Result) -> str:
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(words for _, words in together(more))}" if more else ""
     size = f", {_size(first, result)}" if math.isfinite(first.torque_rms) else ""
-    change = tip_change(first.gain)
-    moved = f"; with it {change}" if change else ""
+    whole = all_together(result.findings)
+    change, alone = tip_change(whole), whole is first.gain
+    moved = f"; with {'it' if alone else 'them'} {change}" if change else ""
     rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
-    return f"{changed}{first.title}{where(first)}{size}{moved}{others}.{rest}"
+    return f"{changed}{first.title}{where(first)}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
 
 
 def _advice(result: Result) -> tuple[str, ...]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRm
 from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
-from pipelines.report.diagnosis_words import tip_change, tip_worth, together
+from pipelines.report.diagnosis_words import all_together, tip_change, tip_worth, together, what_stays
 
 
 def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[str, float] | None = None) -> Finding:
@@ -34,6 +36,36 @@ def test_a_cause_is_not_blamed_for_all_that_the_tip_is_off(before: float, after:
     assert tip_change(gain) == said
     assert ("tip" in tip_worth(gain)) == (before > 0.0)
     assert ("as with it" in tip_worth(gain)) == (before > 0.0 and not said)
+
+
+def following(*tips: float) -> list[Finding]:
+    """Findings each of which takes the tip from one error to the next [m]."""
+    return [replace(one, gain=replace(one.gain, tip_error_rms=TipError(before, after)))
+            for one, before, after in zip([finding()] * (len(tips) - 1), tips, tips[1:], strict=False)]
+
+
+def test_the_tip_is_told_of_all_findings_together() -> None:
+    """Whatever their order; where they do not follow each other the first alone is told."""
+    some = following(1e-3, 0.9e-3, 0.2e-3)
+    for order in (some, some[::-1]):
+        tip = all_together(order).tip_error_rms
+        assert tip is not None
+        assert (tip.before, tip.after) == (1e-3, 0.2e-3)
+    apart = [*following(1e-3, 0.9e-3), *following(0.5e-3, 0.4e-3)]
+    assert all_together(apart) is apart[0].gain
+    assert all_together(some[:1]) is some[0].gain
+
+
+@pytest.mark.parametrize(("origin", "own", "said"), [
+    ("twin", True, " Joint 1 stays at 2 times what an arm in order leaves, held out, without a name."),
+    ("blocks", False, " Joint 1 stays at 20 times its noise, held out, without a name."), ("twin", False, "")])
+def test_what_stays_above_the_floor_is_said(origin: str, own: bool, said: str) -> None:
+    left = np.array([0.1, 0.04, 0.02])
+    floor = {"twin": np.array([0.09, 0.04, 0.02]), "blocks": np.full(3, 0.005)}[origin]
+    rms = ResidualRms(left, left, floor)
+    there: Any = SimpleNamespace(floor_origin=origin, after_rms=rms, residual_rms=rms,
+                                 held_out_floor=np.array([0.05, 0.04, 0.02]) if own else None)
+    assert what_stays(there) == said
 
 
 @pytest.mark.parametrize(("torque", "left", "most"), [(4.6, 1.6, True), (0.29, 0.29, False), (0.2, 0.16, False)])

@@ -40,11 +40,14 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
                if _SMALL <= float(np.nanmax(peak)) * UNITS[unit].factor <= _SLACK]
     factors = " or ".join(f"{unit} ({1.0 / UNITS[unit].factor:g} times too large)" for unit in fitting)
     declared = s.unit("tau", j)
+    others = bool(((peak >= _SMALL) & (peak <= 1.0)).any())  # in a smaller unit every joint's is too large, unless it hardly moves
     guesses, remedies = [f"this looks like {factors}"] if fitting else [], []
-    if fitting:
+    if fitting and not others:
         remedies.append(f"write so to the file: {_to_declare(s, 'tau', fitting[0])}")
-    if ((peak >= _SMALL) & (peak <= 1.0)).any():  # in a smaller unit the torque of every joint is too large, unless it hardly moves
+    if others:
         guesses.append("its controller winds up, for other joints are within theirs")
+        remedies += [f"if of joint {j + 1} alone, divide its column of tau by that factor"] if fitting else []
+        remedies += [f"if of all joints, {_to_declare(s, 'tau', fitting[0])}"] if fitting else []
         remedies.append("leave out the stretches in which the joint does not follow")
     guess = ", or ".join(guesses) or "unit or limit is wrong"
     told = "; or ".join((*remedies, "correct the torque limits of the robot's description (--robot)"))

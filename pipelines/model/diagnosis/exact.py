@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit, effect_rows, law_rows, nominal_arm, rigid_rows, several_rows
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.estimation.regression import Columns
+from pipelines.model.rigid.body import Motion
 
 __all__ = ["Exact", "Named", "law_of", "number_moved"]
 
@@ -68,6 +69,7 @@ class Exact:
     columns: Columns  # laws in their shapes
     beta: Array  # of the rigid body and the laws
     effects: tuple[Named, ...]
+    standing: tuple[Acting, ...] = ()  # that just add; their torque was subtracted from the rows, over the motion as it was read
 
     @classmethod
     def start(cls, columns: Columns, fit: Fit) -> Exact:
@@ -84,7 +86,8 @@ class Exact:
 
     def beside(self, nominal: Exact) -> Exact:
         """Its effects beside another nominal model."""
-        return replace(nominal, effects=tuple(_following(one, nominal.columns.laws) for one in self.effects))
+        own = tuple(_following(one, nominal.columns.laws) for one in self.effects)
+        return replace(nominal, effects=own, standing=self.standing)
 
     @cached_property
     def nominal(self) -> Arm:
@@ -101,6 +104,14 @@ class Exact:
         acting = [Acting.of(one.effect, one.values, revolute=one.effect.joint is None or turning[one.effect.joint - 1])
                   for one in self.effects if one.log in (None, log)]
         return self.nominal.extended(*acting)
+
+    def torque_in(self, log: int, motion: Motion) -> Array:
+        """(samples, joints) [N m] in log number `log`, less what stands beside the model where nothing acts on it."""
+        arm = self.arm_in(log)
+        if not self.standing:
+            return arm.torque(motion)
+        known = sum(one.effect.torque(motion, self.nominal, one.values) for one in self.standing)
+        return np.asarray(replace(arm, effects=(*self.standing, *arm.effects)).torque(motion) - known)
 
     @property
     def core(self) -> int:
@@ -120,10 +131,10 @@ class Exact:
         return [self.columns_of(data, one) for one in self.effects[self.core:]]
 
     def core_torque(self, data: Data, core: int) -> Array:
-        """(rows,) of the nominal model and the first `core` effects."""
+        """(rows,) of the nominal model and the first `core` effects, which act on what stands beside it as well."""
         if core:
             inner = replace(self, effects=self.effects[:core])
-            return data.lay_each(lambda log, motion: inner.arm_in(log).torque(motion))
+            return data.lay_each(lambda log, motion: inner.torque_in(log, motion))
         if not all(law.from_motion for law in self.columns.laws):
             return data.lay(self.nominal.torque)
         kept = len(self.columns.kept)

@@ -50,6 +50,7 @@ from pipelines.model.parameter import Parameter
 
 __all__ = ["Extended", "Wanted", "extend"]
 
+_STANDS = "the reference logs show it too, so that it stands in the model already, as it was"
 _NOT_MOVED = "beside the other causes the base parameters have not moved as it moves them"
 _ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
 
@@ -118,6 +119,7 @@ def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSet
     case, prepared, ask = _case(first, chosen, memory)
     given = {one.place for one in case.beside}
     rest = [one for one in wanted if one.place not in given]
+    stands = given - {one.place for one in first.held.acting}
     taken_in = [one for one in rest if ask is not None and one.effect.evidence == "base parameters"]
     every = tuple(_family(case, one) for one in rest if one not in taken_in)
     left, refused = list(every), dict[tuple[str, int | None], str]()
@@ -136,6 +138,7 @@ def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSet
     if unmoved and not every:
         _family(case, unmoved[0])  # alone it is a slip of who asked
     refused |= {(one.effect.name, one.effect.joint): _NOT_MOVED for one in unmoved}
+    refused |= {(one.effect.name, one.effect.joint): _STANDS for one in wanted if one.place in stands}
     return _told(found, named, refused, replace(first, held=replace(first.held, case=case, prepared=prepared)), moved, chosen)
 
 

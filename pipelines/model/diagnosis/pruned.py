@@ -16,7 +16,6 @@ from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.chance import BY_CHANCE, no_gain, no_name
-from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.findings import unlike
 from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
@@ -37,7 +36,8 @@ _ALIKE = 0.25  # of what a cause took away, that one for which it could be mista
 _REST = 0.5  # of what the later of two takes, the earlier takes as well in a looser form: then it is the rest of that
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
-_SHAPE = "it only mends the shape of what was found before it at the joint"
+_TRACE = 0.01  # of the nominal residual's power, by which a law like one that stands at its joint is the rest of that
+_SHAPE = "it only mends the shape of what was found before it at the joint, or stood there"
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
 _STOOD = "what was found after it at the joint leaves less without it"
@@ -201,9 +201,17 @@ def _apart(found: Found, kept: list[int], case: Case) -> list[int]:
     for k in kept:
         step = found.steps[k]
         taken = 0.0 if step.best is None else _power(found, step.before.rms) - _power(found, step.best.done.rms)
-        if taken > _MENDS * _power(found, found.nominal.rms) or not any(_mistaken(found, j, k, case) for j in out):
+        share = taken / max(_power(found, found.nominal.rms), 1e-300)
+        stood = bool(out) and share <= _TRACE and _stands(found.final.model.effects[k].effect, case)
+        if not stood and (share > _MENDS or not any(_mistaken(found, j, k, case) for j in out)):
             out.append(k)
     return out
+
+
+def _stands(own: Effect, case: Case) -> bool:
+    """Whether an effect that it is, or could be mistaken for, stands at its joint since before."""
+    there = (one.effect for one in case.beside if one.effect.joint == own.joint)
+    return own.friction and any(own.name == one.name or own.name in one.twins or one.name in own.twins for one in there)
 
 
 def _turned(found: Found, kept: list[int], believed: list[int], case: Case) -> list[int]:
@@ -280,5 +288,5 @@ def _without(found: Found, kept: list[int], case: Case, weighted: Refined | None
         return last
     if kept and kept == list(range(len(kept))):  # it was fitted like this before
         return refine(found.steps[len(kept)].before.model, case.data, last.weight)
-    model = Exact(found.final.model.columns, found.final.model.beta, tuple(effects[k] for k in kept))
+    model = replace(found.final.model, effects=tuple(effects[k] for k in kept))
     return refine(model, case.data, last.weight)

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,16 +22,20 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import Prepared
-from pipelines.model.diagnosis.nominal import fit_columns, fit_nominal, law_slopes, rows_of
+from pipelines.model.diagnosis.linear import deviations
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal, law_slopes, rows_of
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Standing, Value
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
+from pipelines.model.diagnosis.standing_shapes import fitted_shapes
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Known", "Moved", "Probed", "Since", "since_reference"]
+
+_ALLOWED, _SHARE = 3.0, 0.1  # standard deviations of the reference logs alone; of an amplitude: no law is that of the machine
 
 Probed = Callable[[Refined, Data | None, Arms], tuple[Probe, Thresholds]]
 Moved = Callable[[Refined, Sequence[Family]], Absorbed | Unexplained | None]
@@ -64,19 +68,19 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     arm = Exact.start(columns, fit).arm
     data, later = joined(reference, prepared.data)
     every = families(columns.laws, whole_motion(data), arm, chosen.without)
-    standing = standing_set(reference, fit, every, arm)
+    standing, columns, beta = fitted_shapes(standing_set(reference, fit, every, arm), columns, fit)
     base = rows_of(data, columns)
-    nominal = np.concatenate([base, *law_slopes(data, columns, fit.beta[:len(base)])[0]])
+    nominal = np.concatenate([base, *law_slopes(data, columns, beta[:len(base)])[0]])
     common = _torques(data, standing, arm)
     whole = fit_columns(data, np.concatenate([apart(nominal, later), common]))
-    shared = whole.beta[2 * len(nominal):]
-    sizes = _split(shared, standing)
+    alone = fit_columns(reference, np.concatenate([nominal, common])[:, ~later])
+    sizes = _sizes(alone, whole.beta[2 * len(nominal):], standing)
     before_and_after = [one.effect for one in standing]
     now = less(prepared.data, _known(prepared.data, standing, sizes, arm), before_and_after)
     judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm), before_and_after)
-    start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, fit.beta[:len(base)])[0]]))
+    start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, beta[:len(base)])[0]]))
 
-    left = whole.left[~later]
+    left = alone.left
     floor = reference.rms(left)
     weight, there = (1.0 / np.maximum(floor, 1e-12), {}) if known is None else known
     chance = Chance.of(data, later, nominal, common, weight, arm,
@@ -90,6 +94,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         return Probe.of(found, judge, seen, (data, fit, later)), bounds(every, [True] * len(every), fit, later, chance)
 
     acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
+    model = replace(Exact.start(columns, start), standing=tuple(one for one in acting if one.effect.adds))
     kept = len(columns.kept)
 
     def sessions(found: Refined) -> Sessions:
@@ -102,7 +107,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         left = two.fit(moved=False, more=two.acting(effect, arm)).residual
         return float(left @ left)
 
-    case = Case(now, judge, Exact.start(columns, start), start.weight, every, None, chosen.blocks, changed=changed,
+    case = Case(now, judge, model, start.weight, every, None, chosen.blocks, changed=changed,
                 shared=of_one_set, beside=(*before, *acting))
 
     def moved(found: Refined, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
@@ -125,9 +130,16 @@ def _torques(data: Data, standing: Sequence[Chosen], arm: Arm) -> Array:
     return np.concatenate([np.zeros((0, data.rows)), *(lay_one(data, one.effect, arm) for one in standing)])
 
 
-def _split(amplitudes: Array, standing: Sequence[Chosen]) -> list[Array]:
+def _sizes(alone: Fit, shared: Array, standing: Sequence[Chosen]) -> list[Array]:
+    """Amplitudes of each: `shared` by before and after, which tell an offset from weight better than the reference logs do `alone`,
+    as far as these allow them; else theirs, for the later logs have what has changed as well."""
+    count = len(shared)
+    own = alone.beta[len(alone.beta) - count:]
+    std = deviations(alone.table * alone.weights, alone.residual)[len(alone.beta) - count:]
     ends = np.cumsum([len(one.amplitudes) for one in standing])[:-1]
-    return np.split(amplitudes, ends) if standing else []
+    parts = zip(*(np.split(x, ends) for x in (own, std, shared)), strict=True) if standing else ()
+    return [both if (np.abs(both - mine) <= np.maximum(_ALLOWED * wide, _SHARE * np.abs(mine))).all() else mine
+            for mine, wide, both in parts]
 
 
 def _known(data: Data, standing: Sequence[Chosen], sizes: Sequence[Array], arm: Arm) -> Array:

@@ -27,7 +27,7 @@ def twins() -> tuple[str, str]:
 
 def among(*causes: Effect) -> Any:
     there = tuple(SimpleNamespace(cause=one.name, joint=one.joint) for one in causes)
-    return SimpleNamespace(families=there, judge=None, blocks=10, white=False)
+    return SimpleNamespace(families=there, judge=None, blocks=10, white=False, beside=())
 
 
 @pytest.fixture
@@ -52,6 +52,16 @@ def test_a_twin_by_name_that_could_not_have_passed_for_the_earlier_is_one_of_its
     assert pruned._apart(found, [0, 1], among(effect(other, 1))) == [0, 1]
 
 
+@pytest.mark.parametrize(("joint", "rest", "kept"), [(2, 0.0101, [0]), (2, 0.06, [0, 1]), (3, 0.0101, [0, 1])])
+def test_a_trace_of_a_law_like_one_that_stands_is_the_rest_of_that(joint: int, rest: float, kept: list[int]) -> None:
+    """Beside a great cause it takes a thousandth off what the nominal model leaves, at the joint where a law of friction stands."""
+    found = searched(left(0.1, 0.1, 0.01), (effect("encoder_crosstalk", 1), left(0.01, rest, 0.01)),
+                     (effect("stribeck", 2), left(0.01, 0.01, 0.01)))
+    case = among(effect("encoder_crosstalk", 1), effect("stribeck", 2))
+    case.beside = (SimpleNamespace(effect=effect("concave_friction", joint)),)
+    assert pruned._apart(found, [0, 1], case) == kept
+
+
 @pytest.mark.parametrize(("share", "kept"), [(0.9, [0]), (0.2, [0, 1])])
 def test_what_an_earlier_law_would_take_in_a_looser_form_is_the_rest_of_it(share: float, kept: list[int],
                                                                            monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,7 +73,7 @@ def test_what_an_earlier_law_would_take_in_a_looser_form_is_the_rest_of_it(share
         return share if step is found.steps[1] and family.shapes == (spring.looser(),) else 0.0
 
     monkeypatch.setattr(pruned, "imitated", taken)
-    case = SimpleNamespace(families=(Family("cogging", 1, (waves,)),), judge=None, blocks=10)
+    case = SimpleNamespace(families=(Family("cogging", 1, (waves,)),), judge=None, blocks=10, beside=())
     assert pruned._apart(found, [0, 1], case) == kept
 
 
@@ -214,7 +224,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(rest: float, ve
     monkeypatch.setattr(pruned, "_not_told", lambda *args: False)
     monkeypatch.setattr(pruned, "_harm", lambda *args: "")
     monkeypatch.setattr(pruned, "_without", lambda *args: left(rest, 0.01, 0.01))
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None)
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", ruled, ""), case, case, FLOOR)
     assert done.ruling.verdict == verdict
     assert done.ruling.named == ((1,) if verdict == "cause" else ())
@@ -233,7 +243,7 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     dip = SimpleNamespace(effects=(SimpleNamespace(possible=True), SimpleNamespace(possible=False)))
     both, one = SimpleNamespace(rms=np.array([0.01, 0.01, 0.01]), model=dip), left(0.02, 0.01, 0.01)
     monkeypatch.setattr(pruned, "_without", lambda found, kept, *_: both if len(kept) == 2 else one)
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None)
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
     assert done.ruling.named == (0,)
     assert done.ruling.doubts == {1: pruned._IMPOSSIBLE}
