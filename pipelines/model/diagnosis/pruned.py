@@ -37,6 +37,7 @@ _REST = 0.5  # of what the later of two takes, the earlier takes as well in a lo
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
 _TRACE = 0.01  # of the nominal residual's power, by which a law like one that stands at its joint is the rest of that
+_REST_OF_GAP = 0.05  # the same, by which what is found at the joint of a gap is what no law of that has
 _SHAPE = "it only mends the shape of what was found before it at the joint, or stood there"
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
@@ -202,10 +203,16 @@ def _apart(found: Found, kept: list[int], case: Case) -> list[int]:
         step = found.steps[k]
         taken = 0.0 if step.best is None else _power(found, step.before.rms) - _power(found, step.best.done.rms)
         share = taken / max(_power(found, found.nominal.rms), 1e-300)
-        stood = bool(out) and share <= _TRACE and _stands(found.final.model.effects[k].effect, case)
-        if not stood and (share > _MENDS or not any(_mistaken(found, j, k, case) for j in out)):
+        own = found.final.model.effects[k].effect
+        stood = bool(out) and share <= _TRACE and _stands(own, case)
+        gap = share <= _REST_OF_GAP and any(_gap_at(found.final.model.effects[j].effect, own.joint) for j in out)
+        if not (stood or gap) and (share > _MENDS or not any(_mistaken(found, j, k, case) for j in out)):
             out.append(k)
     return out
+
+
+def _gap_at(effect: Effect, joint: int | None) -> bool:
+    return effect.evidence == "reversals" and effect.joint == joint
 
 
 def _stands(own: Effect, case: Case) -> bool:

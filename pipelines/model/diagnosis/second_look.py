@@ -9,7 +9,8 @@ and searches again: with thresholds of the same replicas through the same, and b
 is. Where the second look finds as many causes at every joint as the first has found, under other names or more, and they leave no
 more of the rows as they are, it is believed. What is next to nothing beside a greater cause, and may as well be what that one's law
 does not have, has to be found by both looks. What happened once is no matter of noise that is slow: where the first look names such
-a thing, it is all. So it is where logs have rows of different spacing: no one filter makes the noise of all of them white.
+a thing, it is all. So it is where it names a gap, which is looked for below the frequencies at which it rings, and where logs have
+rows of different spacing: no one filter makes the noise of all of them white.
 
 What it found is then told in newton metres of the rows as they are: beside the nominal model of the first look, every model with
 the numbers that the second one has fitted.
@@ -54,7 +55,9 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
         floor: (joints,) [N m] of rows as they are.
     """
     once = {family.cause for family in case.families if family.event}
-    if done.ruling.verdict == "unknown" or any(cause in once for cause, _ in _names(done)) or not _evenly(case, twin):
+    named = [best.effect for k in done.ruling.named if (best := done.found.steps[k].best) is not None]
+    enough = any(effect.name in once or effect.evidence == "reversals" for effect in named)
+    if done.ruling.verdict == "unknown" or enough or not _evenly(case, twin):
         return done
     there, whitened, usual = _in_white(case, twin)
     found = search(there, most)

@@ -62,6 +62,16 @@ def test_a_trace_of_a_law_like_one_that_stands_is_the_rest_of_that(joint: int, r
     assert pruned._apart(found, [0, 1], case) == kept
 
 
+@pytest.mark.parametrize(("joint", "rest", "kept"), [(1, 0.012, [0]), (1, 0.05, [0, 1]), (2, 0.012, [0, 1])])
+def test_a_trace_at_the_joint_of_a_gap_is_what_no_law_of_it_has(joint: int, rest: float, kept: list[int]) -> None:
+    """A tenth of a millisecond beside a gap at the joint, that takes a hundredth of what it left; elsewhere it is a cause."""
+    before = [0.1, 0.1, 0.01]
+    between = [0.01, 0.01, 0.01]
+    between[joint - 1] = rest
+    found = searched(left(*before), (effect("backlash", 1), left(*between)), (effect("time_delay", joint), left(0.01, 0.01, 0.01)))
+    assert pruned._apart(found, [0, 1], among(effect("backlash", 1), effect("time_delay", joint))) == kept
+
+
 @pytest.mark.parametrize(("share", "kept"), [(0.9, [0]), (0.2, [0, 1])])
 def test_what_an_earlier_law_would_take_in_a_looser_form_is_the_rest_of_it(share: float, kept: list[int],
                                                                            monkeypatch: pytest.MonkeyPatch) -> None:
