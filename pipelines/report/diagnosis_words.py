@@ -114,7 +114,7 @@ def all_together(findings: Sequence[Finding]) -> Gain:
 def what_stays(found: Diagnosis) -> str:
     """" Joint 1 stays at 2.3 times what an arm in order leaves there, without a name."; empty where no joint stands so high."""
     floor, name, _ = held_out_floor(found)
-    noise = found.floor_origin not in ("twin", "reference logs")
+    noise = found.floor_origin == "blocks"
     times = found.after_rms.validate / np.maximum(floor, 1e-300)
     high = np.flatnonzero(times > (_STAYS_ABOVE_NOISE if noise else _STAYS)).tolist()
     if not high:

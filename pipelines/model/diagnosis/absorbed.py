@@ -235,8 +235,8 @@ def _elsewhere(one: Effect, other: Effect) -> bool:
 
 def _place(effect: Effect) -> str:
     """"torque_gain:2", "link_length of link 2"."""
-    of = "".join(f" of {q.name} {getattr(effect, q.name):g}" for q in effect.parameters if q.shape and q.discrete)
-    return place_of(effect.name, effect.joint) + of
+    numbers = [q.name for q in effect.parameters if q.shape and q.discrete] if effect.joint is None else []
+    return place_of(effect.name, effect.joint) + "".join(f" of {name} {getattr(effect, name):g}" for name in numbers)
 
 
 def _reported(effect: Effect, amplitudes: Array, std: Array) -> dict[str, Value]:

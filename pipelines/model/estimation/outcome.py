@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import Validity
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Motions
+from pipelines.model.estimation.peaks import bridged
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstructed
 from pipelines.signal.filters import choose_decimation, design_low_pass, zero_phase
@@ -98,7 +98,7 @@ def course(log: ExperimentLog, found: Reconstructed, parts: ArmTorque, cutoff_hz
     for run in good.runs:
         rows = good.kept[run]
         tau, spoilt = good.log.tau[run], (good.missing | good.spikes | good.saturated)[run]
-        torques = np.hstack([_bridged(tau, spoilt), parts.total[rows], parts.friction[rows]])
+        torques = np.hstack([bridged(tau, spoilt), parts.total[rows], parts.friction[rows]])
         if low_pass is not None and len(torques) > low_pass.padding:
             torques = zero_phase(torques, low_pass)
         torques[:, :log.n_joints][spoilt] = np.nan
@@ -109,15 +109,6 @@ def course(log: ExperimentLog, found: Reconstructed, parts: ArmTorque, cutoff_hz
     t, torques = whole[:, 0], whole[:, 1:]
     measured, model, friction, left = (np.ascontiguousarray(part) for part in np.split(torques, 4, axis=1))
     return Course(log.name, log.role, t, measured, model, friction, left)
-
-
-def _bridged(x: Array, bad: npt.NDArray[np.bool_]) -> Array:
-    """`x` (samples, joints) with straight lines where it is bad."""
-    out, place = x.copy(), np.arange(len(x))
-    for column, ill in zip(out.T, bad.T, strict=True):
-        if ill.any():
-            column[ill] = 0.0 if ill.all() else np.interp(place[ill], place[~ill], column[~ill])
-    return out
 
 
 def _extremes(rows: Array, points: int) -> Array:
