@@ -11,6 +11,7 @@ from pipelines.errors import Check
 from pipelines.model.evidence import Evidence
 from pipelines.model.rigid.body import Array
 from pipelines.model.row_fit import Sampled, quick_residual, shared_residual
+from pipelines.model.torque_scale import torque_scale
 
 __all__ = ["encoder_scale", "position_columns", "torque_columns"]
 
@@ -18,6 +19,7 @@ _BAD, _GOOD, _MUCH_BETTER = 0.15, 0.3, 0.35  # relative residuals, and the ratio
 # A wrong scale can hide well, but the right one then is far better.
 _SCALE_BAD, _SHARED_BAD, _SCALE_BETTER = 0.02, 0.01, 0.25
 _WORSE = 1.03  # times what a row left before: chance
+_EITHER = 1.5  # of two explanations, neither leaves so much more than the other: these rows cannot tell them apart
 _SCALES = {"0.5": 0.5, "2": 2.0, "0.1": 0.1, "10": 10.0, "pi/180 (degrees)": np.pi / 180, "180/pi": 180 / np.pi,
            "2 pi (turns)": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi, "-1": -1.0}
 
@@ -100,28 +102,46 @@ def encoder_scale(e: Evidence) -> list[Check]:
 
     First with one set of rigid parameters for all rows, where the scale of a joint tells that bends nothing and moves little.
     Then with parameters of its own for each row, where a joint's angle bends the arm: that holds whatever the torques' scales.
+    Where bending does not tell, the torque's own scale may explain as much: then that is said as well, or instead.
     """
     motion, told = e.thinned().motion, e.telling
+
+    def together(**other: Array) -> Array:
+        return shared_residual(e.body, motion, **other)[told]
 
     def alone(**other: Array) -> Array:
         return np.diag(quick_residual(e.body, motion, **other))[told]
 
     # The direction of a joint that bends nothing is that of its torque: S14 tells.
     magnitudes = {name: factor for name, factor in _SCALES.items() if factor > 0}
-    return (_scaled(e, lambda **other: shared_residual(e.body, motion, **other)[told], alone, _SHARED_BAD, magnitudes)
-            or _scaled(e, alone, alone, _SCALE_BAD, _SCALES))
+    if (found := _scaled(e, together, alone, _SHARED_BAD, magnitudes)) is None:
+        found = _scaled(e, alone, alone, _SCALE_BAD, _SCALES)
+        return [] if found is None else [_angle(e, *found)]
+    torque = torque_scale(e)
+    if torque is None or torque.joint != found[2] or torque.after > _EITHER * found[1]:
+        return [_angle(e, *found)]
+    return [_angle(e, *found, f"; so does its tau divided by {torque.factor:.3g}")] if found[1] < _EITHER * torque.after else []
+
+
+def _angle(e: Evidence, before: float, after: float, joint: int, factor: str, rival: str = "") -> Check:
+    return e.subject.say("S15", "warn",
+                         f"q of joint {joint + 1} fits if multiplied by {factor}, residual {before:.2g} -> {after:.2g}{rival}",
+                         signal="q", joint=joint, gate=True,
+                         remedy="correct the gear ratio, the direction or the counts per turn of this encoder"
+                                + (", or the gear ratio or torque constant of this torque" if rival else ""))
 
 
 def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Array], bad: float,
-            scales: Mapping[str, float]) -> list[Check]:
-    """The angle and the scale that leave least, where the log as it is leaves more than `bad` and far more than that.
+            scales: Mapping[str, float]) -> tuple[float, float, int, str] | None:
+    """What the log as it is leaves, what the best angle and scale leave, the joint and the factor; None where the log leaves no
+    more than `bad` or not far more than that.
 
     By the right scale no row fits worse `alone`, with its own parameters: a joint that hears of another drive may fit far better
     with an angle scaled down, but the other joints' rows, which are in order, do not.
     """
     motion, before, rows = e.thinned().motion, _rms(residual()), alone()
     if before < bad:
-        return []
+        return None
     found: list[tuple[float, int, str]] = []
     for joint in e.telling.tolist():
         for name, factor in scales.items():
@@ -130,10 +150,4 @@ def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Ar
             left = _rms(residual(**other))
             if left <= min(_GOOD, _SCALE_BETTER * before) and (alone(**other) <= _WORSE * rows).all():
                 found.append((left, joint, name))
-    if not found:
-        return []
-    best = min(found)
-    return [e.subject.say("S15", "warn",
-                          f"q of joint {best[1] + 1} fits if multiplied by {best[2]}, residual {before:.2g} -> {best[0]:.2g}",
-                          signal="q", joint=best[1], gate=True,
-                          remedy="correct the gear ratio, the direction or the counts per turn of this encoder")]
+    return (before, *min(found)) if found else None

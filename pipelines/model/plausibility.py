@@ -23,6 +23,7 @@ from pipelines.model.mix_ups import encoder_scale, position_columns, torque_colu
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
+from pipelines.model.torque_scale import torque_scale
 
 __all__ = ["excitation_condition", "mismatches", "plausibility", "plausibility_findings"]
 
@@ -148,10 +149,12 @@ def _negative(e: Evidence, joint: int) -> bool:
 
 
 def _ratios(e: Evidence) -> Sequence[Check | NotTested]:
-    """S15: the torque is as large as the described links need, within what load and friction can make of it."""
+    """S15: the torque is as large as the described links need, within what load and friction can make of it; as the other
+    joints' torques need, where the description says nothing."""
     known = e.body.known_parameters()
     if known is None:
-        return e.subject.cannot_tell("S15", "the robot's description has no masses and inertias to compare with", signal="tau")
+        return _against_the_others(e) or e.subject.cannot_tell(
+            "S15", "the robot's description has no masses and inertias to compare with", signal="tau")
     motion = e.motion
     expected = e.body.torque(motion.q, motion.dq, motion.ddq, known)
     found, seen = [], []
@@ -170,9 +173,22 @@ def _ratios(e: Evidence) -> Sequence[Check | NotTested]:
                                        remedy=f"look for a gear ratio or torque constant of about {slope:.3g} or "
                                               f"{1 / slope:.3g} that was applied twice or not at all"))
     if not seen:
-        return e.subject.cannot_tell("S15", "the described masses and inertias do not explain the torque of any joint, "
-                                     "so that a wrong gear ratio or unit would not show", signal="tau")
+        return _against_the_others(e) or e.subject.cannot_tell(
+            "S15", "the described masses and inertias do not explain the torque of any joint, so that a wrong gear ratio or unit "
+            "would not show", signal="tau")
     return found or e.subject.ok("S15", f"torque over that of the described links: {', '.join(seen)}", signal="tau")
+
+
+def _against_the_others(e: Evidence) -> list[Check]:
+    """S15 without a description: all torques come from one set of rigid parameters."""
+    if (found := torque_scale(e)) is None:
+        return []
+    return [e.subject.say("S15", "warn",
+                          f"tau of joint {found.joint + 1} is {found.factor:.3g} times what the other joints' torques need, "
+                          f"residual {found.before:.2g} -> {found.after:.2g}",
+                          signal="tau", joint=found.joint, gate=True,
+                          remedy=f"look for a gear ratio or torque constant of about {found.factor:.3g} or {1 / found.factor:.3g} "
+                                 "that was applied twice or not at all")]
 
 
 def _unexplained(columns: Array, tau: Array) -> float:

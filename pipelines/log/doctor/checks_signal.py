@@ -18,6 +18,7 @@ __all__ = ["SIGNAL_CHECKS"]
 
 _FEW = 0.01  # share of samples that may be missing before a channel is not a measurement any more
 _HALF = 0.5
+_FAR_BEYOND = 1.5  # times its limit: a controller may command it, a wrong scale makes it everywhere
 
 
 def missing_samples(s: Subject) -> list[Check]:
@@ -131,11 +132,15 @@ def saturation(s: Subject) -> list[Check]:
             limit = f"at a flat top at {level:.4g}"
         elif peak > 1.01 * described:  # commands, which the drive cuts
             limit = f"at or beyond the described limit of {described:.4g}, up to {peak:.4g}"
+        remedy = "move slower or with less acceleration; a saturated drive hides what the arm needs"
+        if peak > _FAR_BEYOND * described:
+            remedy += (f"; if nothing commanded {peak / described:.2g} times the limit, look for a gear ratio or torque constant "
+                       "applied twice, or correct the limit in the robot's description")
         found.append(s.say("D05", "warn",
                            f"{percent(share, 2)} of the torque samples lie {limit} {s.unit('tau', j)}; "
                            "they are left out of fits",
                            signal="tau", joint=j, sample=int(s.good.kept[np.argmax(flags[:, j])]), gate=share > 0.05,
-                           remedy="move slower or with less acceleration; a saturated drive hides what the arm needs"))
+                           remedy=remedy))
     if found:
         return found
     peak = np.nanmax(np.abs(s.good.log.tau), axis=0, initial=0.0)

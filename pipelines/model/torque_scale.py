@@ -1,0 +1,104 @@
+"""Ask whether one joint's torque would fit the others' in another scale: a gear ratio or torque constant applied twice, or not.
+
+    found = torque_scale(e)          found.factor: times what the other joints' torques need; None where nothing is wrong
+
+No parameter of the arm has to be known: the rows of all joints share the rigid body's parameters, those of one joint alone would
+follow any scale of its torque.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from pipelines.model.evidence import Evidence
+from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.model.row_fit import Sampled
+
+__all__ = ["TorqueScale", "torque_scale"]
+
+# A drive whose gain is off by less is a fault that `diagnose` names and measures; gear ratios are off by more.
+_LEAST, _MOST = 1.8, 200.0
+_BAD, _BETTER = 0.02, 0.4  # relative residual of all rows with one set of parameters; the ratio of two
+_GRID = 25
+_RANK = 1e-14  # of the normal equations: squares of 1e-7
+
+
+@dataclass(frozen=True)
+class TorqueScale:
+    """The torque of `joint` (from 0) is `factor` times what the others' need; residuals before and after it is divided by it."""
+
+    joint: int
+    factor: float
+    before: float
+    after: float
+
+
+def torque_scale(e: Evidence) -> TorqueScale | None:
+    """The joint and factor that leave least, where the log as it is leaves far more; None where none does."""
+    if len(e.telling) < 2:
+        return None
+    rows = _Rows.of(e.body, e.motion)
+    before = rows.left(np.ones(e.n_joints))
+    if before < _BAD:
+        return None
+    found = [(*_least(rows, j, e.n_joints), j) for j in e.telling.tolist()]
+    after, factor, joint = min(found)
+    apart = max(factor, 1.0 / factor)
+    if not _LEAST < apart < _MOST or after > _BETTER * before:
+        return None
+    return TorqueScale(joint, factor, before, after)
+
+
+def _least(rows: _Rows, joint: int, n: int) -> tuple[float, float]:
+    """Residual and factor of one joint's torque by which all rows fit best: a grid, and Brent (1973) about its best point."""
+    def left(log_factor: float) -> float:
+        factors = np.ones(n)
+        factors[joint] = np.exp(log_factor)
+        return rows.left(factors)
+
+    grid = np.linspace(-np.log(_MOST), np.log(_MOST), _GRID)
+    values = [left(float(x)) for x in grid]
+    at = int(np.clip(np.argmin(values), 1, _GRID - 2))
+    best = minimize_scalar(left, bounds=(grid[at - 1], grid[at + 1]), method="bounded", options={"xatol": 1e-4})
+    return float(best.fun), float(np.exp(best.x))
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Normal equations of each joint's torque, over its own size, after friction, rotor inertia and offset of its own."""
+
+    gram: Array  # (joints, parameters, parameters)
+    side: Array  # (joints, parameters)
+    square: Array  # (joints,)
+
+    @classmethod
+    def of(cls, body: RigidBody, motion: Sampled) -> _Rows:
+        regressor, tau = body.regressor(motion.q, motion.dq, motion.ddq), motion.tau
+        scale = np.sqrt(np.sum(regressor**2, axis=(0, 1)))
+        regressor = regressor / np.where(scale > 0.0, scale, 1.0)
+        grams, sides, squares = [], [], []
+        for j in range(tau.shape[1]):
+            own = np.stack([motion.ddq[:, j], motion.dq[:, j], motion.coulomb[:, j], np.ones(len(tau))], axis=-1)
+            own, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
+            size = float(np.linalg.norm(tau[:, j] - tau[:, j].mean())) or 1.0
+            unit = tau[:, j] / size
+            rest, columns = unit - own @ (own.T @ unit), regressor[:, j] - own @ (own.T @ regressor[:, j])
+            grams.append(columns.T @ columns / size**2)
+            sides.append(columns.T @ rest / size)
+            squares.append(float(rest @ rest))
+        return cls(np.array(grams), np.array(sides), np.array(squares))
+
+    def left(self, factors: Array) -> float:
+        """rms over the joints of what is left of each torque's variation, the torques divided by `factors` (joints,).
+
+            min over β of Σ_j |τ_j/s_j - f_j/s_j Φ_j β|² = Σ_j c_j - bᵀ G⁺ b,  b = Σ_j f_j b_j,  G = Σ_j f_j² G_j
+        """
+        gram, side = np.einsum("j,jab->ab", factors**2, self.gram), factors @ self.side
+        size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        values, vectors = np.linalg.eigh(gram / size / size[:, None])
+        seen = values > _RANK * values[-1] * len(values) * 10
+        explained = float(np.sum((vectors[:, seen].T @ (side / size)) ** 2 / values[seen]))
+        return float(np.sqrt(max(float(self.square.sum()) - explained, 0.0) / len(self.square)))

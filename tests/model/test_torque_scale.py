@@ -1,0 +1,70 @@
+"""A torque in another scale than the other joints' is told from the rows' common parameters, without a description of the links;
+arms with faults of their drives are left to `diagnose`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.log.doctor.checks import Subject
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import open_log
+from pipelines.model.evidence import Evidence
+from pipelines.model.plausibility import plausibility
+from pipelines.model.rigid.choose import rigid_body
+from pipelines.model.row_fit import sample_motion
+from pipelines.model.torque_scale import torque_scale
+from tests.faulty import healthy_without_reference
+from tests.healthy import good_log, with_signal
+
+
+def evidence(log: ExperimentLog) -> Evidence:
+    subject = Subject(log)
+    motion = sample_motion(subject.good)
+    assert motion is not None
+    return Evidence(subject, rigid_body(log.robot), motion)
+
+
+@pytest.fixture(scope="module")
+def excited(samples: Path) -> ExperimentLog:
+    return open_log(samples / "rrr-healthy/excitation-1.h5").log
+
+
+def scaled(log: ExperimentLog, joint: int, factor: float) -> ExperimentLog:
+    return with_signal(log, tau=log.tau * np.where(np.arange(log.n_joints) == joint, factor, 1.0))
+
+
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize("factor", [0.1, 0.25, 4.0])
+def test_a_torque_in_another_scale_is_measured(excited: ExperimentLog, joint: int, factor: float) -> None:
+    found = torque_scale(evidence(scaled(excited, joint, factor)))
+    assert found is not None
+    assert found.joint == joint
+    assert found.factor == pytest.approx(factor, rel=0.03)
+    (check,) = [c for c in plausibility(Subject(scaled(excited, joint, factor))) if c.code == "RRID-S15"]
+    assert check.gate
+    assert f"tau of joint {joint + 1} is {found.factor:.3g} times what the other joints' torques need" in check.message
+
+
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.3])
+def test_a_gain_is_left_to_diagnose(excited: ExperimentLog, joint: int, factor: float) -> None:
+    assert torque_scale(evidence(scaled(excited, joint, factor))) is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_encoder_in_another_scale_is_no_torque(seed: int) -> None:
+    """The angle of joint 1 bends nothing, but its square in the others' centrifugal torque tells it from a torque."""
+    log = healthy_without_reference(good_log(seed))
+    wrong = with_signal(log, q=log.q * [2.0, 1.0, 1.0])
+    (check,) = [c for c in plausibility(Subject(wrong)) if c.code == "RRID-S15"]
+    assert check.message.startswith("q of joint 1 fits if multiplied by 0.5")
+    assert "its tau" not in check.message
+
+
+@pytest.mark.parametrize("factor", [0.1, 8.0])
+def test_a_waist_that_pushes_too_hard_is_not_blamed_on_its_encoder(excited: ExperimentLog, factor: float) -> None:
+    (check,) = [c for c in plausibility(Subject(scaled(excited, 0, factor))) if c.code == "RRID-S15"]
+    assert check.message.startswith("tau of joint 1 is")
