@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import sys
 import textwrap
+import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ __all__ = ["Teller", "say_error", "say_outcome", "say_table", "say_verdict"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
 _MOST = 12  # remarks
+_SILENT = 20.0  # [s]
 _LOGS = 30  # named for one remark
 _NUMBERS = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z_])")  # values; p3 and q_1 are names
 _HEADS = (12, 8, 6)  # characters: a heading is broken into lines no shorter than that; shorter ones where the table is too wide
@@ -28,12 +30,14 @@ _WIDE = 80  # characters of the narrowest terminal that tables are made for
 
 
 class Teller:
-    """Progress: one line that is written over on a terminal, every step with -v, else nothing."""
+    """Progress: one line that is written over on a terminal, every step with -v, else a line now and then, that whoever reads a
+    pipe or the output of CI knows that something is done. With -q nothing."""
 
     def __init__(self, quiet: bool, verbose: bool) -> None:
         self.live = sys.stderr.isatty() and not quiet and not verbose
-        self.verbose = verbose
+        self.verbose, self.quiet = verbose, quiet
         self.width = 0
+        self.last = time.monotonic()
 
     def __call__(self, words: str) -> None:
         line = clean(words, 100)
@@ -41,8 +45,9 @@ class Teller:
             sys.stderr.write("\r" + line.ljust(self.width))
             sys.stderr.flush()
             self.width = len(line)
-        elif self.verbose:
-            print(line, file=sys.stderr)
+        elif self.verbose or (not self.quiet and time.monotonic() - self.last > _SILENT):
+            print(line, file=sys.stderr, flush=True)
+            self.last = time.monotonic()
 
     def done(self) -> None:
         if self.live and self.width:

@@ -10,7 +10,7 @@ import pytest
 from pipelines.errors import Check
 from pipelines.report.report import Report, Table
 from pipelines.stage import Outcome
-from rrrid_cli.console import _say_checks, say_outcome, say_table
+from rrrid_cli.console import Teller, _say_checks, say_outcome, say_table
 
 TABLE = Table(("joint", "held-out torque error now [N m]", "cause"),
               ((1, 0.08783, "cogging"), (2, 1.2, "–"), (3, None, "no cause")))
@@ -92,3 +92,19 @@ def test_one_finding_of_several_logs_is_told_once(capsys: pytest.CaptureFixture[
         "      alike 2 times in all, in a.h5, b.h5",
         "  ! RRID-D09 a.h5: p1 cannot be told", "  ! RRID-D09 a.h5: p2 cannot be told",
         "  ! RRID-F05 a.h5: no integrity data"]
+
+
+def test_who_reads_a_pipe_hears_now_and_then_that_something_is_done(capsys: pytest.CaptureFixture[str],
+                                                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing of what is over in seconds; of what takes minutes a line now and then; nothing at all with -q."""
+    now = [0.0]
+    monkeypatch.setattr("rrrid_cli.console.time.monotonic", lambda: now[0])
+    for quiet, heard in ((False, ["third", "fifth"]), (True, [])):
+        now[0] = 0.0
+        teller = Teller(quiet, False)
+        for at, words in ((1.0, "first"), (15.0, "second"), (25.0, "third"), (40.0, "fourth"), (60.0, "fifth")):
+            now[0] = at
+            teller(words)
+        teller.done()
+        out, err = capsys.readouterr()
+        assert (out, err.splitlines()) == ("", heard)
