@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from pipelines.model.evidence import Evidence
 from pipelines.model.rigid.body import Array, RigidBody
@@ -22,7 +21,7 @@ __all__ = ["TorqueScale", "torque_scale"]
 # A drive whose gain is off by less is a fault that `diagnose` names and measures; gear ratios are off by more.
 _LEAST, _MOST = 1.8, 200.0
 _BAD, _BETTER = 0.02, 0.4  # relative residual of all rows with one set of parameters; the ratio of two
-_GRID = 25
+_GRID, _FINER = 25, 6  # points, and how often a grid is laid about the best of the last
 _RANK = 1e-14  # of the normal equations: squares of 1e-7
 
 
@@ -53,17 +52,18 @@ def torque_scale(e: Evidence) -> TorqueScale | None:
 
 
 def _least(rows: _Rows, joint: int, n: int) -> tuple[float, float]:
-    """Residual and factor of one joint's torque by which all rows fit best: a grid, and Brent (1973) about its best point."""
+    """Residual and factor of one joint's torque by which all rows fit best, by ever finer grids of its logarithm."""
     def left(log_factor: float) -> float:
         factors = np.ones(n)
         factors[joint] = np.exp(log_factor)
         return rows.left(factors)
 
-    grid = np.linspace(-np.log(_MOST), np.log(_MOST), _GRID)
-    values = [left(float(x)) for x in grid]
-    at = int(np.clip(np.argmin(values), 1, _GRID - 2))
-    best = minimize_scalar(left, bounds=(grid[at - 1], grid[at + 1]), method="bounded", options={"xatol": 1e-4})
-    return float(best.fun), float(np.exp(best.x))
+    low, high = -np.log(_MOST), np.log(_MOST)
+    for _ in range(_FINER):
+        grid = np.linspace(low, high, _GRID)
+        best, at = min((left(float(x)), k) for k, x in enumerate(grid))
+        low, high = grid[max(at - 1, 0)], grid[min(at + 1, _GRID - 1)]
+    return best, float(np.exp(grid[at]))
 
 
 @dataclass(frozen=True)
