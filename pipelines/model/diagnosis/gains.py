@@ -30,8 +30,8 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Plant, Windows, choose_step, simulate_together, simulate_windows
 
-__all__ = ["Simulation", "farther", "gain_of", "in_loop", "simulation_errors", "surely_less", "torque_gain", "torque_gain_of",
-           "worse_log"]
+__all__ = ["Simulation", "farther", "gain_of", "in_loop", "nearer", "simulation_errors", "surely_less", "torque_gain",
+           "torque_gain_of", "worse_log"]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -130,6 +130,11 @@ def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str
         return "the simulated arm runs away with it"
     low, _ = apart(before.power, after.power, before.samples, np.random.default_rng(_SEED))
     return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
+
+
+def nearer(before: Simulation, after: Simulation) -> bool:
+    """Whether the second simulated arm is nearer to the measured one than the first, chance or not."""
+    return "none" not in (before.how, after.how) and float(after.power.sum()) < float(before.power.sum())
 
 
 def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int, Simulation] | None = None) -> list[Simulation]:

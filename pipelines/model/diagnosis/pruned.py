@@ -17,7 +17,7 @@ from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.chance import BY_CHANCE, no_gain, no_name
 from pipelines.model.diagnosis.findings import unlike
-from pipelines.model.diagnosis.gains import Simulation, farther, simulation_errors, worse_log
+from pipelines.model.diagnosis.gains import Simulation, farther, nearer, simulation_errors, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mistaken import imitated
@@ -64,8 +64,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
               at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
-        doubts |= {k: BY_CHANCE for k in ruling.named
-                   if k not in doubts and _not_told(found.steps[k], prepared, case)}
+        doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _not_told(found.steps[k], simulated, prepared, case)}
     believed = [k for k in ruling.named if k not in doubts]
     apart = _apart(found, believed, case)
     kept = _turned(found, apart, believed, case)
@@ -142,11 +141,12 @@ def _unseen(found: Found, kept: list[int], final: Refined, case: Case, floor: Ar
     return [k for k in kept if not seen_in(found.steps[k], nominal, last, floor)]
 
 
-def _not_told(step: Step, prepared: Prepared, case: Case) -> bool:
+def _not_told(step: Step, simulated: Sequence[Simulation], prepared: Prepared, case: Case) -> bool:
     best = step.best
     if best is None or best.log is not None:
         return False
-    return no_name(step, step.before, best.done, len(best.done.model.effects) - 1, prepared.judge, case.blocks, case.white)
+    lone, place = len(simulated) == 2 and nearer(*simulated), len(best.done.model.effects) - 1
+    return no_name(step, step.before, best.done, place, prepared.judge, case.blocks, case.white, lone)
 
 
 def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:

@@ -89,3 +89,28 @@ def test_all_time_is_asked_only_of_what_stands_far_above_an_arm_in_order(times: 
     monkeypatch.setattr(chance, "surely_less", lambda *_: False)
     step: Any = SimpleNamespace(trials=(SimpleNamespace(accepted=True, gain=times, threshold=1.0),))
     assert chance.no_name(step, before, after, 0, HELD, 10) is refused
+
+
+@pytest.mark.parametrize("white", [False, True])
+@pytest.mark.parametrize(("lone", "held_out", "refused"), [(False, 1.001, True), (True, 1.001, False), (True, 0.999, True)])
+def test_what_stands_alone_is_asked_of_all_time_near_its_threshold_too(lone: bool, held_out: float, refused: bool, white: bool,
+                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the rest of no other cause; what makes held-out logs worse is refused all the same."""
+    rng = np.random.default_rng(13)
+    held, fitted = noise(rng, ROWS), noise(rng, FITTED)
+    before, after = left(held_out * held, fitted + noise(rng, FITTED)), left(held, fitted)
+    monkeypatch.setattr(chance, "by_flips", lambda gains: 0.01)  # between the two bounds
+    monkeypatch.setattr(chance, "by_chance", lambda *_: True)
+    step: Any = SimpleNamespace(trials=(SimpleNamespace(accepted=True, gain=1.2, threshold=1.0),))
+    assert chance.no_name(step, before, after, 0, HELD, 10, white, lone) is refused
+
+
+def test_two_models_that_are_equally_wrong_are_seldom_told_apart_alone() -> None:
+    rng = np.random.default_rng(14)
+    false = 0
+    for _ in range(DRAWS):
+        held, fitted = noise(rng, ROWS), noise(rng, FITTED)
+        one, other = ([noise(rng, rows, 0.1) for rows in (ROWS, FITTED)] for _ in range(2))
+        false += chance.by_all_time(left(held + one[0], fitted + one[1]), left(held + other[0], fitted + other[1]), 0, HELD, 10,
+                                    chance._SELDOM)
+    assert false <= 5
