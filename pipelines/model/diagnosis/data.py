@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis.kept import Kept
+from pipelines.model.diagnosis.ripple import Ripple
 from pipelines.model.diagnosis.stretch import PAD, Run, run_of
 from pipelines.model.diagnosis.whitening import Whitening
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
@@ -50,10 +51,16 @@ class LogData:
     kept: Kept  # what was laid before, of all logs gathered with it
     place: int  # among them
     whitening: Whitening | None = None  # that rows pass at last; `y` has
+    unwhitened: Array | None = None  # `y` before that
 
     @property
     def n_joints(self) -> int:
         return int(self.motion.q.shape[1])
+
+    @property
+    def plain(self) -> Array:
+        """[N m] (joints, rows) measured torque that has passed no whitening."""
+        return self.y if self.unwhitened is None else self.unwhitened
 
     @cached_property
     def rows(self) -> int:
@@ -76,7 +83,8 @@ class LogData:
 
     def whitened(self, whitening: Whitening, kept: Kept) -> LogData:
         """The same with rows through `whitening`."""
-        return replace(self, y=whitening.through(self.y, range(self.n_joints), self.stretches), whitening=whitening, kept=kept)
+        return replace(self, y=whitening.through(self.y, range(self.n_joints), self.stretches), whitening=whitening, kept=kept,
+                       unwhitened=self.y)
 
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """What `x` (samples, …) is at the moments of the rows, unfiltered."""
@@ -115,6 +123,7 @@ class Data:
     first: int = 0  # number of the first log among all that are diagnosed: of what happens in one log only
     known: Array | None = None  # (rows,) [N m] torque that is subtracted: of standing effects
     rubbing: frozenset[int] = frozenset()  # joints, from 1, whose friction is partly in `known`
+    steady: bool = False  # models are fitted with the ripple of drives in order among the noise
 
     @property
     def n_joints(self) -> int:
@@ -143,6 +152,11 @@ class Data:
     def y(self) -> Array:
         measured = np.concatenate([one.y.ravel() for one in self.logs])
         return self._counted(measured if self.known is None else measured - self.known)
+
+    @cached_property
+    def ripple(self) -> Ripple | None:
+        """That of drives in order, where models are to be fitted beside it."""
+        return Ripple.of(self) if self.steady else None
 
     @property
     def rows(self) -> int:

@@ -42,6 +42,7 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRm
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Moved, since_reference
+from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects.base import Effect
@@ -190,7 +191,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     """Fitted one after the other, the strongest first; and why some of them are not accepted."""
     none = np.zeros(len(case.families))
     free = Thresholds(none, none, "none: the cause was named", case.weight, tuple(f.joint for f in case.families))
-    found = search(replace(case, thresholds=free, again=False), len(case.families))
+    found, case = steadied(search(replace(case, thresholds=free, again=False), len(case.families)), case)
     steps = [step for step in found.steps if step.best is not None]
     ruling = Ruling("cause", tuple(range(len(steps))), "")
     arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in steps if step.best is not None)]

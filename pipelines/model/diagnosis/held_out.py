@@ -25,12 +25,13 @@ def cross_validated(done: Refined, blocks: int) -> Array:
     table, residual = np.delete(done.slopes, sorted(once), axis=0) * done.weights, done.residual
     size = np.linalg.norm(table, axis=1)
     unit = table / np.where(size > 0.0, size, 1.0)[:, None]
+    fitted, asked = done.steadied(unit), done.steadied(residual)
     place = done.data.blocks(blocks)
-    left, gram, moment = np.empty_like(residual), unit @ unit.T, unit @ residual
+    left, gram, moment = np.empty_like(residual), fitted @ fitted.T, fitted @ asked
     ridge = 1e-9 * np.eye(len(gram))
     for block in range(int(place.max()) + 1):
         held = place == block
-        own = unit[:, held]
-        shift = np.linalg.solve(gram - own @ own.T + ridge, moment - own @ residual[held])
-        left[held] = residual[held] - shift @ own
+        own = fitted[:, held]
+        shift = np.linalg.solve(gram - own @ own.T + ridge, moment - own @ asked[held])
+        left[held] = residual[held] - shift @ unit[:, held]
     return left / done.weights

@@ -15,11 +15,11 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["DriveNoise", "small_loads"]
+__all__ = ["RIPPLE", "RIPPLE_ORDERS", "DriveNoise", "small_loads"]
 
-_RIPPLE = 1e-3  # of the torque
+RIPPLE = 1e-3  # of the torque
 _COGGING = 2e-5  # of the largest rated torque
-_ORDERS = (6, 40)  # waves a turn
+RIPPLE_ORDERS = (6, 40)  # waves a turn, and of cogging
 _CORNER = (1.0, 5.0)  # [Hz]
 
 
@@ -41,12 +41,12 @@ def small_loads(motion: Motion, arm: Arm, wander: Array, sample_time: float, dri
         rng: for what happens in this log.
     """
     joints = motion.q.shape[1]
-    order = drives.integers(*_ORDERS, size=(2, joints))
+    order = drives.integers(*RIPPLE_ORDERS, size=(2, joints))
     phase = drives.uniform(-np.pi, np.pi, (2, joints))
     rated = np.array([joint.torque for joint in arm.robot.joints])
     tau = arm.torque(motion)
     largest = float(np.max(rated[np.isfinite(rated)], initial=0.0)) or float(np.abs(tau).max())
-    ripple = _RIPPLE * tau * np.sin(order[0] * motion.q + phase[0])
+    ripple = RIPPLE * tau * np.sin(order[0] * motion.q + phase[0])
     cogging = _COGGING * largest * np.sin(order[1] * motion.q + phase[1])
     return np.asarray(ripple + cogging + _wander(wander, len(tau), sample_time, rng))
 

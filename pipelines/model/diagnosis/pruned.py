@@ -24,6 +24,7 @@ from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.momentary import ONLY_THEN, only_then
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
+from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, held_out_high, seen_in, too_little, without_steps
 from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
@@ -57,6 +58,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     """Only causes that keep every rule of acceptance; `floor` and `known` as in `rule`."""
     if ruling.verdict != "cause":
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
+    plain, (found, case) = found, steadied(found, case)
     simulated = _simulated(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
     elsewhere = {k: at_which(found.steps[k], case.shared) for k in ruling.named}
@@ -90,11 +92,10 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         kept = []
     if kept:
         return Settled(replace(found, final=final), replace(ruling, named=tuple(kept), doubts=doubts), simulated)
-    alone = without_steps(found, floor, known)
-    alone = _elsewhere(alone, found, case, floor, known)
+    alone = _elsewhere(without_steps(found, floor, known), found, case, floor, known)
     reason = next((why for why in elsewhere.values() if why), f"{alone.reason}: {next(iter(doubts.values()), '')}")
     reason = reason if alone.verdict == "unknown" else alone.reason
-    return Settled(replace(found, final=found.nominal), replace(alone, reason=reason, doubts=doubts), ())
+    return Settled(replace(plain, final=plain.nominal), replace(alone, reason=reason, doubts=doubts), ())
 
 
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:
@@ -176,8 +177,7 @@ def at_odds(found: Found, k: int, prepared: Prepared, case: Case) -> str:
 
 def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) -> tuple[list[int], Refined]:
     """With those of `doubted` that gain more than chance does beside `kept`, and the model with all of them."""
-    final = _without(found, kept, case)
-    left = doubted if kept else []
+    final, left = _without(found, kept, case), doubted if kept else []
     while left:
         others = []
         for k in left:

@@ -58,7 +58,12 @@ class Refined:
 
     @cached_property
     def rss(self) -> float:
-        return float(self.residual @ self.residual)
+        """Squared weighted residual, less what the ripple of a drive in order makes of it where the rows are steady."""
+        return _power(self.data, self.left, self.weight)
+
+    def steadied(self, table: Array) -> Array:
+        """Weighted rows (..., rows) as the numbers are fitted to them."""
+        return _steadied(self.data, table, self.weight)
 
     @property
     def rms(self) -> Array:
@@ -92,10 +97,11 @@ class Refined:
             return self.known
         seen = np.ones(len(self.slopes), dtype=bool)
         seen[self.unseen] = False
-        table, whole = (self.slopes * self.weights)[seen], np.zeros((len(seen), len(seen)))
-        noise = covariance(table, self.residual)
+        table, whole = self.steadied((self.slopes * self.weights)[seen]), np.zeros((len(seen), len(seen)))
+        residual = self.steadied(self.residual)
+        noise = covariance(table, residual)
         std = np.sqrt(np.maximum(np.diag(noise), 1e-300))
-        wider = np.maximum(left_out(table, self.residual, self.data.blocks(_PARTS)) / std, 1.0)
+        wider = np.maximum(left_out(table, residual, self.data.blocks(_PARTS)) / std, 1.0)
         whole[np.ix_(seen, seen)] = noise * wider * wider[:, None]
         return whole
 
@@ -108,21 +114,25 @@ def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target:
 
 def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
     weights = weight[data.joint]
+
+    def steadied(table: Array) -> Array:
+        return _steadied(data, table * weights, weight)
+
     rigid = rigid_rows(data, model.columns)
     model = replace(model, beta=dissipating(model.beta, model.columns.laws, data.rubbing))
     laid = model.laid(data)
     left = y - model.torque(data, laid)
-    now = float(np.sum(np.square(left * weights)))
+    now = _power(data, left, weight)
     slopes, names = slopes_of(model, data, rigid, laid)
     for _ in range(steps):
-        better = False
+        better, table, y_left = False, steadied(slopes), steadied(left)
         for ridge in _RIDGES:
-            shift = _within(model, names, slopes * weights, left * weights, ridge, data.rubbing)
+            shift = _within(model, names, table, y_left, ridge, data.rubbing)
             for share in _SHARES:
                 there = model.moved(share * shift, names)
                 laid = there.laid(data)
                 other = y - there.torque(data, laid)
-                power = float(np.sum(np.square(other * weights)))
+                power = _power(data, other, weight)
                 if power < now:
                     better = True
                     break
@@ -135,6 +145,15 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
         if gained < _GAIN:
             break
     return Refined(model, data, weight, left, slopes, tuple(names))
+
+
+def _power(data: Data, left: Array, weight: Array) -> float:
+    residual = _steadied(data, left * weight[data.joint], weight)
+    return float(residual @ residual)
+
+
+def _steadied(data: Data, table: Array, weight: Array) -> Array:
+    return table if data.ripple is None else data.ripple.out_of(table, weight)
 
 
 def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float, known: Collection[int]) -> Array:

@@ -127,13 +127,13 @@ def _joints(done: Settled) -> Counter[int | None]:
 
 def _as_they_are(again: Settled, first: Settled, case: Case) -> Settled:
     """Every model on rows as they are, beside the nominal one of the `first` look; numbers are as sure as white rows say."""
-    found = again.found
+    found, data = again.found, replace(case.data, steady=True)
 
     def plain(done: Refined, weight: Array | None = None) -> Refined:
         if done is found.nominal:
             return first.found.nominal
         left = case.data.rms(case.data.y - done.model.torque(case.data))
-        return refine(done.model, case.data, 1.0 / np.maximum(left, 1e-12) if weight is None else weight, steps=0)
+        return refine(done.model, data, 1.0 / np.maximum(left, 1e-12) if weight is None else weight, steps=0)
 
     def step(one: Step) -> Step:
         before = plain(one.before)

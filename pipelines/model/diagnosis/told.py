@@ -31,6 +31,7 @@ from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, Not
 from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Probed
+from pipelines.model.diagnosis.steadied import steady_nominal
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.diagnosis.words import taken_in, where
 
@@ -45,6 +46,7 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
         probed: how limits are looked for beside reference logs.
         moved: whether there is a cause that the base parameters show.
     """
+    done = replace(done, found=steady_nominal(done.found))
     done, responded, own = _held_against(first, case, done, floored, chosen, moved)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]

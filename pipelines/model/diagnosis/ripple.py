@@ -1,0 +1,74 @@
+"""What the torque constants of drives in order ripple with the angle, as noise of the rows.
+
+    ripple = Ripple.of(data)
+    ripple.out_of(table, weight)        (k, rows) weighted rows in which it is as large as the rest of the noise, and white
+
+A thousandth of a torque that carries gravity is as much as the amplifier's noise, and the same whenever the joint comes by. Least
+squares of rows that are weighed alike take it for what it looks like over the angles of these logs, gravity of a lighter arm say,
+and are wrong by several times their standard deviation where other logs turn farther. With the ripple in the covariance of the rows
+they are not (Aitken 1935; as a random effect: Henderson 1975).
+
+The ripple of joint j is torque times a random function of its angle, of the orders that drives have, each with the same power:
+
+    e_j = τ_j Σ_m (a_m cos m q_j + b_m sin m q_j),   a_m, b_m ~ N(0, r²/(2 M)),   m = 6 … 40,  r = 0.1 %
+    K = I + F Fᵀ,   F = U S Vᵀ,   K^(-1/2) = I + U ((1 + S²)^(-1/2) - 1) Uᵀ
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.imperfections import RIPPLE, RIPPLE_ORDERS
+
+if TYPE_CHECKING:
+    from pipelines.model.diagnosis.data import Data, LogData
+
+__all__ = ["Ripple"]
+
+_LEAST = 1e-3  # of the rows' noise, that a direction of the ripple has at least to be told from it
+
+
+@dataclass(frozen=True, eq=False)
+class Ripple:
+    """Of each joint the rows that count, and what ripple does to them."""
+
+    rows: tuple[npt.NDArray[np.intp], ...]  # of each joint
+    basis: tuple[Array, ...]  # U (rows, rank)
+    size: tuple[Array, ...]  # S (rank,) [N m]
+
+    @classmethod
+    def of(cls, data: Data) -> Ripple:
+        """By the measured torque: what of it is not the drive's is less than a ripple's ripple."""
+        rows, basis, size = [], [], []
+        for joint in range(data.n_joints):
+            own = np.flatnonzero((data.joint == joint) & data.counts)
+            waves = np.concatenate([_rippled(one, joint) for one in data.logs])[data.counts[data.joint == joint]]
+            u, s, _ = np.linalg.svd(waves, full_matrices=False)
+            rows.append(own)
+            basis.append(u)
+            size.append(s)
+        return cls(tuple(rows), tuple(basis), tuple(size))
+
+    def out_of(self, table: Array, weight: Array) -> Array:
+        """K^(-1/2) x of every line of `table` (k, rows) or (rows,), weighted; `weight` (joints,) [1/(N m)]."""
+        out = np.array(table, dtype=np.float64)
+        for rows, basis, size, own in zip(self.rows, self.basis, self.size, weight, strict=True):
+            seen = own * size > _LEAST
+            u = basis[:, seen]
+            less = 1.0 / np.sqrt(1.0 + np.square(own * size[seen])) - 1.0
+            out[..., rows] += ((out[..., rows] @ u) * less) @ u.T
+        return out
+
+
+def _rippled(one: LogData, joint: int) -> Array:
+    """(rows, orders) [N m] what each wave of a ripple makes of the torque of a joint in one log."""
+    orders = np.arange(*RIPPLE_ORDERS)
+    turn = one.at_rows(one.motion.q)[:, joint, None] * orders
+    size = RIPPLE / np.sqrt(2.0 * len(orders)) * one.plain[joint, :, None]
+    waves = (size * np.concatenate([np.cos(turn), np.sin(turn)], axis=1)).T
+    return waves.T if one.whitening is None else one.whitening.through(waves, [joint] * len(waves), one.stretches).T

@@ -1,0 +1,47 @@
+"""What a search has found, refitted with the ripple of drives in order among the noise (`ripple`).
+
+    found, case = steadied(found, case)
+    found = steady_nominal(found)                 where nothing that was found is believed, or by a second look
+
+Which causes there are, the search asks of rows weighed alike, as thresholds were made. What each is worth on other logs, and what
+the extended model is, hangs on numbers that held-out motion does not stray from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.refit import Refined, refine
+from pipelines.model.diagnosis.search import Found, Step
+
+__all__ = ["steadied", "steady_nominal"]
+
+
+def steadied(found: Found, case: Case) -> tuple[Found, Case]:
+    """Every model that was accepted, and the case whose further models are fitted alike; rivals stay as they were compared."""
+    there = replace(case, data=replace(case.data, steady=True))
+    done: dict[int, Refined] = {}
+
+    def again(one: Refined) -> Refined:
+        if id(one) not in done:
+            done[id(one)] = refine(one.model, there.data, one.weight)
+        return done[id(one)]
+
+    def step(one: Step) -> Step:
+        if one.best is None:
+            return replace(one, before=again(one.before))
+        best = replace(one.best, done=again(one.best.done))
+        return replace(one, before=again(one.before), best=best,
+                       rivals=tuple(best if rival is one.best else rival for rival in one.rivals))
+
+    nominal, final = again(found.nominal), again(found.final)
+    return replace(found, nominal=nominal, final=final, steps=tuple(map(step, found.steps))), there
+
+
+def steady_nominal(found: Found) -> Found:
+    """The same with the nominal model refitted alike, where it was not yet."""
+    if found.nominal.data.steady:
+        return found
+    nominal = refine(found.nominal.model, replace(found.nominal.data, steady=True), found.nominal.weight)
+    return replace(found, nominal=nominal, final=nominal if found.final is found.nominal else found.final)
