@@ -1,0 +1,100 @@
+"""The ripple of drives as noise of the rows: white by the covariance written out, and numbers that fit motion farther out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.refit import Refined, refine
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.whitening import Whitening
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import arm, hidden
+from tests.model.estimation.experiments import motion_of
+
+SIZE, ORDERS = 1e-3, range(6, 40)  # a thousandth of the torque, as many waves a turn as drives have
+DRAWS = 8
+
+
+@pytest.fixture(scope="module")
+def prepared() -> Prepared:
+    return prepare(Logs((hidden(1),)), DiagnosisSettings())
+
+
+def nominal(prepared: Prepared, steady: bool) -> Refined:
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    return refine(Exact.start(columns, fit), replace(prepared.data, steady=steady), fit.weight)
+
+
+@pytest.mark.parametrize("joint", range(3))
+def test_what_comes_out_is_white(prepared: Prepared, joint: int) -> None:
+    """E[e_i e_k] = δ_ik + w² r² τ_i τ_k / 2M Σ_m cos m(q_i - q_k), the waves' random amplitudes averaged by hand."""
+    data = replace(prepared.data, steady=True)
+    assert data.ripple is not None
+    weight = np.array([50.0, 80.0, 150.0])
+    own = np.flatnonzero(data.joint == joint)[::3]
+    q = motion_of(1)(data.t[own]).q[:, joint]
+    apart = np.sum([np.cos(m * (q[:, None] - q)) for m in ORDERS], axis=0)
+    covariance = np.eye(len(own)) + (weight[joint] * SIZE) ** 2 * np.outer(data.y[own], data.y[own]) * apart / (2 * len(ORDERS))
+    some = replace(data.ripple, rows=tuple(rows[::3] if j == joint else rows[:0] for j, rows in enumerate(data.ripple.rows)),
+                   **_thinned(data.ripple.basis, data.ripple.size, joint))
+    table = np.zeros((len(own), data.rows))
+    table[:, own] = np.linalg.cholesky(covariance).T
+    out = some.out_of(table, weight)[:, own]
+    assert float(np.abs(covariance - np.eye(len(own))).max()) > 0.02  # there is something to take out
+    np.testing.assert_allclose(out.T @ out, np.eye(len(own)), atol=5e-3)
+
+
+def _thinned(basis: tuple[Array, ...], size: tuple[Array, ...], joint: int) -> dict[str, tuple[Array, ...]]:
+    """The decomposition of every third row of one joint, from that of all."""
+    u, s, _ = np.linalg.svd((basis[joint] * size[joint])[::3], full_matrices=False)
+    return {"basis": tuple(u if j == joint else b[:0, :0] for j, b in enumerate(basis)),
+            "size": tuple(s if j == joint else x[:0] for j, x in enumerate(size))}
+
+
+def test_rows_that_were_whitened_have_the_ripple_whitened(prepared: Prepared) -> None:
+    """A log's own ripple, an eighth wave of joint 2, is of the same share inside what is taken out, white rows or not."""
+    data = prepared.data
+    joint = data.joint == 1
+    q = np.concatenate([one.at_rows(one.motion.q)[:, 1] for one in data.logs])
+    wave = np.zeros(data.rows)
+    wave[joint] = SIZE * data.y[joint] * np.cos(8.0 * q)
+    white = Whitening.of(data, np.cumsum(np.random.default_rng(5).standard_normal((3, data.rows)), axis=1) * 1e-3)
+    weight = np.full(3, 1e6)
+    for rows, x in ((data, wave), (data.whitened(white), data.through(white, wave[None])[0])):
+        ripple = replace(rows, steady=True).ripple
+        assert ripple is not None
+        assert np.linalg.norm(ripple.out_of(x * 1e6, weight)) < 0.02 * np.linalg.norm(x * 1e6)
+
+
+def test_numbers_of_a_rippling_drive_fit_motion_farther_out() -> None:
+    """Eight arms whose drives ripple by a thousandth, over 8 s: the torque of other motion, without noise or ripple, is told with
+    less error than by rows weighed alike at joint 2, which carries the arm; where nothing ripples, with no more at any joint."""
+    far = motion_of(77)(np.arange(0.0, 10.0, 0.01))
+    truth = arm().torque(far)
+    errors = np.array([[_error(_rippling(draw, size), far, truth, steady) for steady in (False, True)]
+                       for size in (SIZE, 0.0) for draw in range(DRAWS)]).reshape(2, DRAWS, 2, 3)
+    mean = np.sqrt(np.mean(np.square(errors), axis=1))  # (ripple or none, alike or steady, joints)
+    assert mean[0, 1, 1] < 0.9 * mean[0, 0, 1], mean
+    assert (mean[1, 1] < 1.1 * mean[1, 0]).all(), mean
+
+
+def _rippling(draw: int, size: float) -> Prepared:
+    rng = np.random.default_rng([6, draw])
+    order, phase = rng.integers(8, 37, 3), rng.uniform(-np.pi, np.pi, 3)
+
+    def load(motion: Motion) -> Array:
+        return np.asarray(size * arm().torque(motion) * np.sin(order * motion.q + phase))
+
+    return prepare(Logs((hidden(20 + draw, load),)), DiagnosisSettings())
+
+
+def _error(prepared: Prepared, motion: Motion, truth: Array, steady: bool) -> Array:
+    """(joints,) [N m] rms."""
+    return np.asarray(np.sqrt(np.mean(np.square(nominal(prepared, steady).model.arm.torque(motion) - truth), axis=0)))
