@@ -228,6 +228,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(rest: float, ve
         step.best.effect, step.best.log = SimpleNamespace(last=False), None
         step.other = None
     monkeypatch.setattr(pruned, "_simulated", lambda *args: ())
+    monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
     monkeypatch.setattr(pruned, "at_which", lambda *_: "")
     monkeypatch.setattr(pruned, "at_odds", lambda found, k, *args: "logs do not agree" if k == 0 else "")
     monkeypatch.setattr(pruned, "_strays", lambda *args: "")
@@ -250,6 +251,7 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
                          "_apart": [0, 1], "_idle": None}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(pruned, "_turned", lambda found, kept, *_: kept)
+    monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
     dip = SimpleNamespace(effects=(SimpleNamespace(possible=True), SimpleNamespace(possible=False)))
     both, one = SimpleNamespace(rms=np.array([0.01, 0.01, 0.01]), model=dip), left(0.02, 0.01, 0.01)
     monkeypatch.setattr(pruned, "_without", lambda found, kept, *_: both if len(kept) == 2 else one)
