@@ -131,10 +131,7 @@ def _lay_some(data: Data, family: Family, first: int, size: int, whole: Arm) -> 
         kept = some[0].from_motion and family.joint and whole is arm
         acting, parts = _own(data, some, arm) if kept else _anywhere(data, some, arm, whole, not family.event)
     rows = np.flatnonzero(acting[data.joint])
-    found = np.concatenate(parts, axis=2)
-    if not data.counts.all():
-        found = np.where(data.counts[rows], found, 0.0)
-    return Laid(first, found, rows)
+    return Laid(first, data.clear(np.concatenate(parts, axis=2), rows), rows)
 
 
 def _at_once(data: Data, family: Family, arm: Arm) -> int:

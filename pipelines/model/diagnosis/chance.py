@@ -98,9 +98,11 @@ def by_all_time(before: Refined, after: Refined, place: int, judge: Data | None,
 
 
 def _gains(before: Refined, after: Refined, own: npt.NDArray[np.bool_], judge: Data | None, blocks: int) -> Array:
-    """(parts,) of squared error at the joints `own`, each in units of what `before` leaves of the fitted logs."""
+    """(parts,) of squared error at the joints `own`, each in units of what `before` leaves of the fitted logs, less the ripple of a
+    drive in order where rows are steady."""
     data = after.data if judge is None else judge
-    ours, theirs = (np.square(held_out_left(one, judge, blocks) * before.weight[data.joint]) for one in (before, after))
+    left = (held_out_left(one, judge, blocks) * before.weight[data.joint] for one in (before, after))
+    ours, theirs = (np.square(x if data.ripple is None else data.ripple.out_of(x, before.weight)) for x in left)
     gained = np.where(data.counts & own[data.joint], ours - theirs, 0.0)
     return np.asarray(np.bincount(data.blocks(_PARTS), gained), dtype=np.float64)
 

@@ -124,6 +124,7 @@ class Data:
     known: Array | None = None  # (rows,) [N m] torque that is subtracted: of standing effects
     rubbing: frozenset[int] = frozenset()  # joints, from 1, whose friction is partly in `known`
     steady: bool = False  # models are fitted with the ripple of drives in order among the noise
+    cleared: tuple[Ripple, Array] | None = None  # the ripple that torque and columns are without, and the weights (joints,) of rows
 
     @property
     def n_joints(self) -> int:
@@ -151,7 +152,7 @@ class Data:
     @cached_property
     def y(self) -> Array:
         measured = np.concatenate([one.y.ravel() for one in self.logs])
-        return self._counted(measured if self.known is None else measured - self.known)
+        return self.clear(measured if self.known is None else measured - self.known)
 
     @cached_property
     def ripple(self) -> Ripple | None:
@@ -162,11 +163,13 @@ class Data:
     def rows(self) -> int:
         return len(self.joint)
 
-    def whitened(self, whitening: Whitening) -> Data:
-        """The same rows through `whitening`."""
+    def whitened(self, whitening: Whitening, weight: Array | None = None) -> Data:
+        """The same rows through `whitening`, and, where `weight` (joints,) [1/(N m)] says how large their noise is then, without
+        what the ripple of drives in order has in common."""
         kept = Kept()
         known = None if self.known is None else self.through(whitening, self.known)
-        return replace(self, logs=tuple(one.whitened(whitening, kept) for one in self.logs), known=known)
+        there = replace(self, logs=tuple(one.whitened(whitening, kept) for one in self.logs), known=known, steady=False)
+        return there if weight is None else replace(there, cleared=(Ripple.of(there), weight))
 
     def through(self, whitening: Whitening, x: Array) -> Array:
         """What `x` (…, rows) is in whitened rows."""
@@ -185,12 +188,12 @@ class Data:
     def lay_each(self, torque: Callable[[int, Motion], Array]) -> Array:
         """The same of a torque that may differ from log to log: of each log's number and motion."""
         laid = [one.lay(torque(self.first + k, one.motion)) for k, one in enumerate(self.logs)]
-        return self._counted(np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1))
+        return self.clear(np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1))
 
     def lay_kept(self, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
         """As `lay` of columns (samples, joints, k) that follow from the motion alone; `key` says which they are."""
         laid = [_kept(one, key, torque) for one in self.logs]
-        return self._counted(np.concatenate([x.reshape(len(x), -1) for x in laid], axis=-1))
+        return self.clear(np.concatenate([x.reshape(len(x), -1) for x in laid], axis=-1))
 
     def blocks(self, count: int) -> Indices:
         """(rows,) to which of about `count` stretches of time a row belongs, each within one log, all joints alike."""
@@ -220,8 +223,11 @@ class Data:
         square = np.bincount(self.joint, np.where(self.counts, x, 0.0) ** 2, minlength=self.n_joints)
         return np.asarray(square, dtype=np.float64), np.bincount(self.joint[self.counts], minlength=self.n_joints)
 
-    def _counted(self, x: Array) -> Array:
-        return x if self.counts.all() else np.where(self.counts, x, 0.0)
+    def clear(self, x: Array, rows: Indices | None = None) -> Array:
+        """Rows (…, rows) that count, less the ripple; `rows`: which these are, of some of the joints all."""
+        counts = self.counts if rows is None else self.counts[rows]
+        counted = x if counts.all() else np.where(counts, x, 0.0)
+        return counted if self.cleared is None else self.cleared[0].out_of(counted, self.cleared[1], rows)
 
 
 def _kept(one: LogData, key: Hashable, torque: Callable[[Motion], Array]) -> Array:

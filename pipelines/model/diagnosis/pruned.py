@@ -66,7 +66,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
               at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
-        doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _not_told(found.steps[k], simulated, prepared, case)}
+        doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _not_told(found.steps[k], simulated, case)}
     believed = [k for k in ruling.named if k not in doubts]
     apart = _apart(found, believed, case)
     kept = _turned(found, apart, believed, case)
@@ -142,12 +142,12 @@ def _unseen(found: Found, kept: list[int], final: Refined, case: Case, floor: Ar
     return [k for k in kept if not seen_in(found.steps[k], nominal, last, floor)]
 
 
-def _not_told(step: Step, simulated: Sequence[Simulation], prepared: Prepared, case: Case) -> bool:
+def _not_told(step: Step, simulated: Sequence[Simulation], case: Case) -> bool:
     best = step.best
     if best is None or best.log is not None:
         return False
     lone, place = len(simulated) == 2 and nearer(*simulated), len(best.done.model.effects) - 1
-    return no_name(step, step.before, best.done, place, prepared.judge, case.blocks, case.white, lone)
+    return no_name(step, step.before, best.done, place, case.judge, case.blocks, case.white, lone)
 
 
 def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:

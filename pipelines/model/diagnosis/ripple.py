@@ -54,14 +54,18 @@ class Ripple:
             size.append(s)
         return cls(tuple(rows), tuple(basis), tuple(size))
 
-    def out_of(self, table: Array, weight: Array) -> Array:
-        """K^(-1/2) x of every line of `table` (k, rows) or (rows,), weighted; `weight` (joints,) [1/(N m)]."""
+    def out_of(self, table: Array, weight: Array, only: npt.NDArray[np.intp] | None = None) -> Array:
+        """K^(-1/2) x of every line of `table` (..., rows), weighted by `weight` (joints,) [1/(N m)]; `only`: which rows these are,
+        of some of the joints all."""
         out = np.array(table, dtype=np.float64)
         for rows, basis, size, own in zip(self.rows, self.basis, self.size, weight, strict=True):
+            at = rows if only is None else np.searchsorted(only, rows)
             seen = own * size > _LEAST
+            if not seen.any() or (only is not None and (at[-1] >= len(only) or only[at[0]] != rows[0])):
+                continue
             u = basis[:, seen]
             less = 1.0 / np.sqrt(1.0 + np.square(own * size[seen])) - 1.0
-            out[..., rows] += ((out[..., rows] @ u) * less) @ u.T
+            out[..., at] += ((out[..., at] @ u) * less) @ u.T
         return out
 
 

@@ -93,10 +93,12 @@ def _evenly(case: Case, twin: Twin) -> bool:
 def _in_white(case: Case, twin: Twin) -> tuple[Case, Twin, Array]:
     """The case and its twin in whitened rows; (joints,) the most that any replica's residual follows a joint's own motion there."""
     whitening = Whitening.of(twin.data, np.array([replace(one).left for one in twin.fits]))
-    judge = None if case.judge is None else case.judge.whitened(whitening)
-    there = replace(case, data=case.data.whitened(whitening), judge=judge, families=tuple(f for f in case.families if not f.event))
+    noise = 1.0 / np.maximum(twin.rms, 1e-12)  # whitening keeps it
+    judge = None if case.judge is None else case.judge.whitened(whitening, noise)
+    there = replace(case, data=case.data.whitened(whitening, noise), judge=judge,
+                    families=tuple(f for f in case.families if not f.event))
     weight = 1.0 / np.maximum(refine(there.model, there.data, there.weight).rms, 1e-12)
-    same = twin.through(whitening)
+    same = twin.through(whitening, noise)
     first, residuals = same.weighted(weight)
     bounds = Thresholds.of_twin(first, residuals, there.families, case.model.nominal, _USELESS)
     return replace(there, weight=weight, thresholds=bounds, white=True), same, following(first, residuals).max(axis=1)

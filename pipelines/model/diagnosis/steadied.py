@@ -19,8 +19,11 @@ __all__ = ["steadied", "steady_nominal"]
 
 
 def steadied(found: Found, case: Case) -> tuple[Found, Case]:
-    """Every model that was accepted, and the case whose further models are fitted alike; rivals stay as they were compared."""
-    there = replace(case, data=replace(case.data, steady=True))
+    """Every model that was accepted, and the case whose further models are fitted alike; rivals stay as they were compared. Rows
+    that are cleared of ripple have been all along."""
+    if case.data.cleared is not None:
+        return found, case
+    there = replace(case, data=replace(case.data, steady=True), judge=case.judge and replace(case.judge, steady=True))
     done: dict[int, Refined] = {}
 
     def again(one: Refined) -> Refined:

@@ -55,12 +55,13 @@ class Twin:
         first = self._weighted(0, weight)
         return first, np.array([first.residual, *(self._weighted(k, weight).residual for k in range(1, len(self.fits)))])
 
-    def through(self, whitening: Whitening) -> Twin:
-        """The same replicas in whitened rows."""
+    def through(self, whitening: Whitening, weight: Array | None = None) -> Twin:
+        """The same replicas in rows that are `Data.whitened`."""
         fits = []
         for one in self.fits:
-            table, y = (one.data.through(whitening, x) for x in (one.table, one.y))
-            fits.append(fit_columns(one.data.whitened(whitening), table, y, one.weight))
+            there = one.data.whitened(whitening, weight)
+            table, y = (there.clear(one.data.through(whitening, x)) for x in (one.table, one.y))
+            fits.append(fit_columns(there, table, y, one.weight))
         return Twin(tuple(fits), self.places, self.noise)
 
     def _weighted(self, k: int, weight: Array) -> Fit:

@@ -19,7 +19,7 @@ class Time:
     """Rows of one joint."""
 
     def __init__(self, rows: int) -> None:
-        self.joint, self.counts, self.n_joints = np.zeros(rows, dtype=int), np.ones(rows, dtype=bool), 1
+        self.joint, self.counts, self.n_joints, self.ripple = np.zeros(rows, dtype=int), np.ones(rows, dtype=bool), 1, None
 
     def blocks(self, count: int) -> Any:
         return np.arange(len(self.joint)) * count // len(self.joint)
