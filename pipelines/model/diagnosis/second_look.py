@@ -4,7 +4,8 @@
 
 The first look weighs every row alike. Where the drive's zero wanders slowly and a cause is quicker than that, it sees the wander.
 The second one takes out of the rows what the noise of an arm in order, the twin's, makes alike in neighbouring ones (`whitening`),
-and searches again: with thresholds of the same replicas through the same, and by the same rules. Generalised least squares (Aitken
+and what the ripple of its torque constants has in common wherever a joint comes by (`ripple`), and searches again: with thresholds
+of the same replicas through the same, and by the same rules. Generalised least squares (Aitken
 1935) lose nothing that plain ones see, where the noise is that of the twin, and tell causes apart that are alike where the wander
 is. Where the second look finds as many causes at every joint as the first has found, under other names or more, and they leave no
 more of the rows as they are, it is believed. What is next to nothing beside a greater cause, and may as well be what that one's law

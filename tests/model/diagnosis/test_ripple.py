@@ -73,6 +73,21 @@ def test_rows_that_were_whitened_have_the_ripple_whitened(prepared: Prepared) ->
         assert np.linalg.norm(ripple.out_of(x * 1e6, weight)) < 0.02 * np.linalg.norm(x * 1e6)
 
 
+def test_rows_that_are_cleared_are_so_in_torque_and_columns_alike(prepared: Prepared) -> None:
+    """Of all joints at once or of one by itself; a torque that is known goes with the rest."""
+    data, weight = prepared.data, np.array([50.0, 80.0, 150.0])
+    white = Whitening.of(data, np.random.default_rng(5).standard_normal((3, data.rows)))
+    known = np.random.default_rng(6).standard_normal(data.rows)
+    there = replace(data, known=known).whitened(white, weight)
+    assert there.cleared is not None
+    ripple = there.cleared[0]
+    np.testing.assert_allclose(there.y, ripple.out_of(data.through(white, data.y - known), weight), atol=1e-9)
+    torque = arm().torque
+    np.testing.assert_allclose(there.lay(torque), ripple.out_of(data.whitened(white).lay(torque), weight), atol=1e-9)
+    own = np.flatnonzero(data.joint != 1)
+    np.testing.assert_allclose(there.clear(known[own], own), there.clear(known)[own], atol=1e-12)
+
+
 def test_numbers_of_a_rippling_drive_fit_motion_farther_out() -> None:
     """Eight arms whose drives ripple by a thousandth, over 8 s: the torque of other motion, without noise or ripple, is told with
     less error than by rows weighed alike at joint 2, which carries the arm; where nothing ripples, with no more at any joint."""
