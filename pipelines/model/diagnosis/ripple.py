@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Ripple"]
 
-_LEAST = 1e-3  # of the rows' noise, that a direction of the ripple has at least to be told from it
+_LEAST = 0.03  # of the rows' noise, that a direction of the ripple has at least: less than a thousandth of it would go out
+_ROUNDING = 1e-10  # of the largest square
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +49,17 @@ class Ripple:
         for joint in range(data.n_joints):
             own = np.flatnonzero((data.joint == joint) & data.counts)
             waves = np.concatenate([_rippled(one, joint) for one in data.logs])[data.counts[data.joint == joint]]
-            u, s, _ = np.linalg.svd(waves, full_matrices=False)
+            square, turn = np.linalg.eigh(waves.T @ waves)  # S², V: of many rows ten times as fast as their own decomposition
+            told = square > _ROUNDING * max(float(square[-1]), 1e-300)
             rows.append(own)
-            basis.append(u)
-            size.append(s)
+            size.append(np.sqrt(square[told]))
+            basis.append(waves @ turn[:, told] / size[-1])
         return cls(tuple(rows), tuple(basis), tuple(size))
 
     def out_of(self, table: Array, weight: Array, only: npt.NDArray[np.intp] | None = None) -> Array:
         """K^(-1/2) x of every line of `table` (..., rows), weighted by `weight` (joints,) [1/(N m)]; `only`: which rows these are,
         of some of the joints all."""
-        out = np.array(table, dtype=np.float64)
+        flat = np.array(table, dtype=np.float64).reshape(-1, np.shape(table)[-1])
         for rows, basis, size, own in zip(self.rows, self.basis, self.size, weight, strict=True):
             at = rows if only is None else np.searchsorted(only, rows)
             seen = own * size > _LEAST
@@ -65,8 +67,9 @@ class Ripple:
                 continue
             u = basis[:, seen]
             less = 1.0 / np.sqrt(1.0 + np.square(own * size[seen])) - 1.0
-            out[..., at] += ((out[..., at] @ u) * less) @ u.T
-        return out
+            where = slice(at[0], at[-1] + 1) if at[-1] - at[0] + 1 == len(at) else at  # without gaps nothing is copied
+            flat[:, where] += ((flat[:, where] @ u) * less) @ u.T
+        return flat.reshape(np.shape(table))
 
 
 def _rippled(one: LogData, joint: int) -> Array:
