@@ -52,7 +52,7 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     effect, data, judge = moved.effect, done.data, prepared.judge
     load = _torque(moved, done, data)
     rigid = rigid_rows(data, done.model.columns)
-    shift = np.linalg.lstsq((rigid * done.weights).T, load * done.weights, rcond=None)[0]
+    shift = np.linalg.lstsq(done.steadied(rigid * done.weights).T, done.steadied(load * done.weights), rcond=None)[0]
     beta = done.model.beta.copy()
     beta[:len(shift)] -= shift
     bare = replace(done.model, beta=beta)

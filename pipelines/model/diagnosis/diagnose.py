@@ -44,6 +44,7 @@ from pipelines.model.diagnosis.search import Explored, Found, gap_first, gives_w
 from pipelines.model.diagnosis.second_look import looked_again
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.steadied import steady_nominal
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
 from pipelines.model.diagnosis.verdict import Ruling, rule
 from pipelines.model.diagnosis.words import within
@@ -184,6 +185,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     first = replace(first, held=replace(first.held, prepared=now))
     found = search(case, chosen.most)
     done = settled(found, rule(found, since.floor), case, now, since.floor)
+    done = replace(done, found=steady_nominal(done.found))
     noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
     moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
     if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":

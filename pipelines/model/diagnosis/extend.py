@@ -42,7 +42,7 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRm
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Moved, since_reference
-from pipelines.model.diagnosis.steadied import steadied
+from pipelines.model.diagnosis.steadied import steadied, steady
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects.base import Effect
@@ -227,7 +227,7 @@ def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, 
         refused[load.finding.cause, load.finding.joint] = load.doubt
         load = None
     kept = [part for part in done.parts if not part.doubt]
-    plain, before = (first.held.plain, first.held.judge) if first.held.plain is not None else (found.nominal, judge)
+    plain, before = (steady(first.held.plain), first.held.judge) if first.held.plain is not None else (found.nominal, judge)
     every = (*(held_finding(part, plain.rms, floor, chosen.evidence) for part in kept), *named,
              *((load.finding,) if load is not None else ()))
     rows = final.data if judge is None else judge

@@ -132,8 +132,10 @@ def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str
     return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
 
 
-def nearer(before: Simulation, after: Simulation) -> bool:
-    """Whether the second simulated arm is nearer to the measured one than the first, chance or not."""
+def nearer(before: Simulation, after: Simulation, *, late: bool = False) -> bool:
+    """Whether the second simulated arm is nearer to the measured one than the first, chance or not; `late` as in `farther`."""
+    if late and before.how == "windowed":
+        return False
     return "none" not in (before.how, after.how) and float(after.power.sum()) < float(before.power.sum())
 
 

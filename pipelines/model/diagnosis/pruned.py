@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.chance import BY_CHANCE, no_gain, no_name
 from pipelines.model.diagnosis.findings import unlike
-from pipelines.model.diagnosis.gains import Simulation, farther, nearer, simulation_errors, worse_log
+from pipelines.model.diagnosis.gains import Simulation, nearer, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mistaken import imitated
@@ -25,6 +25,7 @@ from pipelines.model.diagnosis.momentary import ONLY_THEN, only_then
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
+from pipelines.model.diagnosis.straying import simulated_steps, strays
 from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, held_out_high, seen_in, too_little, without_steps
 from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
@@ -59,14 +60,14 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     if ruling.verdict != "cause":
         return Settled(replace(found, final=found.nominal), _elsewhere(replace(ruling, named=()), found, case, floor, known), ())
     plain, (found, case) = found, steadied(found, case)
-    simulated = _simulated(found, case, prepared)
+    simulated = simulated_steps(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    elsewhere = {k: at_which(found.steps[k], case.shared) for k in ruling.named}
-    doubts = {k: ONLY_THEN if only_then(found.final, k) else elsewhere[k] or
-              at_odds(found, k, prepared, case) or _strays(found, k, simulated, prepared, case, late) for k in ruling.named}
+    elsewhere = {k: at_which(plain.steps[k], case.shared) for k in ruling.named}
+    doubts = {k: ONLY_THEN if only_then(found.final, k) else elsewhere[k] or at_odds(found, k, prepared, case) or
+              strays(found, plain, k, simulated, prepared, case, late, partial(_less, found, k, case)) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
     if case.floored:  # the search has asked it where there is no floor
-        doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _not_told(found.steps[k], simulated, case)}
+        doubts |= {k: BY_CHANCE for k in ruling.named if k not in doubts and _not_told(found.steps[k], simulated, case, late)}
     believed = [k for k in ruling.named if k not in doubts]
     apart = _apart(found, believed, case)
     kept = _turned(found, apart, believed, case)
@@ -92,7 +93,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         kept = []
     if kept:
         return Settled(replace(found, final=final), replace(ruling, named=tuple(kept), doubts=doubts), simulated)
-    alone = _elsewhere(without_steps(found, floor, known), found, case, floor, known)
+    alone = _elsewhere(without_steps(plain, floor, known), plain, case, floor, known)
     reason = next((why for why in elsewhere.values() if why), f"{alone.reason}: {next(iter(doubts.values()), '')}")
     reason = reason if alone.verdict == "unknown" else alone.reason
     return Settled(replace(plain, final=plain.nominal), replace(alone, reason=reason, doubts=doubts), ())
@@ -110,25 +111,6 @@ def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bo
     return Ruling("unknown", (), f"on held-out logs the residual of {high} stands far above the floor") if high else ruling
 
 
-def _simulated(found: Found, case: Case, prepared: Prepared) -> tuple[Simulation, ...]:
-    arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in found.steps if step.best is not None)]
-    return tuple(simulation_errors([acted(arm, case.beside) for arm in arms], prepared.judging or prepared.motions))
-
-
-def _strays(found: Found, k: int, simulated: Sequence[Simulation], prepared: Prepared, case: Case, late: bool) -> str:
-    """Why the simulated arm is no nearer with step `k`, neither when it was found nor beside all the others; empty where it is.
-
-    Where every joint is late, one that is told so alone no longer fits the others, and their loops stray until they are told too.
-    """
-    accepted = [j for j, one in enumerate(found.steps) if one.best is not None]
-    why = farther(simulated[k], simulated[k + 1], late=late)
-    if not why or k == accepted[-1] or simulated[k].how != "closed-loop":
-        return why
-    rest = _without(found, [j for j in accepted if j != k], case)
-    arms = [acted(one.model.arm, case.beside) for one in (rest, found.final)]
-    return farther(*simulation_errors(arms, prepared.judging or prepared.motions), late=late)
-
-
 def _harm(found: Found, final: Refined, case: Case) -> str:
     """Why the model with everything is worse than the nominal one on some held-out log."""
     left = [held_out_left(one, case.judge, case.blocks) for one in (found.nominal, final)]
@@ -142,11 +124,11 @@ def _unseen(found: Found, kept: list[int], final: Refined, case: Case, floor: Ar
     return [k for k in kept if not seen_in(found.steps[k], nominal, last, floor)]
 
 
-def _not_told(step: Step, simulated: Sequence[Simulation], case: Case) -> bool:
+def _not_told(step: Step, simulated: Sequence[Simulation], case: Case, late: bool) -> bool:
     best = step.best
     if best is None or best.log is not None:
         return False
-    lone, place = len(simulated) == 2 and nearer(*simulated), len(best.done.model.effects) - 1
+    lone, place = len(simulated) == 2 and nearer(*simulated, late=late), len(best.done.model.effects) - 1
     return no_name(step, step.before, best.done, place, case.judge, case.blocks, case.white, lone)
 
 
@@ -166,13 +148,13 @@ def at_odds(found: Found, k: int, prepared: Prepared, case: Case) -> str:
 
     What was found after it stood in the residual then, and one log may have more of that than another.
     """
-    step, accepted = found.steps[k], [j for j, one in enumerate(found.steps) if one.best is not None]
+    step, last = found.steps[k], max(j for j, one in enumerate(found.steps) if one.best is not None)
     if step.best is None or step.best.log is not None:
         return ""
     why = unlike(step.before, step.best.done, k, prepared, case.blocks)
-    if not why or k == accepted[-1]:
+    if not why or k == last:
         return why
-    return unlike(_without(found, [j for j in accepted if j != k], case), found.final, k, prepared, case.blocks)
+    return unlike(_less(found, k, case), found.final, k, prepared, case.blocks)
 
 
 def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) -> tuple[list[int], Refined]:
@@ -285,6 +267,11 @@ def _bound(case: Case, effect: Effect, final: Refined, bounds: Array | None) -> 
 
 def _family(case: Case, effect: Effect) -> Family:
     return next(family for family in case.families if (family.cause, family.joint) == (effect.name, effect.joint))
+
+
+def _less(found: Found, k: int, case: Case) -> Refined:
+    """All that was accepted but step `k`."""
+    return _without(found, [j for j, one in enumerate(found.steps) if one.best is not None and j != k], case)
 
 
 def _without(found: Found, kept: list[int], case: Case, weighted: Refined | None = None) -> Refined:

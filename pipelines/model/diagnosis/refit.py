@@ -58,8 +58,8 @@ class Refined:
 
     @cached_property
     def rss(self) -> float:
-        """Squared weighted residual, less what the ripple of a drive in order makes of it where the rows are steady."""
-        return _power(self.data, self.left, self.weight)
+        """Squared weighted residual, of rows as they are, steady or not: as thresholds are."""
+        return float(self.residual @ self.residual)
 
     def steadied(self, table: Array) -> Array:
         """Weighted rows (..., rows) as the numbers are fitted to them."""
@@ -85,7 +85,7 @@ class Refined:
         if self.known is not None:  # where they were fitted they were held
             return [k for k in range(len(self.model.beta), len(self.slopes)) if self.names[k - len(self.model.beta)][0] == 1
                     and self.known[k, k] == 0.0]
-        return _superfluous(self.slopes * self.weights, len(self.model.beta), self.names)
+        return _superfluous(self.steadied(self.slopes * self.weights), len(self.model.beta), self.names)
 
     def covariance(self) -> Array:
         """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held.

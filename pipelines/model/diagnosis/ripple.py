@@ -10,7 +10,7 @@ they are not (Aitken 1935; as a random effect: Henderson 1975).
 
 The ripple of joint j is torque times a random function of its angle, of the orders that drives have, each with the same power:
 
-    e_j = τ_j Σ_m (a_m cos m q_j + b_m sin m q_j),   a_m, b_m ~ N(0, r²/(2 M)),   m = 6 … 40,  r = 0.1 %
+    e_j = τ_j Σ_m (a_m cos m q_j + b_m sin m q_j),   a_m, b_m ~ N(0, r²/(2 M)),   m = 6 … 39,  r = 0.1 %
     K = I + F Fᵀ,   F = U S Vᵀ,   K^(-1/2) = I + U ((1 + S²)^(-1/2) - 1) Uᵀ
 """
 
@@ -73,7 +73,11 @@ class Ripple:
 
 
 def _rippled(one: LogData, joint: int) -> Array:
-    """(rows, orders) [N m] what each wave of a ripple makes of the torque of a joint in one log."""
+    """(rows, orders) [N m] what each wave of a ripple makes of the torque of a joint in one log.
+
+    Of torque that has passed the low-pass: right to 3 % at a usual cut-off, where no wave is as quick; below 10 Hz the highest
+    orders are up to a fourth too large.
+    """
     orders = np.arange(*RIPPLE_ORDERS)
     turn = one.at_rows(one.motion.q)[:, joint, None] * orders
     size = RIPPLE / np.sqrt(2.0 * len(orders)) * one.plain[joint, :, None]

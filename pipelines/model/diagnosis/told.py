@@ -31,7 +31,7 @@ from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, Not
 from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Probed
-from pipelines.model.diagnosis.steadied import steady_nominal
+from pipelines.model.diagnosis.steadied import steady, steady_nominal
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.diagnosis.words import taken_in, where
 
@@ -50,7 +50,7 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
     done, responded, own = _held_against(first, case, done, floored, chosen, moved)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
-    plain = first.held.plain or nominal  # nothing taken out for what responses name
+    plain = nominal if first.held.plain is None else steady(first.held.plain)  # nothing taken out for what responses name
     parts = responded.parts
     held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
     named = strongest((*held, *findings(found, ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks,

@@ -227,11 +227,11 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(rest: float, ve
     for step in made.steps:
         step.best.effect, step.best.log = SimpleNamespace(last=False), None
         step.other = None
-    monkeypatch.setattr(pruned, "_simulated", lambda *args: ())
+    monkeypatch.setattr(pruned, "simulated_steps", lambda *args: ())
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
     monkeypatch.setattr(pruned, "at_which", lambda *_: "")
     monkeypatch.setattr(pruned, "at_odds", lambda found, k, *args: "logs do not agree" if k == 0 else "")
-    monkeypatch.setattr(pruned, "_strays", lambda *args: "")
+    monkeypatch.setattr(pruned, "strays", lambda *args: "")
     monkeypatch.setattr(pruned, "_not_told", lambda *args: False)
     monkeypatch.setattr(pruned, "_harm", lambda *args: "")
     monkeypatch.setattr(pruned, "_without", lambda *args: left(rest, 0.01, 0.01))
@@ -247,7 +247,7 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
                     (effect("stribeck", 2), left(0.01, 0.01, 0.01)))
     for step in made.steps:
         step.best.log, step.other = None, None
-    for name, answer in {"_simulated": (), "at_which": "", "at_odds": "", "_strays": "", "_not_told": False, "_harm": "",
+    for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
                          "_apart": [0, 1], "_idle": None}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(pruned, "_turned", lambda found, kept, *_: kept)
@@ -274,24 +274,6 @@ def test_what_did_harm_in_a_log_when_it_was_found_is_asked_again_beside_what_was
     case = SimpleNamespace(blocks=10)
     assert bool(pruned.at_odds(found, 0, SimpleNamespace(), case)) is odd
     assert pruned.at_odds(found, 1, SimpleNamespace(), case) == "worse in free-1"  # nothing was found after it
-
-
-@pytest.mark.parametrize(("beside", "strays"), [("", False), ("farther", True)])
-def test_what_moved_the_simulated_arm_away_is_asked_again_beside_what_was_found_after_it(
-        beside: str, strays: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Both joints are late: with the first alone told so, the arm strays; the last was found beside all the others already."""
-    found = searched(left(0.5, 0.5, 0.01), (effect("spring", 1), left(0.4, 0.5, 0.01)),
-                     (effect("spring", 2), left(0.01, 0.01, 0.01)))
-    rest = SimpleNamespace(model=SimpleNamespace(arm="rest"))
-    found.final.model.arm = "final"
-    monkeypatch.setattr(pruned, "_without", lambda *args: rest)
-    monkeypatch.setattr(pruned, "acted", lambda arm, effects: arm)
-    monkeypatch.setattr(pruned, "simulation_errors", lambda arms, motions: arms)
-    monkeypatch.setattr(pruned, "farther", lambda before, after, late: beside if before == "rest" else "farther")
-    case, prepared = SimpleNamespace(beside=()), SimpleNamespace(judging=(), motions=())
-    runs: Any = [SimpleNamespace(how="closed-loop")] * 3
-    assert bool(pruned._strays(found, 0, runs, prepared, case, False)) is strays
-    assert pruned._strays(found, 1, runs, prepared, case, False) == "farther"
 
 
 @pytest.mark.parametrize(("after", "unseen"), [(0.1, []), (0.17, []), (0.185, [0])])
