@@ -176,15 +176,19 @@ def _ratios(e: Evidence) -> Sequence[Check | NotTested]:
         return _against_the_others(e) or e.subject.cannot_tell(
             "S15", "the described masses and inertias do not explain the torque of any joint, so that a wrong gear ratio or unit "
             "would not show", signal="tau")
-    return found or e.subject.ok("S15", f"torque over that of the described links: {', '.join(seen)}", signal="tau")
+    return found or _against_the_others(e) or e.subject.ok(
+        "S15", f"torque over that of the described links: {', '.join(seen)}", signal="tau")
 
 
 def _against_the_others(e: Evidence) -> list[Check]:
     """S15 without a description: all torques come from one set of rigid parameters."""
     if (found := torque_scale(e)) is None:
         return []
+    places = ", or tau of ".join(f"joint {joint + 1} {'is ' * (not k)}{factor:.3g} times" for k, (joint, factor) in
+                                 enumerate(((found.joint, found.factor), *found.others)))
+    ratio = ": only their ratio shows" if found.others else ""
     return [e.subject.say("S15", "warn",
-                          f"tau of joint {found.joint + 1} is {found.factor:.3g} times what the other joints' torques need, "
+                          f"tau of {places} what the other joints' torques need{ratio}, "
                           f"residual {found.before:.2g} -> {found.after:.2g}",
                           signal="tau", joint=found.joint, gate=True,
                           remedy=f"look for a gear ratio or torque constant of about {found.factor:.3g} or {1 / found.factor:.3g} "

@@ -8,6 +8,7 @@ follow any scale of its torque.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +21,12 @@ __all__ = ["TorqueScale", "torque_scale"]
 
 # A drive whose gain is off by less is a fault that `diagnose` names and measures; gear ratios are off by more.
 _LEAST, _MOST = 1.8, 200.0
-_BAD, _BETTER = 0.02, 0.4  # relative residual of all rows with one set of parameters; the ratio of two
+# Relative residual of all rows with one set of parameters, and the ratio of two: with that beyond what a set for each joint leaves,
+# torque of another drive in a joint, or a clipped one, would pass for a scale.
+_BAD, _BETTER = 0.02, 0.4
 _GRID, _FINER = 25, 6  # points, and how often a grid is laid about the best of the last
-_RANK = 1e-14  # of the normal equations: squares of 1e-7
+_AS_GOOD = 1.3  # times the least residual
+_RANK = 1e-12  # of the largest eigenvalue of the normal equations, a column: what is smaller is rounding
 
 
 @dataclass(frozen=True)
@@ -33,29 +37,33 @@ class TorqueScale:
     factor: float
     before: float
     after: float
+    others: tuple[tuple[int, float], ...] = ()  # joints and factors that explain as much: of two torques only the ratio shows
 
 
 def torque_scale(e: Evidence) -> TorqueScale | None:
-    """The joint and factor that leave least, where the log as it is leaves far more; None where none does."""
-    if len(e.telling) < 2:
+    """The joint and factor that leave least, where the log as it is leaves far more; None where none does. Joints that are only
+    held tell nothing."""
+    told = e.telling.tolist()
+    if len(told) < 2:
         return None
-    rows = _Rows.of(e.body, e.motion)
-    before = rows.left(np.ones(e.n_joints))
+    rows = _Rows.of(e.body, e.motion, told)
+    before = rows.left(np.ones(len(told)))
     if before < _BAD:
         return None
-    found = [(*_least(rows, j, e.n_joints), j) for j in e.telling.tolist()]
-    after, factor, joint = min(found)
+    found = sorted((*_least(rows, place, len(told)), joint) for place, joint in enumerate(told))
+    after, factor, joint = found[0]
     apart = max(factor, 1.0 / factor)
     if not _LEAST < apart < _MOST or after > _BETTER * before:
         return None
-    return TorqueScale(joint, factor, before, after)
+    others = tuple((other, by) for left, by, other in found[1:] if left < _AS_GOOD * after)
+    return TorqueScale(joint, factor, before, after, others)
 
 
-def _least(rows: _Rows, joint: int, n: int) -> tuple[float, float]:
+def _least(rows: _Rows, place: int, n: int) -> tuple[float, float]:
     """Residual and factor of one joint's torque by which all rows fit best, by ever finer grids of its logarithm."""
     def left(log_factor: float) -> float:
         factors = np.ones(n)
-        factors[joint] = np.exp(log_factor)
+        factors[place] = np.exp(log_factor)
         return rows.left(factors)
 
     low, high = -np.log(_MOST), np.log(_MOST)
@@ -68,19 +76,19 @@ def _least(rows: _Rows, joint: int, n: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Normal equations of each joint's torque, over its own size, after friction, rotor inertia and offset of its own."""
+    """Normal equations of the torque of each joint that tells, over its size, after its own friction, rotor inertia and offset."""
 
     gram: Array  # (joints, parameters, parameters)
     side: Array  # (joints, parameters)
     square: Array  # (joints,)
 
     @classmethod
-    def of(cls, body: RigidBody, motion: Sampled) -> _Rows:
+    def of(cls, body: RigidBody, motion: Sampled, told: Sequence[int]) -> _Rows:
         regressor, tau = body.regressor(motion.q, motion.dq, motion.ddq), motion.tau
         scale = np.sqrt(np.sum(regressor**2, axis=(0, 1)))
         regressor = regressor / np.where(scale > 0.0, scale, 1.0)
         grams, sides, squares = [], [], []
-        for j in range(tau.shape[1]):
+        for j in told:
             own = np.stack([motion.ddq[:, j], motion.dq[:, j], motion.coulomb[:, j], np.ones(len(tau))], axis=-1)
             own, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
             size = float(np.linalg.norm(tau[:, j] - tau[:, j].mean())) or 1.0
@@ -99,6 +107,6 @@ class _Rows:
         gram, side = np.einsum("j,jab->ab", factors**2, self.gram), factors @ self.side
         size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         values, vectors = np.linalg.eigh(gram / size / size[:, None])
-        seen = values > _RANK * values[-1] * len(values) * 10
+        seen = values > _RANK * values[-1] * len(values)
         explained = float(np.sum((vectors[:, seen].T @ (side / size)) ** 2 / values[seen]))
         return float(np.sqrt(max(float(self.square.sum()) - explained, 0.0) / len(self.square)))

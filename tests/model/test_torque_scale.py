@@ -12,12 +12,14 @@ from pipelines.log.doctor.checks import Subject
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.evidence import Evidence
+from pipelines.model.plausibility import _against_the_others as against_the_others
 from pipelines.model.plausibility import plausibility
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
 from tests.faulty import healthy_without_reference
 from tests.healthy import good_log, with_signal
+from tests.model.estimation.experiments import experiment
 
 
 def evidence(log: ExperimentLog) -> Evidence:
@@ -52,6 +54,25 @@ def test_a_torque_in_another_scale_is_measured(excited: ExperimentLog, joint: in
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.3])
 def test_a_gain_is_left_to_diagnose(excited: ExperimentLog, joint: int, factor: float) -> None:
     assert torque_scale(evidence(scaled(excited, joint, factor))) is None
+
+
+@pytest.mark.parametrize(("joint", "factor"), [(1, 4.0), (2, 0.2)])
+def test_of_two_joints_that_move_only_the_ratio_shows(joint: int, factor: float) -> None:
+    """The waist is held: which of the other two torques is in another scale, nothing tells, and both are named."""
+    log = scaled(experiment(3, moving=np.array([0.0, 1.0, 1.0])), joint, factor)
+    found = torque_scale(evidence(log))
+    assert found is not None
+    scales = dict(((found.joint, found.factor), *found.others))
+    assert scales == {joint: pytest.approx(factor, rel=0.05), 3 - joint: pytest.approx(1.0 / factor, rel=0.05)}
+    (check,) = against_the_others(evidence(log))
+    assert "only their ratio shows" in check.message
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_factor_that_a_load_could_make_is_told_by_the_other_joints(factor: float) -> None:
+    """Of links that are described, twice the torque may be a load: not where the other joints do not feel it."""
+    found = [c for c in plausibility(Subject(scaled(good_log(), 1, factor))) if c.code == "RRID-S15" and c.level != "ok"]
+    assert [c.message.partition(" is")[0] for c in found] == ["tau of joint 2"]
 
 
 @pytest.mark.parametrize("seed", range(6))
