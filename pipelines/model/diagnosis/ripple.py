@@ -56,6 +56,11 @@ class Ripple:
             basis.append(waves @ turn[:, told] / size[-1])
         return cls(tuple(rows), tuple(basis), tuple(size))
 
+    def waves(self, weight: Array) -> list[tuple[npt.NDArray[np.intp], Array]]:
+        """Of each joint its rows, and F of these (rows, rank) weighted by `weight` (joints,) [1/(N m)]."""
+        parts = zip(self.rows, self.basis, self.size, weight, strict=True)
+        return [(rows, basis * (own * size)) for rows, basis, size, own in parts]
+
     def out_of(self, table: Array, weight: Array, only: npt.NDArray[np.intp] | None = None) -> Array:
         """K^(-1/2) x of every line of `table` (..., rows), weighted by `weight` (joints,) [1/(N m)]; `only`: which rows these are,
         of some of the joints all."""
