@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.change_of_sign import SEVERAL, loosened, of_one_law, plainer_of, shows, wrong_law
 from pipelines.model.diagnosis.compliance import Compliance
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.doubted import unlike_motion, unnamed
+from pipelines.model.diagnosis.doubted import unlike_motion, unlike_noise, unnamed
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.floored import Floored, floored_by
 from pipelines.model.diagnosis.imperfections import DriveNoise
@@ -148,6 +148,7 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     done = settled(found, rule(found, floored.rms, known, mended), case, prepared, floored.rms, known)
     if floored.twin is not None:
         done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
+        done = unlike_noise(done, floored.twin)
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 
 
