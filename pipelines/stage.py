@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import os
 import platform
-import shutil
 import sys
 import time
 import typing
@@ -23,7 +22,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, RrridError, clean
-from pipelines.log.atomic import environment_faults, replace_folder, staging_folder, write_file
+from pipelines.log.atomic import environment_faults, remove_folder, replace_folder, staging_place, write_file
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, expanded, hash_file
 from pipelines.log.inputs import Inputs, Rejected, Request, read_by_role, read_logs
@@ -172,9 +171,10 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
     report = renamed(stage.report(result), names)
     object_, series = encode(result)
     object_ = tilde({"command": stage.name, **object_})
-    staging = staging_folder(out)
+    staging = staging_place(out)
     try:
         with environment_faults(out):
+            staging.mkdir()
             _fill(staging, stage, result, report, object_, series, request, hashes)
             _unchanged(hashes)
             _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
@@ -184,7 +184,7 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
         problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
         raise
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        remove_folder(staging)
     return Outcome(result, object_, report, out, stage.exit_code(result, request.check), (*moved, *renamed(checks, names)))
 
 

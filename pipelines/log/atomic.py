@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pipelines.errors import EnvironmentFault, RrridError, UsageError
 
-__all__ = ["environment_faults", "replace_folder", "staging_folder", "sweep", "write_file"]
+__all__ = ["environment_faults", "remove_folder", "replace_folder", "staging_folder", "staging_place", "sweep", "write_file"]
 
 _MARK = ".rrrid-tmp-"
 
@@ -89,11 +89,26 @@ def staging_folder(target: Path) -> Path:
     What a killed process left behind there is swept away first.
     """
     with environment_faults(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        sweep(target.parent)
-        folder = target.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}"
+        folder = staging_place(target)
         folder.mkdir()
         return folder
+
+
+def staging_place(target: Path) -> Path:
+    """Where it will be: for who has to remove it even if interrupted while it is made."""
+    with environment_faults(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        sweep(target.parent)
+        return target.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}"
+
+
+def remove_folder(folder: Path) -> None:
+    """A hidden folder and all that is in it, if it is there; wholly, even if interrupted meanwhile."""
+    try:
+        shutil.rmtree(folder, ignore_errors=True)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def replace_folder(staging: Path, target: Path) -> None:
