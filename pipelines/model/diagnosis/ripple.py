@@ -64,6 +64,8 @@ class Ripple:
     def out_of(self, table: Array, weight: Array, only: npt.NDArray[np.intp] | None = None) -> Array:
         """K^(-1/2) x of every line of `table` (..., rows), weighted by `weight` (joints,) [1/(N m)]; `only`: which rows these are,
         of some of the joints all."""
+        if not np.size(table):  # of a cause that acts nowhere
+            return table
         flat = np.array(table, dtype=np.float64).reshape(-1, np.shape(table)[-1])
         for rows, basis, size, own in zip(self.rows, self.basis, self.size, weight, strict=True):
             at = rows if only is None else np.searchsorted(only, rows)

@@ -87,6 +87,7 @@ def test_rows_that_are_cleared_are_so_in_torque_and_columns_alike(prepared: Prep
     np.testing.assert_allclose(there.lay(torque), ripple.out_of(data.whitened(white).lay(torque), weight), atol=1e-9)
     own = np.flatnonzero(data.joint != 1)
     np.testing.assert_allclose(there.clear(known[own], own), there.clear(known)[own], atol=1e-12)
+    assert there.clear(np.zeros((3, 2, 0)), own[:0]).shape == (3, 2, 0)  # of a cause that acts at no joint
 
 
 def test_numbers_of_a_rippling_drive_fit_motion_farther_out() -> None:
