@@ -133,8 +133,8 @@ def less(data: Data, torque: Array, effects: Iterable[Effect] = ()) -> Data:
     """The same rows less a known torque (rows,) [N m], that of `effects`: joints at which one of them is friction, or could be
     mistaken for it, are remembered."""
     rubbing = data.rubbing | {one.joint for one in effects if one.joint is not None and _rubs(one)}
-    if data.cleared is not None:
-        raise ValueError("torque that is known is subtracted before rows are cleared of ripple")
+    if data.cleared is not None:  # so is the torque that was laid in its rows
+        return replace(data, taken=torque if data.taken is None else data.taken + torque, rubbing=rubbing)
     return replace(data, known=torque if data.known is None else data.known + torque, rubbing=rubbing)
 
 

@@ -124,6 +124,7 @@ class Data:
     known: Array | None = None  # (rows,) [N m] torque that is subtracted: of standing effects
     rubbing: frozenset[int] = frozenset()  # joints, from 1, whose friction is partly in `known`
     steady: bool = False  # models are fitted with the ripple of drives in order among the noise
+    taken: Array | None = None  # (rows,) [N m] as `known`, of rows that are cleared
     cleared: tuple[Ripple, Array] | None = None  # the ripple that torque and columns are without, and the weights (joints,) of rows
 
     @property
@@ -152,7 +153,8 @@ class Data:
     @cached_property
     def y(self) -> Array:
         measured = np.concatenate([one.y.ravel() for one in self.logs])
-        return self.clear(measured if self.known is None else measured - self.known)
+        clear = self.clear(measured if self.known is None else measured - self.known)
+        return clear if self.taken is None else clear - self.taken
 
     @cached_property
     def ripple(self) -> Ripple | None:

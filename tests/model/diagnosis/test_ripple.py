@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.beside import less
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.held_out import cross_validated
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
@@ -85,6 +86,9 @@ def test_rows_that_are_cleared_are_so_in_torque_and_columns_alike(prepared: Prep
     np.testing.assert_allclose(there.y, ripple.out_of(data.through(white, data.y - known), weight), atol=1e-9)
     torque = arm().torque
     np.testing.assert_allclose(there.lay(torque), ripple.out_of(data.whitened(white).lay(torque), weight), atol=1e-9)
+    np.testing.assert_allclose(less(there, there.lay(torque)).y, there.y - there.lay(torque), atol=1e-12)
+    twice = less(less(there, there.lay(torque)), there.lay(torque))
+    np.testing.assert_allclose(twice.y, there.y - 2.0 * there.lay(torque), atol=1e-12)
     own = np.flatnonzero(data.joint != 1)
     np.testing.assert_allclose(there.clear(known[own], own), there.clear(known)[own], atol=1e-12)
     assert there.clear(np.zeros((3, 2, 0)), own[:0]).shape == (3, 2, 0)  # of a cause that acts at no joint
