@@ -25,8 +25,8 @@ __all__ = ["unlike_held_out", "unlike_motion", "unlike_noise", "unnamed"]
 # wrong one 16; of 114 arms in order none left more than 1.9. Of what the nominal model leaves there a wrong name leaves more than a
 # tenth: another such spring left 17 floors of 298.
 _WRONG, _STRANGE, _TENTH = 8.0, 2.5, 0.1
-# Times the spectrum beside it, and times the most of any replica, that a line of an oscillation has at least. Of 24 arms in order,
-# half of them with drives that wander, none had more than 3.3; drives that hunt 50 to 1100.
+# Times the spectrum beside it, and times the most of any replica, that a line of an oscillation has at least. Of 21 arms in order,
+# twelve of them with drives that wander, none had more than 3; drives that hunt 50 to 1100.
 _LINE, _TIMES = 10.0, 3.0
 
 
