@@ -158,7 +158,7 @@ class Exact:
     def _of_log(self, data: Data, one: Named, columns: Array) -> Array:
         return columns if one.log is None else np.where(data.log_of == one.log - data.first, columns, 0.0)
 
-    def moved(self, shift: Array, names: list[tuple[int, int, str]]) -> Exact:
+    def moved(self, shift: Array, names: Sequence[tuple[int, int, str]]) -> Exact:
         """Every number moved: base first, then what `names` says: shapes of laws, numbers of effects."""
         first = len(self.beta)
         laws, effects = list(self.columns.laws), list(self.effects)
@@ -168,7 +168,8 @@ class Exact:
             else:
                 effects[place] = number_moved(effects[place], name, by)
         effects = [_following(one, laws) for one in effects]
-        return Exact(replace(self.columns, laws=tuple(laws)), self.beta + shift[:first], tuple(effects))
+        columns = replace(self.columns, laws=tuple(laws))
+        return replace(self, columns=columns, beta=self.beta + shift[:first], effects=tuple(effects))
 
 
 def law_of(laws: Sequence[Effect], effect: Effect, name: str) -> int | None:

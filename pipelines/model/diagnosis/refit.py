@@ -20,7 +20,7 @@ from pipelines.model.diagnosis.linear import covariance, left_out, solved, super
 from pipelines.model.diagnosis.nominal import Fit, rigid_rows
 from pipelines.model.diagnosis.slopes import Which, slopes_of
 
-__all__ = ["Refined", "refine"]
+__all__ = ["Refined", "moved_by", "refine"]
 
 _STEPS = 8
 _SHARES = (1.0, 0.4, 0.1)  # of a step, until one leaves less
@@ -110,6 +110,14 @@ def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target:
     """Gauss-Newton with halved steps until the squared weighted residual no longer falls."""
     with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
         return _refined(model, data, weight, steps, data.y if target is None else target)
+
+
+def moved_by(done: Refined, left: Array) -> Refined:
+    """The model with every number moved as far as `left` (rows,) [N m], if it was left beside what is, would move it."""
+    table, y = (_steadied(done.data, x * done.weights, done.weight) for x in (done.slopes, left))
+    shift = _within(done.model, list(done.names), table, y, 0.0, done.data.rubbing)
+    model = done.model.moved(shift, done.names)
+    return replace(done, model=model, left=done.data.y - model.torque(done.data))
 
 
 def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:

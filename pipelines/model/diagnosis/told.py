@@ -32,6 +32,7 @@ from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Probed
 from pipelines.model.diagnosis.steadied import steady, steady_nominal
+from pipelines.model.diagnosis.unbiased import unbiased
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.diagnosis.words import taken_in, where
 
@@ -46,7 +47,8 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
         probed: how limits are looked for beside reference logs.
         moved: whether there is a cause that the base parameters show.
     """
-    done = replace(done, found=steady_nominal(done.found))
+    even = unbiased(steady_nominal(done.found), first.held.prepared, case, floored.noise, chosen.seed)
+    done = replace(done, found=even)
     done, responded, own = _held_against(first, case, done, floored, chosen, moved)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
