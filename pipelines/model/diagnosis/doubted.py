@@ -16,6 +16,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.oscillating import oscillation
 from pipelines.model.diagnosis.own_motion import following, lasting, standing_out
 from pipelines.model.diagnosis.pruned import Settled
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 
@@ -69,20 +70,23 @@ def unlike_motion(done: Settled, usual: Array) -> Settled:
 
 
 def unlike_noise(done: Settled, twin: Twin) -> Settled:
-    """"unknown" where nothing was found, and what the nominal model leaves of a joint oscillates as no replica does."""
-    if done.ruling.verdict != "nothing-wrong":
+    """"unknown" where no cause was found, and what the nominal model leaves of a joint oscillates as no replica does; where it is
+    "unknown" already, this is said as well."""
+    if done.ruling.verdict == "cause" or not (where := _oscillating(done.found.nominal, twin)):
         return done
-    nominal = done.found.nominal
+    seen = (f"what is left of {where} oscillates by itself, whatever the motion, and no cause that is known does: look at the "
+            "drive's current loop and at the gains of its controller")
+    reason = f"{done.ruling.reason}; and {seen}" if done.ruling.verdict == "unknown" else seen
+    return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
+
+
+def _oscillating(nominal: Refined, twin: Twin) -> str:
+    """At which joints, how quickly and how much; empty where nothing does."""
     seen = oscillation(nominal.data, nominal.left)
     joints = np.flatnonzero(seen.stands > _LINE)
     if len(joints):
         usual = np.max([oscillation(one.data, replace(one).left).stands for one in twin.fits], axis=0)
         joints = joints[seen.stands[joints] > _TIMES * usual[joints]]
-    if not len(joints):
-        return done
     turning = nominal.model.arm.robot.revolute
-    where = " and of ".join(f"joint {j + 1} ({seen.hertz[j]:.2g} Hz, {seen.rms[j]:.2g} {'N m' if turning[j] else 'N'} rms)"
-                            for j in joints.tolist())
-    reason = (f"what is left of {where} oscillates by itself, whatever the motion, and no cause that is known does: look at the "
-              "drive's current loop and at the gains of its controller")
-    return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
+    return " and of ".join(f"joint {j + 1} ({seen.hertz[j]:.2g} Hz, {seen.rms[j]:.2g} {'N m' if turning[j] else 'N'} rms)"
+                           for j in joints.tolist())

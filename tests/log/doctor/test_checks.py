@@ -183,6 +183,19 @@ def test_a_sagging_controller_still_follows() -> None:
     assert not any(c.code == "RRID-S16" and c.level != "ok" for c in check_log(lazy))
 
 
+@pytest.mark.parametrize("scale", [2.0, 0.25, -1.0])
+def test_a_position_in_another_scale_is_told_from_one_of_another_run(scale: float) -> None:
+    """S15, not S16: an encoder counts twice as far as the reference asks, or backwards; the controller saw what it should."""
+    log = good_log()
+    counted = log.q.copy()
+    counted[:, 1] *= scale
+    said = [c for c in check_log(with_signal(log, q=counted, q_ref=log.q)) if c.code in ("RRID-S15", "RRID-S16") and c.level != "ok"]
+    assert [c.code for c in said] == ["RRID-S15"]
+    assert f"position of joint 2 is {scale:.3g} times its reference" in said[0].message
+    still = with_signal(log, q=np.where(np.arange(log.n_joints) == 1, log.q[0], log.q) + 1e-3 * counted, q_ref=log.q)
+    assert any(c.code == "RRID-S16" for c in check_log(still) if c.level != "ok")  # a joint that stands still has no scale
+
+
 def test_a_drive_at_its_limit_is_no_log_of_another_run() -> None:
     """S16: a joint whose torque is at its limit for half of the time does not follow; a fault of the arm, not of the log."""
     log = good_log()
