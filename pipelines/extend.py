@@ -92,7 +92,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     """Gates, fit, judgement.
 
     Raises:
-        NothingMatched: C06, no log to fit; within `run`, nothing that diagnose found.
+        NothingMatched: C06, no log to fit; within `run`, nothing that diagnose found, or no diagnose.
         UsageError: C01, C02, causes or settings that do not fit, logs of several robots, a model of another one.
         InputRejected: as `diagnose`.
     """
@@ -105,6 +105,9 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     wanted = [*_kept(given.arm), *(Wanted(*wanted_cause(text, robot.revolute)) for text in settings.causes)]
     if isinstance(inputs.material, Diagnosed) and not settings.causes:
         wanted = _found(inputs.material, inputs.label)
+    if not wanted:
+        raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was left out", where=inputs.label,
+                             remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     memory = (inputs.material.memory if isinstance(inputs.material, Diagnosed) else None) or Memory()  # none of one taken back
     said = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,

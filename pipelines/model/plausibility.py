@@ -170,8 +170,7 @@ def _ratios(e: Evidence) -> Sequence[Check | NotTested]:
             found.append(e.subject.say("S15", "warn",
                                        f"tau of joint {j + 1} is {slope:.3g} times what the described links need",
                                        signal="tau", joint=j, gate=True,
-                                       remedy=f"look for a gear ratio or torque constant of about {slope:.3g} or "
-                                              f"{1 / slope:.3g} that was applied twice or not at all"))
+                                       remedy=_divided(j + 1, slope)))
     if not seen:
         return _against_the_others(e) or e.subject.cannot_tell(
             "S15", "the described masses and inertias do not explain the torque of any joint, so that a wrong gear ratio or unit "
@@ -191,8 +190,13 @@ def _against_the_others(e: Evidence) -> list[Check]:
                           f"tau of {places} what the other joints' torques need{ratio}, "
                           f"residual {found.before:.2g} -> {found.after:.2g}",
                           signal="tau", joint=found.joint, gate=True,
-                          remedy=f"look for a gear ratio or torque constant of about {found.factor:.3g} or {1 / found.factor:.3g} "
-                                 "that was applied twice or not at all")]
+                          remedy=_divided(found.joint + 1, found.factor))]
+
+
+def _divided(joint: int, factor: float) -> str:
+    """S15's remedy for a torque."""
+    return (f"look for a gear ratio or torque constant of about {factor:.3g} or {1 / factor:.3g} that was applied twice or not at "
+            f"all; tau of joint {joint} divided by {factor:.3g} would fit")
 
 
 def _unexplained(columns: Array, tau: Array) -> float:

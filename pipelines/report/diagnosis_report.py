@@ -153,7 +153,7 @@ def _others(result: Result) -> list[Section]:
     if shown:
         rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _reachable(t.threshold),
                       _hundredths(100.0 * t.exact_gain), _hundredths(t.visibility),
-                      "accepted" if t.accepted else without_keys(t.reason))
+                      _outcome(t, result))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
         more = len(result.ledger) - len(rows)
@@ -163,6 +163,14 @@ def _others(result: Result) -> list[Section]:
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
             f"believed. {_OUT_OF_REACH}{_alike(len(result.residual_rms.identify))}", tones),)))
     return sections
+
+
+def _outcome(trial: Trial, result: Result) -> str:
+    """What a search has taken up is not named for that: the time held out has its say."""
+    if not trial.accepted:
+        return without_keys(trial.reason)
+    named = any((one.cause, one.joint) == (trial.cause, trial.joint) for one in result.findings)
+    return "accepted" if named else "taken up by the search, not named"
 
 
 def _refused(rejected: Sequence[Rejected]) -> str:

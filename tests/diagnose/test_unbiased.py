@@ -41,7 +41,7 @@ def errors() -> tuple[Array, Array]:
         machine = draw_machine(number, "fault")
         truth = np.array([one.sharpness for one in machine.friction])
         done, prepared = fitted(machine, seed)
-        artefact, = smoothed_away([done.model.arm], done.data, prepared, np.array(machine.amplifier_noise), seed)
+        artefact, = smoothed_away([(done.model.arm, np.array(machine.amplifier_noise))], done.data, prepared, seed)
         before.append(sharpness(done) / truth - 1.0)
         after.append(sharpness(moved_by(done, -artefact)) / truth - 1.0)
     return np.array(before), np.array(after)
@@ -61,4 +61,4 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
 
 def test_logs_that_no_controller_is_known_of_leave_nothing() -> None:
     done, prepared = fitted(draw_machine(1501, "fault"), 0, controlled=False)
-    assert smoothed_away([done.model.arm], done.data, prepared, np.zeros(3), 0) == []
+    assert smoothed_away([(done.model.arm, np.zeros(3))], done.data, prepared, 0) == []

@@ -168,8 +168,8 @@ def follows_reference(s: Subject) -> list[Check]:
             found.append(s.say("S15", "reject" if share > 0.8 else "warn",
                                f"position of joint {j + 1} is {scale:.3g} times its reference, to {100 * rest:.2g} % of the motion",
                                signal="q", joint=int(j), gate=True,
-                               remedy="correct the gear ratio, the direction or the counts per turn of this encoder; if the position "
-                               "is right, the scale of the reference"))
+                               remedy="correct the gear ratio, the direction or the counts per turn of this encoder; if the "
+                               "position is right, the scale of the reference"))
             continue
         why = ("they are not of the same run, or not of the same joint" if limit is None else
                f"its torque stands at ±{limit:.3g} {s.unit('tau', int(j))}, and the joint cannot follow")

@@ -34,7 +34,6 @@ from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.ledger import UNBELIEVABLE
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.motion_floor import noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import at_odds, vague
 from pipelines.model.diagnosis.refit import Refined
@@ -194,9 +193,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     none = np.zeros(len(case.families))
     free = Thresholds(none, none, "none: the cause was named", case.weight, tuple(f.joint for f in case.families))
     found, case = steadied(search(replace(case, thresholds=free, again=False), len(case.families)), case)
-    final = found.final
-    noise = noise_in(final.model, final.data, final.left, prepared.motions, prepared.recipe, chosen.seed)
-    found = unbiased(found, prepared, case, noise, chosen.seed)
+    found = unbiased(found, prepared, case, chosen.seed)
     steps = [step for step in found.steps if step.best is not None]
     ruling = Ruling("cause", tuple(range(len(steps))), "")
     arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in steps if step.best is not None)]

@@ -141,8 +141,8 @@ def _common(kind: type[Effect], data: Data, fit: Fit, columns: Columns, arm: Arm
     if left >= _VISIBLE:
         return []
     one = kind.everywhere(arm.n_joints)[0]
-    return [NotTestable(kind.name, None, f"the same at all joints it is absorbed by {', '.join(_hiding(table, fit, columns))}; "
-                        f"needs {' and '.join(kind.needs)}", one.experiment)]
+    return [NotTestable(kind.name, None, f"where it is the same at all joints, absorbed by "
+                        f"{', '.join(_hiding(table, fit, columns))}; needs {' and '.join(kind.needs)}", one.experiment)]
 
 
 def _hiding(table: Array, fit: Fit, columns: Columns) -> list[str]:

@@ -47,8 +47,7 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
         probed: how limits are looked for beside reference logs.
         moved: whether there is a cause that the base parameters show.
     """
-    even = unbiased(steady_nominal(done.found), first.held.prepared, case, floored.noise, chosen.seed)
-    done = replace(done, found=even)
+    done = replace(done, found=unbiased(steady_nominal(done.found), first.held.prepared, case, chosen.seed))
     done, responded, own = _held_against(first, case, done, floored, chosen, moved)
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]

@@ -1,6 +1,6 @@
 """What sampling and smoothing do to the numbers of a model, taken out of them.
 
-    found = unbiased(found, prepared, case, noise, seed)
+    found = unbiased(found, prepared, case, seed)
 
 The velocity of a reversal is reconstructed from samples of an encoder. Smoothed a little, it passes zero a little late or early,
 and friction that changes its sign within a few mrad/s is fitted two in a hundred too sharp or too blunt, ten times what noise does.
@@ -27,7 +27,7 @@ from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.data import Data, gather
-from pipelines.model.diagnosis.imperfections import DriveNoise
+from pipelines.model.diagnosis.drive_noise import white
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.refit import Refined, moved_by
 from pipelines.model.diagnosis.search import Found, Step
@@ -40,17 +40,11 @@ _RUNS = 3
 _MOST = 1.2  # times what is left of the logs, that sampling may leave at a joint: more was no such thing
 
 
-def unbiased(found: Found, prepared: Prepared, case: Case, noise: DriveNoise | None, seed: int) -> Found:
-    """Every model that was accepted, and the nominal one, as arms whose logs would have been fitted as these were.
-
-    Args:
-        noise: of the drives; None where nobody knows: all stays as it is.
-    """
-    if noise is None:
-        return found
+def unbiased(found: Found, prepared: Prepared, case: Case, seed: int) -> Found:
+    """Every model that was accepted, and the nominal one, as arms whose logs would have been fitted as these were."""
     nominal, final = found.nominal, found.final
     whole = [nominal] if final is nominal else [nominal, final]
-    artefacts = smoothed_away([_in_order(one, case) for one in whole], final.data, prepared, noise.white, seed)
+    artefacts = smoothed_away([(_in_order(one, case), _amplifiers(one)) for one in whole], final.data, prepared, seed)
     if not artefacts or any((one.data.rms(x) > _MOST * one.rms).any() for one, x in zip(whole, artefacts, strict=True)):
         return found
     done = {id(nominal): moved_by(nominal, -artefacts[0])}
@@ -70,6 +64,14 @@ def unbiased(found: Found, prepared: Prepared, case: Case, noise: DriveNoise | N
     return replace(found, nominal=once(nominal), final=once(final), steps=tuple(map(step, found.steps)))
 
 
+def _amplifiers(done: Refined) -> Array:
+    """(joints,) [N m] about their noise, of one sample, that is as quick as rows can show: what a row has of it is the mean of all
+    samples up to the next."""
+    one = done.data.logs[0]
+    step = float(np.median(np.diff(one.t)))
+    return np.asarray(np.nan_to_num(white(done.data, done.left)) * np.sqrt(step / one.log.sample_time))
+
+
 def _in_order(done: Refined, case: Case) -> Arm:
     """The arm without its faults, but for what comes late: it reverses nearly as that with all of them does, which would take ten
     times as long where torque passes them on its way to the joints."""
@@ -77,22 +79,23 @@ def _in_order(done: Refined, case: Case) -> Arm:
     return done.model.nominal.extended(*(one for one in case.beside if one.effect.friction), *late)
 
 
-def smoothed_away(arms: Sequence[Arm], data: Data, prepared: Prepared, white: Array, seed: int) -> list[Array]:
+def smoothed_away(arms: Sequence[tuple[Arm, Array]], data: Data, prepared: Prepared, seed: int) -> list[Array]:
     """(rows,) [N m] what each arm leaves on average of its own logs of these experiments; empty where one can be run in none.
 
     Args:
-        white: (joints,) [N m] noise of the amplifiers.
+        arms: each with the noise (joints,) [N m] of its amplifiers, of one sample.
     """
     logs = [log for log, _ in prepared.motions]
-    places, noise = replayable(logs), Noise(white, np.zeros_like(white))
+    places = replayable(logs)
 
-    def of_log(piece: tuple[Arm, int]) -> Array:
-        arm, place = piece
-        done, = simulate_together(arm, [Experiment.of_log(logs[place])], noise, range(seed, seed + _RUNS))
+    def of_log(piece: tuple[Arm, Array, int]) -> Array:
+        arm, noise, place = piece
+        drawn = Noise(noise, np.zeros_like(noise))
+        done, = simulate_together(arm, [Experiment.of_log(logs[place])], drawn, range(seed, seed + _RUNS))
         return np.asarray(np.mean([_left(arm, done, k, data, prepared, place) for k in range(_RUNS)], axis=0))
 
     try:
-        every = iter(shared_out(of_log, [(arm, place) for arm in arms for place in places]))
+        every = iter(shared_out(of_log, [(*one, place) for one in arms for place in places]))
     except InputRejected:  # D15, D17, T04
         return []
     none = [np.zeros(one.rows * one.n_joints) for one in data.logs]
