@@ -16,6 +16,7 @@ __all__ = ["Spring"]
 
 _DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
 _ANY = 11  # of what a polynomial leaves of a spring that hardens and gives way again
+_FAR = 1e3  # [rad] where nobody says how far it was seen
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …
 
 
@@ -26,8 +27,12 @@ class Spring(Effect):
     A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its linear part is q0. Where gravity
     acts on the joint, the fit of its weight takes much of the polynomial: k, of either sign then, and q0 are known poorly. With
     odd powers alone they were no better known, and the fit, no longer linear, ended elsewhere.
+
+    Beyond the angles that it was fitted to, where a polynomial tells nothing, it goes straight on.
     """
 
+    seen_from: float = -_FAR
+    seen_to: float = _FAR
     degree: int = _MORE
     highest: int = _DEGREE  # of the form that a finding is refitted with
 
@@ -42,6 +47,8 @@ class Spring(Effect):
         Quantity("fifth", "N m/rad^5", -1e4, 1e4, "e"),
         Quantity("sixth", "N m/rad^6", -1e2, 1e2, "f", unsaid=0.0),
         Quantity("seventh", "N m/rad^7", -1e2, 1e2, "g", unsaid=0.0),
+        Quantity("seen_from", "rad", -_FAR, _FAR, "below it goes straight on", shape=True, derived=True, unsaid=-_FAR),
+        Quantity("seen_to", "rad", -_FAR, _FAR, "above it goes straight on", shape=True, derived=True, unsaid=_FAR),
     )
     signature = "A torque that depends on the angle of its joint alone and pulls towards one angle."
     explanation = "A cable bundle, a hose or a balancing spring pulls the joint."
@@ -52,13 +59,17 @@ class Spring(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         q = self.own(motion.q)
-        return self.on_own_row(arm, q, np.ones_like(q), *(q**power for power in range(2, self.degree + 1)))
+        near = np.clip(q, self.seen_from, self.seen_to)
+        beyond = q - near
+        powers = (near**power + power * near**(power - 1) * beyond for power in range(2, self.degree + 1))
+        return self.on_own_row(arm, q, np.ones_like(q), *powers)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Straight alone where a joint without limits closes its circle: what comes back to where it began there is a wave."""
         low, high = arm.robot.joints[self._index].position
         closed = math.isinf(high - low) and self.goes_round(motion) and arm.robot.revolute[self._index]
-        yield replace(self, degree=1, highest=1 if closed else self.highest)
+        q = self.own(motion.q)
+        yield replace(self, degree=1, highest=1 if closed else self.highest, seen_from=float(q.min()), seen_to=float(q.max()))
 
     def full(self) -> Self:
         return replace(self, degree=self.highest)
@@ -71,13 +82,14 @@ class Spring(Effect):
 
     def own_load(self, values: Values) -> OwnLoad:
         slope, constant, *rest = self.amplitudes(values).tolist()
-        falling = (*rest[::-1], slope, constant)
+        known, falling = self.complete(values), (*rest[::-1], slope, constant)
+        low, high = known["seen_from"], known["seen_to"]
 
         def load(angle: float, speed: float) -> float:
-            torque = 0.0
-            for coefficient in falling:  # Horner
-                torque = torque * angle + coefficient
-            return torque
+            near, torque, steep = min(max(angle, low), high), 0.0, 0.0
+            for coefficient in falling:  # Horner, of the polynomial and of its slope
+                torque, steep = torque * near + coefficient, steep * near + torque
+            return torque + steep * (angle - near)
 
         return load
 
@@ -90,7 +102,8 @@ class Spring(Effect):
         polynomial = [constant, slope, *rest]
         zero = _zero(polynomial)
         found = dict(zip(_TERMS, [*_about(polynomial, zero)[1:], *[0.0] * (_MORE - self.degree)], strict=True))
-        return {q.name: zero if q.name == "rest_angle" else found[q.name] for q in self.parameters}
+        seen = {"rest_angle": zero, "seen_from": self.seen_from, "seen_to": self.seen_to}
+        return {q.name: seen[q.name] if q.name in seen else found[q.name] for q in self.parameters}
 
 
 def _about(polynomial: Sequence[float], point: float) -> list[float]:
