@@ -26,7 +26,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.straying import simulated_steps, strays
-from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, held_out_high, seen_in, too_little, without_steps
+from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, explained, held_out_high, seen_in, too_little, without_steps
 from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
 
@@ -40,6 +40,7 @@ _LEAST = 0.002  # of the squared residual, where nothing else says what a cause 
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
 _TRACE = 0.01  # of the nominal residual's power, by which a law like one that stands at its joint is the rest of that
 _REST_OF_GAP = 0.05  # the same, by which what is found at the joint of a gap is what no law of that has
+_NEXT_TO_NOTHING = 0.02  # of what stands above the noise: all that was found is not what is wrong, where that has no name
 _SHAPE = "it only mends the shape of what was found before it at the joint, or stood there"
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
@@ -88,6 +89,9 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         doubts |= dict.fromkeys(unsure, REST_UNKNOWN)
         kept = [k for k in kept if k not in unsure]
         final = _without(found, kept, case, final)
+    if not known and kept and explained(found.nominal.rms, final.rms, found.nominal.rms, floor) < _NEXT_TO_NOTHING:
+        doubts |= dict.fromkeys(kept, _BESIDE)
+        kept = []
     if known and len(kept) < len(found.final.model.effects) and too_little(found.nominal.rms, final.rms, floor):
         doubts |= dict.fromkeys(kept, _BESIDE)
         kept = []

@@ -285,3 +285,22 @@ def test_without_a_floor_a_cause_is_seen_in_what_was_held_out(after: float, unse
     monkeypatch.setattr(pruned, "held_out_left", lambda done, judge, blocks: held[id(done)])
     case: Any = SimpleNamespace(judge=SimpleNamespace(rms=lambda rms: rms), blocks=10)
     assert pruned._unseen(found, [0], found.final, case, 0.015 * np.ones(3)) == unseen
+
+
+@pytest.mark.parametrize(("elsewhere", "named"), [(0.02, (0,)), (0.3, ())])
+def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere: float, named: tuple[int, ...],
+                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of the waves of a weak joint are found; what another one leaves, thirty times the noise or twice, has no name."""
+    waves = effect("cogging", 3)
+    made = searched(left(0.01, elsewhere, 0.03), (waves, left(0.01, elsewhere, 0.01)))
+    made.steps[0].best.log, made.steps[0].other = None, None
+    for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
+                         "_apart": [], "_idle": None, "only_then": False, "_possible": True, "_unseen": []}.items():
+        monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
+    monkeypatch.setattr(pruned, "_turned", lambda found, apart, believed, *_: believed)
+    monkeypatch.setattr(pruned, "_asked_again", lambda found, kept, *_: (kept, found.final))
+    monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
+    case: Any = SimpleNamespace(floored=False, blocks=10, judge=None, changed=None, shared=None, beside=())
+    done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0,), ""), case, case, FLOOR, False)
+    assert done.ruling.named == named
+    assert done.ruling.verdict == ("cause" if named else "nothing-wrong")
