@@ -17,6 +17,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.data import Data
+from pipelines.signal.spectra import welch
 
 __all__ = ["Oscillation", "oscillation"]
 
@@ -46,10 +47,10 @@ def oscillation(data: Data, left: Array) -> Oscillation:
 def _of_joint(data: Data, left: Array, joint: int) -> tuple[float, float, float]:
     step = float(np.median(np.diff(data.logs[0].t)))
     size = round(_SECONDS / step)
-    powers = np.array([_power(piece) for piece in _pieces(data, left, joint, step, size)])
-    if len(powers) < _FEWEST:
+    seen = [welch(piece, 1.0 / step, size) for piece in _pieces(data, left, joint, step, size)]
+    if len(seen) < _FEWEST:
         return 0.0, np.nan, 0.0
-    hertz = np.asarray(np.fft.rfftfreq(size, step), dtype=np.float64)
+    hertz, powers = seen[0].frequency, np.array([one.density * one.resolution for one in seen])  # [N m^2] by frequency
     stands = [_stands(hertz, half.mean(axis=0), _HIGHEST / step) for half in (powers, powers[::2], powers[1::2])]
     at = int(np.argmax(stands[0]))
     near = np.abs(hertz / max(hertz[at], _LOWEST) - 1.0) < _WIDE
@@ -66,12 +67,6 @@ def _pieces(data: Data, left: Array, joint: int, step: float, size: int) -> Iter
         for stretch in one.stretches[joint]:
             if one.weighed[joint, stretch.start]:
                 yield from (rows[joint, k:k + size] for k in range(stretch.start, stretch.stop - size + 1, size // 2))
-
-
-def _power(x: Array) -> Array:
-    """(frequencies,) [N m^2] mean square of `x` (rows,) by frequency, through a Hann window."""
-    window = np.hanning(len(x))
-    return np.asarray(2.0 * np.abs(np.fft.rfft((x - x.mean()) * window)) ** 2 / (len(x) * np.sum(window**2)))
 
 
 def _stands(hertz: Array, power: Array, highest: float) -> Array:
