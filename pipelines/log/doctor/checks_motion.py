@@ -164,7 +164,8 @@ def follows_reference(s: Subject) -> list[Check]:
         if share <= 0.5:
             continue
         limit, (scale, rest) = _stands_at(log.tau[:s.good.end, j]), _in_scale(q[ok], reference[ok])
-        if limit is None and rest < _PROPORTIONAL and abs(scale) > _MOVES:
+        degrees = abs(scale * _DEGREE - 1.0) < _PROPORTIONAL  # S07 tells
+        if limit is None and rest < _PROPORTIONAL and abs(scale) > _MOVES and not degrees:
             found.append(s.say("S15", "reject" if share > 0.8 else "warn",
                                f"position of joint {j + 1} is {scale:.3g} times its reference, to {100 * rest:.2g} % of the motion",
                                signal="q", joint=int(j), gate=True,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.change_of_sign import SEVERAL, loosened, of_one_law, plainer_of, shows, wrong_law
 from pipelines.model.diagnosis.compliance import Compliance
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.doubted import unlike_motion, unlike_noise, unnamed
+from pipelines.model.diagnosis.doubted import of_replicas, unlike_motion, unlike_noise, unnamed
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.floored import Floored, floored_by
 from pipelines.model.diagnosis.imperfections import DriveNoise
@@ -35,6 +36,7 @@ from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.oscillating import oscillation
 from pipelines.model.diagnosis.own_motion import put_right
 from pipelines.model.diagnosis.pruned import settled
 from pipelines.model.diagnosis.refit import Refined
@@ -148,7 +150,7 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     done = settled(found, rule(found, floored.rms, known, mended), case, prepared, floored.rms, known)
     if floored.twin is not None:
         done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
-        done = unlike_noise(done, floored.twin)
+        done = unlike_noise(done, partial(of_replicas, floored.twin))
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 
 
@@ -187,6 +189,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     found = search(case, chosen.most)
     done = settled(found, rule(found, since.floor), case, now, since.floor)
     done = replace(done, found=steady_nominal(done.found))
+    done = unlike_noise(done, lambda: oscillation(reference, since.left).stands)
     noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
     moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
     if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
@@ -227,9 +230,9 @@ def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared,
     if one.doubt:
         told = _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)
         return _nameless(told, _MOVED.format(moved.times)) if moved.far and not told.findings else told
-    findings = strongest((one.finding, *told.findings))
-    return replace(told, verdict="cause", findings=findings, reason="", extended=one.arm,
-                   summary=sentence(Ruling("cause", (), ""), findings, turning, told.residual_rms.identify))
+    findings, beside = strongest((one.finding, *told.findings)), told.reason if told.verdict == "cause" else ""
+    return replace(told, verdict="cause", findings=findings, reason=beside, extended=one.arm,
+                   summary=sentence(Ruling("cause", (), beside), findings, turning, told.residual_rms.identify))
 
 
 def _not_accepted(told: Diagnosis, cause: str, joint: int | None, why: str) -> Diagnosis:

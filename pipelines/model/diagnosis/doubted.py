@@ -2,12 +2,13 @@
 
     done = unlike_held_out(done, rms, floor, nominal)     held-out logs have a floor of their own
     done = unlike_motion(done, usual)                     noise does not follow how a joint moves
-    done = unlike_noise(done, twin)                       noise does not oscillate
+    done = unlike_noise(done, usual)                      noise does not oscillate
     done = unnamed(done, floor)                           what has changed has a name that the residual does not show
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 
-__all__ = ["unlike_held_out", "unlike_motion", "unlike_noise", "unnamed"]
+__all__ = ["of_replicas", "unlike_held_out", "unlike_motion", "unlike_noise", "unnamed"]
 
 # Times the floor of the held-out logs. The right cause, a spring turned farther than it was fitted, has been seen to leave 5.1, a
 # wrong one 16; of 114 arms in order none left more than 1.9. Of what the nominal model leaves there a wrong name leaves more than a
@@ -69,24 +70,35 @@ def unlike_motion(done: Settled, usual: Array) -> Settled:
     return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
 
 
-def unlike_noise(done: Settled, twin: Twin) -> Settled:
-    """"unknown" where no cause was found, and what the nominal model leaves of a joint oscillates as no replica does; where it is
-    "unknown" already, this is said as well."""
-    if done.ruling.verdict == "cause" or not (where := _oscillating(done.found.nominal, twin)):
+def unlike_noise(done: Settled, usual: Callable[[], Array]) -> Settled:
+    """"unknown" where no cause was found, and what is left of a joint oscillates as that of no arm in order does; where something
+    is named, or "unknown" already, this is said as well.
+
+    Args:
+        usual: asked where a line stands out: (joints,) how far one does in an arm in order, at most.
+    """
+    ruling = done.ruling
+    if not (where := _oscillating(done.found.final if ruling.verdict == "cause" else done.found.nominal, usual)):
         return done
     seen = (f"what is left of {where} oscillates by itself, whatever the motion, and no cause that is known does: look at the "
             "drive's current loop and at the gains of its controller")
-    reason = f"{done.ruling.reason}; and {seen}" if done.ruling.verdict == "unknown" else seen
-    return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
+    if ruling.verdict == "cause":
+        return replace(done, ruling=replace(ruling, reason=seen))
+    reason = f"{ruling.reason}; and {seen}" if ruling.verdict == "unknown" else seen
+    return replace(done, ruling=Ruling("unknown", (), reason, ruling.doubts), simulated=())
 
 
-def _oscillating(nominal: Refined, twin: Twin) -> str:
+def of_replicas(twin: Twin) -> Array:
+    """(joints,) how far a line stands out of what is left of any replica, at most."""
+    return np.asarray(np.max([oscillation(one.data, replace(one).left).stands for one in twin.fits], axis=0))
+
+
+def _oscillating(done: Refined, usual: Callable[[], Array]) -> str:
     """At which joints, how quickly and how much; empty where nothing does."""
-    seen = oscillation(nominal.data, nominal.left)
+    seen = oscillation(done.data, done.left)
     joints = np.flatnonzero(seen.stands > _LINE)
     if len(joints):
-        usual = np.max([oscillation(one.data, replace(one).left).stands for one in twin.fits], axis=0)
-        joints = joints[seen.stands[joints] > _TIMES * usual[joints]]
-    turning = nominal.model.arm.robot.revolute
+        joints = joints[seen.stands[joints] > _TIMES * usual()[joints]]
+    turning = done.model.arm.robot.revolute
     return " and of ".join(f"joint {j + 1} ({seen.hertz[j]:.2g} Hz, {seen.rms[j]:.2g} {'N m' if turning[j] else 'N'} rms)"
                            for j in joints.tolist())

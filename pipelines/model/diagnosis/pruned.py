@@ -26,7 +26,16 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.straying import simulated_steps, strays
-from pipelines.model.diagnosis.verdict import REST_UNKNOWN, Ruling, explained, held_out_high, seen_in, too_little, without_steps
+from pipelines.model.diagnosis.verdict import (
+    REST_UNKNOWN,
+    Ruling,
+    at_floor,
+    explained,
+    held_out_high,
+    seen_in,
+    too_little,
+    without_steps,
+)
 from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
 
@@ -92,7 +101,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     if not known and kept and explained(found.nominal.rms, final.rms, found.nominal.rms, floor) < _NEXT_TO_NOTHING:
         doubts |= dict.fromkeys(kept, _BESIDE)
         kept = []
-    if known and len(kept) < len(found.final.model.effects) and too_little(found.nominal.rms, final.rms, floor):
+    left = known and len(kept) < len(found.final.model.effects) and not at_floor(final.rms, floor)
+    if left and too_little(found.nominal.rms, final.rms, floor):
         doubts |= dict.fromkeys(kept, _BESIDE)
         kept = []
     if kept:

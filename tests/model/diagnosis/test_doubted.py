@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.doubted import unlike_held_out, unnamed
+from pipelines.model.diagnosis.doubted import unlike_held_out, unlike_noise, unnamed
 from pipelines.model.diagnosis.pruned import Settled
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
@@ -70,3 +70,26 @@ def test_a_joint_without_rows_is_no_number_in_the_sentence() -> None:
     done = Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
     believed = unlike_held_out(done, np.array([0.01, 0.05, 0.0]), np.array([0.01, 0.01, 0.0]), np.array([0.01, 0.05, 0.0]))
     assert "joint 2 in those held out, 5 times" in believed.ruling.reason
+
+
+@pytest.mark.parametrize(("stands", "in_order", "seen"), [(50.0, 3.0, True), (50.0, 20.0, False), (9.0, 1.0, False)])
+@pytest.mark.parametrize(("verdict", "told"), [("nothing-wrong", "unknown"), ("unknown", "unknown"), ("cause", "cause")])
+def test_an_oscillation_is_told_whatever_else_is(verdict: Any, told: str, stands: float, in_order: float, seen: bool) -> None:
+    """A sine of 0.2 N m and 5 Hz in noise, at the second joint of what the last model leaves; what is named keeps its name."""
+    t = np.arange(0.0, 20.0, 0.02)
+    rng = np.random.default_rng(3)
+    size = 0.2 if stands > 10.0 else 0.0
+    rows = 0.01 * rng.standard_normal((2, len(t)))
+    rows[1] += size * np.sqrt(2.0) * np.sin(2.0 * np.pi * 5.0 * t)
+    log = SimpleNamespace(t=t, rows=len(t), stretches=((slice(0, len(t)),),) * 2, weighed=np.ones((2, len(t)), dtype=bool))
+    data: Any = SimpleNamespace(n_joints=2, logs=(log,), split=lambda left: [left])
+    arm = SimpleNamespace(robot=SimpleNamespace(revolute=(True, True)))
+    model: Any = SimpleNamespace(data=data, left=rows, model=SimpleNamespace(arm=arm))
+    usual = np.full(2, in_order if in_order < 10.0 else 1e5)
+    before = Settled(Found(model, (), model), Ruling(verdict, (0,) if verdict == "cause" else (), ""), ())
+    after = unlike_noise(before, lambda: usual)
+    assert (after is before) is not seen
+    if seen:
+        assert after.ruling.verdict == told
+        assert after.ruling.named == before.ruling.named
+        assert "joint 2 (5 Hz, 0.2 N m rms) oscillates by itself" in after.ruling.reason
