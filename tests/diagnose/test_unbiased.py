@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from pipelines.bench import experiments
 from pipelines.bench.machine import Machine, draw_machine
 from pipelines.bench.session import record
-from pipelines.log.experiment import Array
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.diagnosis import unbiased
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
@@ -21,9 +23,10 @@ from pipelines.model.diagnosis.unbiased import smoothed_away
 MACHINES = (1501, 1502, 1503, 1505)
 
 
-def fitted(machine: Machine, seed: int, controlled: bool = True) -> tuple[Refined, Prepared]:
+def fitted(machine: Machine, seed: int, spoiled: Callable[[ExperimentLog], ExperimentLog] = lambda log: log,
+           ) -> tuple[Refined, Prepared]:
     log, = record(machine, (), [experiments.excitation(machine, seed, 6.0, 2)], seed)
-    prepared = prepare(Logs((log if controlled else replace(log, controller=None),)), DiagnosisSettings())
+    prepared = prepare(Logs((spoiled(log),)), DiagnosisSettings())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     return refine(Exact.start(columns, fit), replace(prepared.data, steady=True), fit.weight), prepared
 
@@ -60,5 +63,33 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
 
 
 def test_logs_that_no_controller_is_known_of_leave_nothing() -> None:
-    done, prepared = fitted(draw_machine(1501, "fault"), 0, controlled=False)
+    done, prepared = fitted(draw_machine(1501, "fault"), 0, lambda log: replace(log, controller=None))
     assert smoothed_away([(done.model.arm, np.zeros(3))], done.data, prepared, 0) == []
+
+
+@pytest.mark.parametrize("name", ["q", "tau"])
+@pytest.mark.parametrize("missing", [3, 20, 60, 200, 600])
+def test_a_log_with_a_hole_is_run_with_the_hole(name: str, missing: int) -> None:
+    """What it leaves there is in the log's own rows, and as large as beside none."""
+    def spoiled(log: ExperimentLog) -> ExperimentLog:
+        values = log.signals[name].values.copy()
+        values[3000:3000 + missing] = np.nan
+        return replace(log, signals={**log.signals, name: replace(log.signals[name], values=values)})
+
+    machine = draw_machine(1501, "fault")
+    done, prepared = fitted(machine, 0, spoiled)
+    artefact, = smoothed_away([(done.model.arm, np.array(machine.amplifier_noise))], done.data, prepared, 0)
+    assert artefact.shape == (done.data.rows,)
+    rms = done.data.rms(artefact)
+    assert (rms > 0.0).all()
+    assert (rms < 1.2 * done.rms).all()
+
+
+def test_rows_that_a_run_does_not_come_to_count_as_if_it_left_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samples that a log lacks for a reason of its own, spikes say, no simulated one lacks."""
+    machine = draw_machine(1501, "fault")
+    done, prepared = fitted(machine, 0)
+    spikes = np.arange(prepared.motions[0][0].n_samples)[:, None] // 50 == 60
+    monkeypatch.setattr(unbiased, "_as_missing", lambda x, measured: np.where(spikes, np.nan, x))
+    artefact, = smoothed_away([(done.model.arm, np.array(machine.amplifier_noise))], done.data, prepared, 0)
+    np.testing.assert_array_equal(artefact, np.zeros(done.data.rows))

@@ -170,7 +170,8 @@ def rejected(found: Found, ruling: Ruling) -> tuple[Rejected, ...]:
             doubted = trial.accepted and trial.step - 1 in ruling.doubts
             if key in named or (key in out and not doubted) or trial.gain <= trial.threshold:
                 continue
-            why = ruling.doubts.get(trial.step - 1) or ruling.reason or "not named" if trial.accepted else trial.reason
+            whole = ruling.reason if ruling.verdict != "cause" else ""  # of a cause it says what is beside that
+            why = ruling.doubts.get(trial.step - 1) or whole or "not named" if trial.accepted else trial.reason
             out[key] = Rejected(trial.cause, trial.joint, why)
     return tuple(out.values())
 

@@ -251,7 +251,7 @@ class Diagnosis:
     question: Literal["what is wrong", "what has changed"]
     held_out: Literal["logs", "blocks"]
     floor_origin: str  # "twin" | "reference logs" | "repetition" | "blocks"
-    reason: str  # why "unknown"; empty otherwise
+    reason: str  # why "unknown"; what "nothing wrong" cannot vouch for; what stands beside causes; else empty
     after_rms: ResidualRms  # the same with all findings and standing effects
     ledger: tuple[Trial, ...]
     thresholds: tuple[Threshold, ...]

@@ -11,7 +11,8 @@ Gouriéroux, Monfort, Renault 1993, to first order):
     θ = θ̂ - (J^T K⁻¹ J)⁻¹ J^T K⁻¹ (y~ - f(θ̂))        y~ (rows,) [N m] what the fitted arm logs, on average
 
 Several runs with the noise of the amplifiers are averaged: without it, each reversal falls between samples in the one way that may
-not have been the logs'. Logs that no controller is known of count as if the arm left nothing of them.
+not have been the logs'. Logs that no controller is known of, or that come to other rows, count as if the arm left nothing of them.
+The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction.
 """
 
 from __future__ import annotations
@@ -103,7 +104,19 @@ def smoothed_away(arms: Sequence[tuple[Arm, Array]], data: Data, prepared: Prepa
 
 
 def _left(arm: Arm, done: Simulated, k: int, data: Data, prepared: Prepared, place: int) -> Array:
-    """(rows,) of one log and one run."""
-    one, copy = data.logs[place], replica(prepared.motions[place], done, k, prepared.recipe)
-    own = gather((copy,), one.equations.columns, prepared.recipe, [one.equations.rows], place)
+    """(rows,) of one log and one run, which lacks what the log lacks; zero where it makes other rows all the same."""
+    one, (log, found) = data.logs[place], prepared.motions[place]
+    holes = replace(done, q=_as_missing(done.q, log.q), tau=_as_missing(done.tau, log.tau))
+    own = gather((replica((log, found), holes, k, prepared.recipe),), one.equations.columns, prepared.recipe,
+                 [one.equations.rows], place)
+    if not (len(own.y) == one.weighed.size and np.array_equal(own.logs[0].t, one.t)):
+        return np.zeros(one.weighed.size)
     return np.asarray(np.where(one.weighed.ravel(), own.y - own.lay(arm.torque), 0.0))
+
+
+def _as_missing(x: Array, measured: Array) -> Array:
+    """`x` (runs, samples, joints) without what was not `measured` (samples, joints)."""
+    count = min(x.shape[1], len(measured))
+    missing = np.zeros(x.shape[1:], dtype=bool)
+    missing[:count] = ~np.isfinite(measured[:count])
+    return np.where(missing, np.nan, x)
