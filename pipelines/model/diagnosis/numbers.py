@@ -18,9 +18,12 @@ from pipelines.model.diagnosis.exact import Named, number_moved
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Value
 
-__all__ = ["acting", "parameters", "standard_deviations"]
+__all__ = ["acting", "of_no_size", "parameters", "standard_deviations"]
 
 _STEP = 1e-4
+# Deviations from zero: of 410 named causes of the test bench the least true one of one number was 6.9, a false gain 4.9; delays of
+# two arms in order 2.3 and 3.5.
+_STDS = 5.0
 
 
 def parameters(done: Refined, place: int, covariance: Array | None = None) -> dict[str, Value]:
@@ -48,6 +51,18 @@ def parameters(done: Refined, place: int, covariance: Array | None = None) -> di
             found[key] = Value(tuple(value.tolist()), None if fixed else tuple(std.tolist()), unit)
         else:
             found[key] = Value(plain, None if fixed else float(std[0]), unit)
+    return found
+
+
+def of_no_size(done: Refined) -> list[int]:
+    """Places of effects of one number alone that is not told from zero, in the model with all of them."""
+    whole, found = done.covariance(), []
+    for place, one in enumerate(done.model.effects):
+        index = done.of_effect(place)
+        if len(index) == 1 and one.free_amplitudes and len(one.amplitudes) == 1:
+            variance = float(whole[index[0], index[0]])
+            if variance > 0.0 and abs(one.amplitudes[0]) < _STDS * np.sqrt(variance):
+                found.append(place)
     return found
 
 

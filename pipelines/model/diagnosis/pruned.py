@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mistaken import imitated
 from pipelines.model.diagnosis.momentary import ONLY_THEN, only_then
+from pipelines.model.diagnosis.numbers import of_no_size
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
@@ -52,6 +53,7 @@ _REST_OF_GAP = 0.05  # the same, by which what is found at the joint of a gap is
 _NEXT_TO_NOTHING = 0.02  # of what stands above the noise: all that was found is not what is wrong, where that has no name
 _SHAPE = "it only mends the shape of what was found before it at the joint, or stood there"
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
+_NO_SIZE = "its size is within five standard deviations of none"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
 _STOOD = "what was found after it at the joint leaves less without it"
 
@@ -90,6 +92,10 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
             break
         kept.remove(idle)
         doubts[idle] = "beside the others it takes nothing off the held-out error"
+        final = _without(found, kept, case, final)
+    if kept and (small := of_no_size(final)):
+        doubts |= {kept[place]: _NO_SIZE for place in small}
+        kept = [k for place, k in enumerate(kept) if place not in small]
         final = _without(found, kept, case, final)
     while kept and (why := _harm(found, final, case) or ("" if _possible(final) else _IMPOSSIBLE)):
         doubts[kept.pop()] = why

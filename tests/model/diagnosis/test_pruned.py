@@ -10,6 +10,7 @@ import pytest
 
 from pipelines.model.diagnosis import chance, pruned
 from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.numbers import of_no_size
 from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
@@ -235,6 +236,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(nominal: float,
     monkeypatch.setattr(pruned, "strays", lambda *args: "")
     monkeypatch.setattr(pruned, "_not_told", lambda *args: False)
     monkeypatch.setattr(pruned, "_harm", lambda *args: "")
+    monkeypatch.setattr(pruned, "of_no_size", lambda done: [])
     monkeypatch.setattr(pruned, "_without", lambda *args: left(rest, 0.01, 0.01))
     case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", ruled, ""), case, case, FLOOR)
@@ -249,7 +251,7 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     for step in made.steps:
         step.best.log, step.other = None, None
     for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
-                         "_apart": [0, 1], "_idle": None}.items():
+                         "of_no_size": [], "_apart": [0, 1], "_idle": None}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(pruned, "_turned", lambda found, kept, *_: kept)
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
@@ -296,7 +298,8 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     made = searched(left(0.01, elsewhere, 0.03), (waves, left(0.01, elsewhere, 0.01)))
     made.steps[0].best.log, made.steps[0].other = None, None
     for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
-                         "_apart": [], "_idle": None, "only_then": False, "_possible": True, "_unseen": []}.items():
+                         "of_no_size": [], "_apart": [], "_idle": None, "only_then": False, "_possible": True,
+                         "_unseen": []}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(pruned, "_turned", lambda found, apart, believed, *_: believed)
     monkeypatch.setattr(pruned, "_asked_again", lambda found, kept, *_: (kept, found.final))
@@ -305,3 +308,13 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0,), ""), case, case, FLOOR, False)
     assert done.ruling.named == named
     assert done.ruling.verdict == ("cause" if named else "nothing-wrong")
+
+
+@pytest.mark.parametrize(("size", "small"), [(4.9e-5, [0]), (5.1e-5, []), (-4.9e-5, [0]), (-5.1e-5, [])])
+def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, small: list[int]) -> None:
+    """A delay of some microseconds, as sampling leaves it in an arm in order; a spring has more numbers, each of them poor."""
+    delay = SimpleNamespace(free_amplitudes=True, amplitudes=(size,))
+    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5))
+    done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(3), model=SimpleNamespace(effects=(delay, spring)),
+                                of_effect=lambda place: [0] if place == 0 else [1, 2])
+    assert of_no_size(done) == small
