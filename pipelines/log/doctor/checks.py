@@ -34,7 +34,7 @@ CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, MOTION_BAND, *UNIT_CHECKS, 
 _CONSEQUENCES: Final = {
     "RRID-D04": ("D11", "S16"),
     "RRID-S05": ("D05", "D06"),
-    "RRID-S07": ("D06", "D08", "D11", "D12", "D16", "S16"),
+    "RRID-S07": ("D06", "D08", "D11", "D12", "D16", "S15", "S16"),
     "RRID-S08": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),
     "RRID-S09": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),
 }

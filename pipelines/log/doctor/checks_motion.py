@@ -18,7 +18,7 @@ __all__ = ["MOTION_CHECKS", "both_ways", "degrees_or_motor"]
 
 _DEGREE = np.pi / 180.0
 _PROPORTIONAL = 0.05  # of a motion: what is left of it beside a multiple of its reference, where it is that
-_MOVES = 0.01  # times its reference: what moves less stands still; a gear is not of more than a hundred
+_MOVES = 0.005  # times its reference: what moves less stands still; a joint's gear is seldom of more than two hundred
 _AT, _NEAR, _STANDS = 0.999, 0.9, 0.02  # of the largest torque: at its limit, and near it; of the time that it stands there
 _NOISE_SPEED = 6.0  # standard deviations that a limit must be exceeded by
 
@@ -164,10 +164,9 @@ def follows_reference(s: Subject) -> list[Check]:
         if share <= 0.5:
             continue
         limit, (scale, rest) = _stands_at(log.tau[:s.good.end, j]), _in_scale(q[ok], reference[ok])
-        degrees = abs(scale * _DEGREE - 1.0) < _PROPORTIONAL  # S07 tells
-        if limit is None and rest < _PROPORTIONAL and abs(scale) > _MOVES and not degrees:
+        if limit is None and rest < _PROPORTIONAL and abs(scale) > _MOVES:
             found.append(s.say("S15", "reject" if share > 0.8 else "warn",
-                               f"position of joint {j + 1} is {scale:.3g} times its reference, to {100 * rest:.2g} % of the motion",
+                               f"position of joint {j + 1} is {scale:.3g} times its reference, within {percent(rest, 2)} of it",
                                signal="q", joint=int(j), gate=True,
                                remedy="correct the gear ratio, the direction or the counts per turn of this encoder; if the "
                                "position is right, the scale of the reference"))

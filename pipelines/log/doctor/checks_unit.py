@@ -32,12 +32,11 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
     if "tau" not in s.log or not np.isfinite(limit).any():
         return s.cannot_tell("S05", "the robot's description has no limits of torque", signal="tau")
     often = _quantile(s.good.log.tau, _OFTEN) / limit
+    peak = _quantile(s.good.log.tau, _PEAK) / limit
     if not (often > _FAR).any():
-        beyond = bool(np.nanmax(_quantile(s.good.log.tau, _PEAK) / limit) > 1.0)
-        return s.ok("S05", "torque is beyond its limits, but not by as much as in another unit" if beyond else
+        return s.ok("S05", "torque is beyond its limits, but not by as much as in another unit" if (peak > 1.0).any() else
                     "torque is of the size that its limits allow", signal="tau")
     j = int(np.argmax(often))
-    peak = _quantile(s.good.log.tau, _PEAK) / limit
     fitting = [unit for unit in _SMALLER[s.log.robot.joints[j].revolute]
                if _SMALL <= float(np.nanmax(peak)) * UNITS[unit].factor <= _SLACK]
     factors = " or ".join(f"{unit} ({1.0 / UNITS[unit].factor:g} times too large)" for unit in fitting)

@@ -127,7 +127,7 @@ def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool
     turns = revolute if first.joint is None else revolute[first.joint - 1:first.joint]
     what = " or ".join(dict.fromkeys("N m rms of torque" if one else "N rms of force" for one in turns))
     size = f": {first.torque_rms:.2g} {what}{taken_in(first, left)}" if np.isfinite(first.torque_rms) else ""
-    beside = f" Beside that, {ruling.reason}." if ruling.reason else ""
+    beside = f" Beside it, {ruling.reason}." if ruling.reason else ""
     return f"{first.title}{where(first)}{size}{more}.{beside}"
 
 

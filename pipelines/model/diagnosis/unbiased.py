@@ -3,9 +3,9 @@
     found = unbiased(found, prepared, case, seed)
 
 The velocity of a reversal is reconstructed from samples of an encoder. Smoothed a little, it passes zero a little late or early,
-and friction that changes its sign within a few mrad/s is fitted two in a hundred too sharp or too blunt, ten times what noise does.
-So the fitted arm is run through the fitted logs' own experiments; what it logs is reconstructed and laid like the logs; and what it
-leaves of that, though it is exact, would move its numbers. By as much they were moved by the logs (indirect inference;
+and friction that changes its sign within a few mrad/s is fitted too sharp: at a wrist mostly by one or two in a hundred, by four at
+most. So the fitted arm is run through the fitted logs' own experiments; what it logs is reconstructed and laid like the logs; and
+what it leaves of that, though it is exact, would move its numbers. By as much they were moved by the logs (indirect inference;
 Gouriéroux, Monfort, Renault 1993, to first order):
 
     θ = θ̂ - (J^T K⁻¹ J)⁻¹ J^T K⁻¹ (y~ - f(θ̂))        y~ (rows,) [N m] what the fitted arm logs, on average
@@ -93,7 +93,9 @@ def smoothed_away(arms: Sequence[tuple[Arm, Array]], data: Data, prepared: Prepa
         arm, noise, place = piece
         drawn = Noise(noise, np.zeros_like(noise))
         done, = simulate_together(arm, [Experiment.of_log(logs[place])], drawn, range(seed, seed + _RUNS))
-        return np.asarray(np.mean([_left(arm, done, k, data, prepared, place) for k in range(_RUNS)], axis=0))
+        log = logs[place]
+        holes = replace(done, q=_as_missing(done.q, log.q), tau=_as_missing(done.tau, log.tau))
+        return np.asarray(np.mean([_left(arm, holes, k, data, prepared, place) for k in range(_RUNS)], axis=0))
 
     try:
         every = iter(shared_out(of_log, [(*one, place) for one in arms for place in places]))
@@ -104,11 +106,9 @@ def smoothed_away(arms: Sequence[tuple[Arm, Array]], data: Data, prepared: Prepa
 
 
 def _left(arm: Arm, done: Simulated, k: int, data: Data, prepared: Prepared, place: int) -> Array:
-    """(rows,) of one log and one run, which lacks what the log lacks; zero where it makes other rows all the same."""
-    one, (log, found) = data.logs[place], prepared.motions[place]
-    holes = replace(done, q=_as_missing(done.q, log.q), tau=_as_missing(done.tau, log.tau))
-    own = gather((replica((log, found), holes, k, prepared.recipe),), one.equations.columns, prepared.recipe,
-                 [one.equations.rows], place)
+    """(rows,) of one log and one run; zero where it makes other rows, though it lacks what the log lacks."""
+    one, copy = data.logs[place], replica(prepared.motions[place], done, k, prepared.recipe)
+    own = gather((copy,), one.equations.columns, prepared.recipe, [one.equations.rows], place)
     if not (len(own.y) == one.weighed.size and np.array_equal(own.logs[0].t, one.t)):
         return np.zeros(one.weighed.size)
     return np.asarray(np.where(one.weighed.ravel(), own.y - own.lay(arm.torque), 0.0))

@@ -19,6 +19,7 @@ from pipelines.model.effects.contact import Contact
 from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.link_length import LinkLength
 from pipelines.model.effects.spring import Spring
+from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Plant, run
 from tests.model.effects.on_bench import (
     arm,
@@ -183,6 +184,27 @@ def test_a_spring_of_three_zeros_rests_at_the_one_near_its_line() -> None:
     found = Spring(1, degree=3).values([-7.0, 6.0, 0.0, 1.0])
     assert found["rest_angle"] == pytest.approx(1.0)
     assert found["stiffness"] == pytest.approx(-4.0)  # (1 - 2)(1 + 3)
+
+
+def test_a_spring_goes_straight_on_beyond_the_angles_it_was_fitted_to() -> None:
+    """By NumPy's tangent at either end, in columns, in the simulation, and after a model file."""
+    fitted = np.polynomial.Polynomial([0.3, -0.2, 0.4, 0.8, -0.1, 0.3])
+    spring = Spring(1, degree=5, seen_from=-0.7, seen_to=1.1)
+    q = np.linspace(-3.0, 3.0, 61)
+    ends = np.clip(q, -0.7, 1.1)
+    expected = fitted(ends) + fitted.deriv()(ends) * (q - ends)
+    assert np.abs(expected - fitted(q)).max() > 10.0  # the polynomial itself ends elsewhere
+    amplitudes = [fitted.coef[1], fitted.coef[0], *fitted.coef[2:]]
+    robot = Arm.from_links(machine().robot)
+    stored = robot.extended(Acting.of(spring, spring.values(amplitudes))).to_model()
+    read = Arm.from_model(stored).effects[0]
+    motion = Motion(np.arange(61.0), np.column_stack([q, q, q]), np.zeros((61, 3)), np.zeros((61, 3)))
+    columns = spring.columns(motion, robot)[:, 0] @ np.array(amplitudes)
+    np.testing.assert_allclose(columns, expected, atol=1e-12)
+    for effect, values in ((spring, spring.values(amplitudes)), (read.effect, read.values)):
+        load = effect.own_load(values)
+        assert load is not None
+        np.testing.assert_allclose([load(x, 0.0) for x in q], expected, atol=1e-10)
 
 
 def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
