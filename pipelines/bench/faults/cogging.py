@@ -8,7 +8,9 @@ from typing import Self
 
 from pipelines.bench.fault import Case, Fault, Floats, Hooks, Parameters, Run
 
-__all__ = ["Cogging"]
+__all__ = ["LINEAR", "Cogging"]
+
+LINEAR = 10.0  # of a slide: a linear motor's magnets are some centimetres apart
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Cogging(Fault):
     def full(cls, case: Case) -> Self:
         order = float(case.rng.integers(8, 37))
         if not case.machine.robot.joints[case.index].revolute:
-            order *= 10.0  # a linear motor's magnets are some centimetres apart
+            order *= LINEAR
         return cls(case.joint, order, 0.4 * case.torque, case.phase(), case.phase())
 
     def scaled(self, factor: float) -> Self:
