@@ -20,11 +20,13 @@ from pipelines.model.diagnosis.screen import INVISIBLE, Screened, gains_of
 from pipelines.model.diagnosis.through import beyond_first_order
 from pipelines.model.effects.base import Effect
 
-__all__ = ["best_form", "fitted", "laid_whole", "plainer"]
+__all__ = ["apart_from", "best_form", "fitted", "laid_whole", "plainer"]
 
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
 _DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
 _NEARLY = 0.95  # of what the best shape explains
+_TELLS = 3.0  # standard deviations of a further number
+_ROUNDING = 1e-12  # of the largest variance
 
 
 def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
@@ -46,7 +48,7 @@ def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error
 
     A spring along one line beside an offset, say: where gravity takes most of either, the spring's whole polynomial would be too
     much for what it explains beyond the offset. A number is worth log n of the squared residual in units of its variance
-    (Schwarz 1978).
+    (Schwarz 1978), and has to be told from what `best` asks for: what is left of an arm is no white noise.
     """
     worth = []
     for one in tried:
@@ -56,9 +58,29 @@ def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error
         plain = replace(_refitted(case, now, one.screened, shape, error), sure=True)
         numbers = plain.done.model.effects[-1].count - best.done.model.effects[-1].count
         price = numbers * np.log(case.data.rows) * plain.done.rss / case.data.rows
-        if numbers == 1 and plain.possible and plain.rank < best.rank and plain.done.rss < best.done.rss - price:
+        pays = numbers == 1 and plain.possible and plain.rank < best.rank and plain.done.rss < best.done.rss - price
+        if pays and _beyond(case.data, plain, best) >= _TELLS:
             worth.append(plain)
     return min(worth, key=lambda one: one.rank, default=None)
+
+
+def _beyond(data: Data, more: Tried, less: Tried) -> float:
+    """How many deviations the numbers of `more` lie beyond those that would be the torque of `less`."""
+    place, arm = len(more.done.model.effects) - 1, more.done.model.arm
+    index = more.done.of_effect(place)
+    amplitudes = np.array(more.done.model.effects[place].amplitudes)
+    if len(index) != len(amplitudes):
+        return np.inf
+    own, other = (laid_whole(data, one.done.model.effects[place].effect, arm) for one in (more, less))
+    return apart_from(amplitudes, more.done.covariance()[np.ix_(index, index)], np.linalg.lstsq(own.T, other.T, rcond=None)[0])
+
+
+def apart_from(numbers: Array, covariance: Array, plane: Array) -> float:
+    """Deviations between `numbers` (k,) and the nearest D λ of a plane (k, m): √ min over λ of (a - D λ)ᵀ C⁻¹ (a - D λ) (Wald 1943)."""
+    values, vectors = np.linalg.eigh(covariance)
+    white = vectors.T / np.sqrt(np.maximum(values, _ROUNDING * values[-1]))[:, None]
+    left, there = white @ numbers, white @ plane
+    return float(np.linalg.norm(left - there @ np.linalg.lstsq(there, left, rcond=None)[0]))
 
 
 def _in_range(case: Case, now: Refined, one: Screened, error: float) -> Tried | None:

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from pipelines.model.diagnosis import hypotheses
 from pipelines.model.diagnosis.ledger import Tried
@@ -15,12 +16,13 @@ from pipelines.model.diagnosis.parsimony import fewest
 from pipelines.model.effects import find_effect
 
 
-@pytest.mark.parametrize(("less", "rank", "numbers", "taken"), [
-    (12.0, 0.49, 2, True), (6.0, 0.49, 2, False), (12.0, 0.51, 2, False), (12.0, 0.49, 3, False)])
-def test_a_further_number_is_taken_for_what_it_is_worth(less: float, rank: float, numbers: int, taken: bool,
+@pytest.mark.parametrize(("less", "rank", "numbers", "told", "taken"), [
+    (12.0, 0.49, 2, 4.0, True), (6.0, 0.49, 2, 4.0, False), (12.0, 0.51, 2, 4.0, False), (12.0, 0.49, 3, 4.0, False),
+    (12.0, 0.49, 2, 2.0, False)])
+def test_a_further_number_is_taken_for_what_it_is_worth(less: float, rank: float, numbers: int, told: float, taken: bool,
                                                         monkeypatch: pytest.MonkeyPatch) -> None:
     """A spring along one line beside an offset: of 3000 rows of unit variance a number is worth log 3000, 8.0. It is not taken
-    where held-out time says otherwise, nor with two more."""
+    where held-out time says otherwise, nor with two more, nor where its slope is two deviations from none."""
 
     def fit(effect: Any, rss: float, at: float, count: int) -> Any:
         model = SimpleNamespace(effects=(SimpleNamespace(effect=effect, count=count, possible=True),))
@@ -31,12 +33,23 @@ def test_a_further_number_is_taken_for_what_it_is_worth(less: float, rank: float
     line = find_effect("spring")(joint=2)
     offset, whole = fit(find_effect("torque_offset")(joint=2), 3000.0, 0.5, 1), fit(replace(line, degree=5), 2995.0, 0.495, 6)
     monkeypatch.setattr(hypotheses, "_refitted", lambda *_: fit(line, 3000.0 - less, rank, numbers))
+    monkeypatch.setattr(hypotheses, "_beyond", lambda *_: told)
     case: Any = SimpleNamespace(data=SimpleNamespace(rows=3000))
     found = hypotheses.plainer(case, cast(Any, None), [whole, offset], offset, 1.0)
     assert (found is not None) is taken
     if found is not None:
         assert fewest(sorted([offset, found], key=lambda one: one.rank)) is found
     assert fewest([whole, offset]) is offset
+
+
+def test_deviations_from_a_plane_are_the_least_that_scipy_finds() -> None:
+    rng = np.random.default_rng(4)
+    numbers, plane, root = rng.standard_normal(4), rng.standard_normal((4, 2)), rng.standard_normal((4, 4))
+    covariance = root @ root.T
+    inverse = np.linalg.inv(covariance)
+    least = minimize(lambda x: (numbers - plane @ x) @ inverse @ (numbers - plane @ x), np.zeros(2), tol=1e-14)
+    assert hypotheses.apart_from(numbers, covariance, plane) == pytest.approx(np.sqrt(least.fun), rel=1e-6)
+    assert hypotheses.apart_from(plane @ [2.0, -3.0], covariance, plane) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(("less", "error", "plain"), [(30.0, 0.95, True), (60.0, 0.95, False), (30.0, 0.9, False)])
