@@ -72,11 +72,15 @@ def _beyond(data: Data, more: Tried, less: Tried) -> float:
     if len(index) != len(amplitudes):
         return np.inf
     own, other = (laid_whole(data, one.done.model.effects[place].effect, arm) for one in (more, less))
-    return apart_from(amplitudes, more.done.covariance()[np.ix_(index, index)], np.linalg.lstsq(own.T, other.T, rcond=None)[0])
+    plane = np.asarray(np.linalg.lstsq(own.T, other.T, rcond=None)[0], dtype=np.float64)
+    return apart_from(amplitudes, more.done.covariance()[np.ix_(index, index)], plane)
 
 
 def apart_from(numbers: Array, covariance: Array, plane: Array) -> float:
-    """Deviations between `numbers` (k,) and the nearest D λ of a plane (k, m): √ min over λ of (a - D λ)ᵀ C⁻¹ (a - D λ) (Wald 1943)."""
+    """Deviations between `numbers` a (k,) and the nearest point of a plane D (k, m) (Wald 1943):
+
+        √ min over λ of (a - D λ)ᵀ C⁻¹ (a - D λ)
+    """
     values, vectors = np.linalg.eigh(covariance)
     white = vectors.T / np.sqrt(np.maximum(values, _ROUNDING * values[-1]))[:, None]
     left, there = white @ numbers, white @ plane
