@@ -44,7 +44,8 @@ def read_guarded(path: Path, container: str, only: Collection[str] | None,
             return (log, digest), False
         if digest != canonical.digest_of(log):
             raise InputRejected("F04", "checksum mismatch: the content does not fit its digest", where=path,
-                                remedy="copy the file again from where it was recorded")
+                                remedy="copy the file again from where it was recorded; if it was edited on purpose, delete its "
+                                "attribute digest, which may be left out")
         return (log, digest), True
 
     try:
