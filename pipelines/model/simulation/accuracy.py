@@ -29,7 +29,6 @@ _SHARE = 0.1  # of the noise difference that the step may cause
 _CANDIDATES = (1, 2, 4, 8, 16, 32, 64)  # steps a sample
 _AMPLE = 8  # steps a sample, where noise is what matters
 _GAIN = 4.0  # what halving the step takes off the error at least: of order 2 is a body held over each, of order 4 what holds none
-_LATE = 16  # steps a sample from which on no more are tried where the last of them would not do either
 _UNHEARD = 1e-9  # [rad] tolerance where nothing is random and nothing counts steps
 
 
@@ -58,7 +57,7 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two counts that have nothing to do with each other
     allowed = np.maximum(_SHARE * np.maximum(random, counted), _UNHEARD)
     calm = [_without_steps(stretch) for stretch in stretches]
-    held, coarse, before = HeldBody.fits(one.prepared(1)), None, list[float]()
+    held, coarse = HeldBody.fits(one.prepared(1)), None
     for steps, finer in zip(_CANDIDATES, (*_CANDIDATES[1:], 2 * _CANDIDATES[-1]), strict=True):
         fine = _positions(one, calm, finer, exact=True)
         for exact in (False, True) if held else (True,):
@@ -71,22 +70,8 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
                 if (left <= allowed).all():
                     return Step(count, left, random, allowed, exact)
         coarse = fine
-        before.append(float((error / allowed).max()))
-        if steps >= _LATE and _hopeless(before):
-            raise InputRejected("D17", "the simulation does not settle as its steps get shorter: "
-                                f"with {steps} a sample it still is {error.max():.2g} rad off",
-                                remedy="friction that changes sign within a very small speed needs a lower sharpness; "
-                                "a loop that hunts around it, lower gains")
     raise InputRejected("D17", f"with {_CANDIDATES[-1]} steps a sample the simulation still is {error.max():.2g} rad off",
                         remedy="friction that changes sign within a very small speed needs a lower sharpness")
-
-
-def _hopeless(errors: list[float]) -> bool:
-    """Whether `errors`, in units of what is allowed, one for each candidate so far, would not fall to one with all of them if they
-    went on as they fell by the last two halvings. Where a loop hunts, every rounding tells where it is after a while."""
-    left = len(_CANDIDATES) + 1 - len(errors)  # the last is run with twice its steps as well
-    fall = np.sqrt(errors[-3] / errors[-1])
-    return bool(np.isfinite([errors[-3], errors[-1]]).all() and errors[-1] > fall**left)
 
 
 def _stretches(experiment: Experiment) -> list[tuple[int, int]]:

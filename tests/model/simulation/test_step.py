@@ -11,7 +11,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.simulation import Experiment, Noise, Plant, accuracy, choose_step, run
+from pipelines.model.simulation import Noise, Plant, choose_step, run
 from tests.model.simulation.arms import KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Friction, Loop
 
@@ -64,16 +64,8 @@ def test_the_step_is_not_wasted() -> None:
     assert (np.sqrt(np.mean((coarse - judged(friction, 600, 32)) ** 2, axis=0)) > step.allowed).any()
 
 
-def test_no_step_is_small_enough_for_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Friction that turns over within a hundredth of a thousandth rad/s: refused, with the remedy, and before the steps are tried
-    that cost most."""
-    tried, positions = [], accuracy._positions
-
-    def counted(plant: Plant, stretches: list[Experiment], steps: int, exact: bool) -> list[Array]:
-        tried.append(steps)
-        return positions(plant, stretches, steps, exact)
-
-    monkeypatch.setattr(accuracy, "_positions", counted)
+def test_no_step_is_small_enough_for_a_jump() -> None:
+    """Friction that turns over within a hundredth of a thousandth rad/s: refused, with the remedy."""
     arm, _ = dry(2000.0)
     law = replace(arm.friction[2].effect, sharpness=1e8)
     sharp = replace(arm, friction=(*arm.friction[:2], Acting(law, (arm.friction[2].parameters[0], replace(
@@ -81,16 +73,6 @@ def test_no_step_is_small_enough_for_a_jump(monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(InputRejected, match="sharpness") as refused:
         choose_step(Plant.of(sharp), experiment(PD, 120))
     assert refused.value.code == "RRID-D17"
-    assert max(tried) <= 32
-
-
-@pytest.mark.parametrize(("errors", "hopeless"), [
-    ([16.0**(4 - k) * 9.0 for k in range(5)], False), ([4.0**(4 - k) * 60.0 for k in range(5)], False),
-    ([4.0**(4 - k) * 70.0 for k in range(5)], True), ([9.0] * 5, True), ([np.inf, np.inf, np.inf, 50.0, 9.0], False)])
-def test_steps_are_given_up_where_none_of_them_would_do(errors: list[float], hopeless: bool) -> None:
-    """Three halvings are left from 16 steps a sample to 128: of order four they take off 4096, of order two 64, of order none
-    nothing."""
-    assert accuracy._hopeless(errors) is hopeless
 
 
 def test_a_loop_that_is_unstable_is_refused() -> None:
