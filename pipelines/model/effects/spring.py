@@ -97,20 +97,6 @@ class Spring(Effect):
         constant, slope, *rest = _about([0.0, *(values[name] for name in _TERMS)], -values["rest_angle"])[:1 + self.degree]
         return np.array([slope, constant, *rest])
 
-    def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
-        """Where the law is straight at its zero, that line: the polynomial has no say there."""
-        known = self.complete(values)
-        rest, polynomial = known["rest_angle"], [0.0, *(known[name] for name in _TERMS)]
-        if known["seen_from"] <= rest <= known["seen_to"]:
-            return super().reported(values)
-        ends = ((known["seen_from"], -1.0), (known["seen_to"], 1.0))
-        lines = [(end, side, *_about(polynomial, end - rest)[:2]) for end, side in ends]
-        zeros = [(end - torque / slope, slope) for end, side, torque, slope in lines if slope and side * torque / slope < 0.0]
-        if not zeros:
-            return super().reported(values)
-        zero, slope = min(zeros, key=lambda one: abs(one[0] - rest))
-        return {**super().reported(values), **dict.fromkeys(_TERMS, 0.0), "stiffness": slope, "rest_angle": zero}
-
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         slope, constant, *rest = (float(a) for a in amplitudes)
         polynomial = [constant, slope, *rest]

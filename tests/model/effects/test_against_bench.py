@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from pipelines.bench.session import as_log
 from pipelines.log.experiment import Array
@@ -206,22 +205,6 @@ def test_a_spring_goes_straight_on_beyond_the_angles_it_was_fitted_to() -> None:
         load = effect.own_load(values)
         assert load is not None
         np.testing.assert_allclose([load(x, 0.0) for x in q], expected, atol=1e-10)
-
-
-@pytest.mark.parametrize("seen", [(0.5, 1.1), (-1.4, -0.9), (-0.5, 0.6)])
-def test_a_spring_is_told_by_where_it_really_rests_and_how_stiff_it_is_there(seen: tuple[float, float]) -> None:
-    """SciPy's root of the load that is simulated, and its difference there, wherever the polynomial itself is zero."""
-    fitted = np.polynomial.Polynomial([0.3, 2.0, 1.4, 0.9, -0.1, 0.3])
-    spring = Spring(1, degree=5, seen_from=seen[0], seen_to=seen[1])
-    values = spring.values([fitted.coef[1], fitted.coef[0], *fitted.coef[2:]])
-    load, told = spring.own_load(values), spring.reported(values)
-    assert load is not None
-    rest = brentq(lambda q: load(q, 0.0), -20.0, 20.0)
-    assert told["rest_angle"] == pytest.approx(rest, abs=1e-9)
-    assert told["stiffness"] == pytest.approx((load(rest + 1e-6, 0.0) - load(rest - 1e-6, 0.0)) / 2e-6, rel=1e-5)
-    if not seen[0] <= rest <= seen[1]:
-        assert abs(values["stiffness"] / told["stiffness"] - 1.0) > 0.02  # the polynomial says otherwise
-        assert told["curvature"] == told["hardening"] == 0.0
 
 
 def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
