@@ -48,7 +48,7 @@ def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error
 
     A spring along one line beside an offset, say: where gravity takes most of either, the spring's whole polynomial would be too
     much for what it explains beyond the offset. A number is worth log n of the squared residual in units of its variance
-    (Schwarz 1978), and has to be told from what `best` asks for: what is left of an arm is no white noise.
+    (Schwarz 1978), and it has to lie three deviations from `best`, by a covariance that allows for a coloured residual.
     """
     worth = []
     for one in tried:
@@ -65,15 +65,19 @@ def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error
 
 
 def _beyond(data: Data, more: Tried, less: Tried) -> float:
-    """How many deviations the numbers of `more` lie beyond those that would be the torque of `less`."""
+    """Distance, in deviations, of the numbers of `more` from the nearest that give the torque of `less`; 0 where a number is not
+    told at all, infinite where a law's shape is fitted with it."""
     place, arm = len(more.done.model.effects) - 1, more.done.model.arm
     index = more.done.of_effect(place)
     amplitudes = np.array(more.done.model.effects[place].amplitudes)
     if len(index) != len(amplitudes):
         return np.inf
     own, other = (laid_whole(data, one.done.model.effects[place].effect, arm) for one in (more, less))
+    covariance = more.done.covariance()[np.ix_(index, index)]
+    if set(index) & set(more.done.unseen) or not np.isfinite(covariance).all():
+        return 0.0
     plane = np.asarray(np.linalg.lstsq(own.T, other.T, rcond=None)[0], dtype=np.float64)
-    return apart_from(amplitudes, more.done.covariance()[np.ix_(index, index)], plane)
+    return apart_from(amplitudes, covariance, plane)
 
 
 def apart_from(numbers: Array, covariance: Array, plane: Array) -> float:
