@@ -13,7 +13,8 @@ from pipelines.bench.rigid import typical_torque
 
 __all__ = ["nuisances_at"]
 
-_OF_NOISE = 0.2
+# Of the amplifier's noise: cogging, as at the RRR's elbow, and what a ripple of the gain makes of a slide's weight.
+_COGGING, _RIPPLE = 0.2, 0.5
 
 
 def nuisances_at(machine: Machine, joint: int, rng: np.random.Generator) -> tuple[Fault, ...]:
@@ -27,8 +28,8 @@ def nuisances_at(machine: Machine, joint: int, rng: np.random.Generator) -> tupl
     turning = machine.robot.joints[joint - 1].revolute
     orders = [float(order) * (1.0 if turning else LINEAR) for order in rng.integers(8, 37, 2)]
     noise = machine.amplifier_noise[joint - 1]
-    cogging = min(1e-3 * max(machine.torque_limit) / 60.0, _OF_NOISE * noise)
+    cogging = min(1e-3 * max(machine.torque_limit) / 60.0, _COGGING * noise)
     weight = 0.0 if turning else typical_torque(machine.robot, acceleration=0.0)[joint - 1]
-    ripple = min(1e-3, 0.5 * noise / weight) if weight else 1e-3
+    ripple = min(1e-3, _RIPPLE * noise / weight) if weight else 1e-3
     return (Cogging(joint, orders[0], cogging, phase[0], phase[1]), GainRipple(joint, ripple, orders[1], phase[2]),
             ColouredNoise(joint, 0.5 * noise, float(rng.uniform(1.0, 5.0))))

@@ -14,6 +14,7 @@ from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.ledger import Tried
+from pipelines.model.diagnosis.linear import solved
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.screen import INVISIBLE, Screened, gains_of
@@ -26,7 +27,7 @@ _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves l
 _DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
 _NEARLY = 0.95  # of what the best shape explains
 _TELLS = 3.0  # standard deviations of a further number
-_ROUNDING = 1e-12  # of the largest variance
+_ROUNDING = 1e-12  # of the largest variance, each number in its own deviations
 
 
 def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
@@ -72,12 +73,11 @@ def _beyond(data: Data, more: Tried, less: Tried) -> float:
     amplitudes = np.array(more.done.model.effects[place].amplitudes)
     if len(index) != len(amplitudes):
         return np.inf
-    own, other = (laid_whole(data, one.done.model.effects[place].effect, arm) for one in (more, less))
     covariance = more.done.covariance()[np.ix_(index, index)]
     if set(index) & set(more.done.unseen) or not np.isfinite(covariance).all():
         return 0.0
-    plane = np.asarray(np.linalg.lstsq(own.T, other.T, rcond=None)[0], dtype=np.float64)
-    return apart_from(amplitudes, covariance, plane)
+    own, other = (laid_whole(data, one.done.model.effects[place].effect, arm) for one in (more, less))
+    return apart_from(amplitudes, covariance, np.stack([solved(own, column) for column in other], axis=1))
 
 
 def apart_from(numbers: Array, covariance: Array, plane: Array) -> float:
@@ -85,8 +85,9 @@ def apart_from(numbers: Array, covariance: Array, plane: Array) -> float:
 
         √ min over λ of (a - D λ)ᵀ C⁻¹ (a - D λ)
     """
-    values, vectors = np.linalg.eigh(covariance)
-    white = vectors.T / np.sqrt(np.maximum(values, _ROUNDING * values[-1]))[:, None]
+    size = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / size[:, None] / size)
+    white = vectors.T / np.sqrt(np.maximum(values, _ROUNDING * values[-1]))[:, None] / size
     left, there = white @ numbers, white @ plane
     return float(np.linalg.norm(left - there @ np.linalg.lstsq(there, left, rcond=None)[0]))
 

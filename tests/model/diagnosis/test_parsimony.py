@@ -10,10 +10,22 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from pipelines.log.experiment import Array
 from pipelines.model.diagnosis import hypotheses
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.ledger import Tried
+from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.parsimony import fewest
+from pipelines.model.diagnosis.refit import refine
+from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
+from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.torque_offset import TorqueOffset
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import hidden
 
 
 @pytest.mark.parametrize(("less", "rank", "numbers", "told", "taken"), [
@@ -50,6 +62,46 @@ def test_deviations_from_a_plane_are_the_least_that_scipy_finds() -> None:
     least = minimize(lambda x: (numbers - plane @ x) @ inverse @ (numbers - plane @ x), np.zeros(2), tol=1e-14)
     assert hypotheses.apart_from(numbers, covariance, plane) == pytest.approx(np.sqrt(least.fun), rel=1e-6)
     assert hypotheses.apart_from(plane @ [2.0, -3.0], covariance, plane) == pytest.approx(0.0, abs=1e-9)
+
+
+def _line_and_offset(seed: int, stiffness: float) -> tuple[Data, Tried, Tried]:
+    """A straight spring, and an offset, fitted to an offset of 0.3 N m at joint 2, a spring and a slow wander."""
+    rng = np.random.default_rng(seed)
+    hertz, phase = rng.uniform(0.1, 1.0, 12), rng.uniform(0.0, 2.0 * np.pi, 12)
+
+    def load(motion: Motion) -> Array:
+        out = np.zeros_like(motion.q)
+        out[:, 1] = 0.3 + stiffness * motion.q[:, 1] + 0.02 * np.sin(2.0 * np.pi * np.outer(motion.t, hertz) + phase).sum(axis=1)
+        return out
+
+    prepared = prepare(Logs((hidden(seed, load),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+
+    def tried(effect: Effect, count: int) -> Tried:
+        start = Exact.start(columns, fit).with_effect(effect, np.full(count, 0.1))
+        return Tried(cast(Any, None), effect, None, refine(start, prepared.data, fit.weight), 0.5, 0.5, 0.1)
+
+    return prepared.data, tried(Spring(joint=2, degree=1, highest=1), 2), tried(TorqueOffset(joint=2), 1)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_slow_wander_makes_no_spring_of_an_offset(seed: int) -> None:
+    assert hypotheses._beyond(*_line_and_offset(seed, 0.0)) < 3.0
+    assert hypotheses._beyond(*_line_and_offset(seed, 3.0)) > 6.0
+
+
+def test_for_white_noise_the_wander_would_be_a_spring() -> None:
+    data, line, _ = _line_and_offset(1, 0.0)
+    slopes, slope = line.done.slopes / line.done.rms[data.joint], line.done.of_effect(0)[0]
+    white = np.linalg.inv(slopes @ slopes.T)[slope, slope]
+    assert abs(line.done.model.effects[0].amplitudes[0]) > 10.0 * np.sqrt(white)
+
+
+def test_a_slope_that_is_not_told_is_no_slope() -> None:
+    """Not even where its number is many deviations from none: that of what is held is zero in the covariance."""
+    data, line, offset = _line_and_offset(1, 3.0)
+    line.done.__dict__["unseen"] = line.done.of_effect(0)[:1]
+    assert hypotheses._beyond(data, line, offset) == 0.0
 
 
 @pytest.mark.parametrize(("less", "error", "plain"), [(30.0, 0.95, True), (60.0, 0.95, False), (30.0, 0.9, False)])
