@@ -44,6 +44,21 @@ def test_what_leaves_many_floors_of_the_held_out_logs_is_something_else(held_out
     assert ("joint 1" in believed.ruling.reason and "16 times" in believed.ruling.reason) is (verdict == "unknown")
 
 
+@pytest.mark.parametrize(("before", "after", "moved", "verdict"), [
+    (0.024, 0.020, False, "unknown"), (0.024, 0.020, True, "cause"), (0.024, 0.015, False, "cause"),
+    (0.0148, 0.0138, False, "cause")])
+def test_half_of_what_the_held_out_logs_show_is_explained(before: float, after: float, moved: bool, verdict: str) -> None:
+    """A link of the wrong length, taken out of the library, passes for a spring of the next joint where it was fitted, and leaves
+    three of five floors elsewhere; little above the floor may be the floor, and what moved base parameters is no residual's."""
+    nominal, final = left(0.03, 0.01, 0.01), left(0.011, 0.01, 0.01)
+    found = searched(nominal, (effect("spring", 1), final))
+    done = Settled(Found(nominal, tuple(found.steps), final), Ruling("cause", (0,), ""), ())
+    believed = unlike_held_out(done, np.array([after, 0.01, 0.01]), FLOOR, np.array([before, 0.01, 0.01]), moved)
+    assert believed.ruling.verdict == verdict
+    assert ("more than half" in believed.ruling.reason) is (verdict == "unknown")
+    assert believed.found.final is (final if verdict == "cause" else nominal)
+
+
 def test_a_law_carried_far_beyond_where_it_was_fitted_keeps_its_name() -> None:
     """Of 3 N m it leaves 0.17, which are 17 floors: a spring that hardens was fitted to a part of its way."""
     nominal, final = left(0.02, 0.01, 0.01), left(0.01, 0.01, 0.01)
