@@ -29,6 +29,7 @@ from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.straying import simulated_steps, strays
 from pipelines.model.diagnosis.verdict import (
     REST_UNKNOWN,
+    TOO_LITTLE,
     Ruling,
     at_floor,
     explained,
@@ -108,7 +109,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         doubts |= dict.fromkeys(kept, _BESIDE)
         kept = []
     left = known and len(kept) < len(found.final.model.effects) and not at_floor(final.rms, floor)
-    if left and too_little(found.nominal.rms, final.rms, floor):
+    few = bool(kept) and left and too_little(found.nominal.rms, final.rms, floor)
+    if few:  # what keeps all the rules is no noise: something is wrong, and not this alone
         doubts |= dict.fromkeys(kept, _BESIDE)
         kept = []
     if kept:
@@ -116,6 +118,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     alone = _elsewhere(without_steps(plain, floor, known), plain, case, floor, known)
     reason = next((why for why in elsewhere.values() if why), f"{alone.reason}: {next(iter(doubts.values()), '')}")
     reason = reason if alone.verdict == "unknown" else alone.reason
+    if few and alone.verdict == "nothing-wrong":
+        alone, reason = replace(alone, verdict="unknown"), TOO_LITTLE
     return Settled(replace(plain, final=plain.nominal), replace(alone, reason=reason, doubts=doubts), ())
 
 
