@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.twin import Twin
 from tests.diagnose.sessions import but
 from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 
@@ -73,6 +74,13 @@ def test_slow_noise_alone_is_nothing_wrong(seed: int) -> None:
     assert diagnosed(0.0, 0.0, seed).verdict == "nothing-wrong"
 
 
+@dataclass(frozen=True)
+class SimpleFit:
+    """What a replica left."""
+
+    rms: Any
+
+
 def looked(*causes: tuple[Any, Any]) -> Any:
     """A search that names each of these, and what it left of three joints with a floor of 0.01."""
     found = searched(left(0.1, 0.1, 0.01), *causes)
@@ -92,7 +100,22 @@ HUMP, DRAG, OTHER, THERE = effect("stribeck", 1), effect("quadratic_drag", 1), e
     (((HUMP, left(0.0101, 0.1, 0.01)), (DRAG, left(0.01, 0.1, 0.01))), ((HUMP, left(0.0101, 0.1, 0.01)),), True),  # a trifle less
     (((HUMP, left(0.02, 0.1, 0.01)), (THERE, left(0.02, 0.01, 0.01))), ((HUMP, left(0.02, 0.1, 0.01)),), False)])  # half of it less
 def test_a_second_look_is_believed_where_it_explains_as_much(first: Any, second: Any, believed: bool) -> None:
-    assert second_look._believed(looked(*first), looked(*second), FLOOR) is believed
+    assert second_look._believed(looked(*first), looked(*second), FLOOR, np.full(3, 0.02)) is believed
+
+
+@pytest.mark.parametrize(("scatter", "believed"), [(0.02, False), (0.06, True), (0.04, False)])
+def test_a_second_look_leaves_more_by_chance_where_the_floor_itself_is_not_known_better(scatter: float, believed: bool) -> None:
+    """Slow waves at an offset's place fit the wander as well, and leave less than an arm in order; the offset a seventh more."""
+    waves, offset = effect("cogging", 1), effect("torque_offset", 1)
+    first, second = looked((waves, left(0.0093, 0.01, 0.01))), looked((offset, left(0.0107, 0.01, 0.01)))
+    assert second_look._believed(first, second, FLOOR, np.array([scatter, scatter, scatter])) is believed
+
+
+def test_how_well_a_floor_is_known_is_told_by_its_replicas() -> None:
+    """White noise of n rows: its power scatters by sqrt(2/n)."""
+    noise: Any = None
+    fits: list[Any] = [SimpleFit(rms) for rms in np.sqrt(np.random.default_rng(5).chisquare(200.0, (400, 2)) / 200.0)]
+    assert Twin(tuple(fits), (0,), noise).scatter == pytest.approx(np.sqrt(2.0 / 200.0), rel=0.15)
 
 
 @pytest.mark.parametrize(("steps", "even"), [((0.01, 0.01, 0.01), True), ((0.01, 0.02, 0.01), False), ((0.01, 0.01, 0.02), False)])

@@ -44,6 +44,7 @@ Name = tuple[str, int | None]  # a cause and its joint
 _LITTLE = 1e-2  # of what stands above the floor: what only the first look has found explains no more, where it is not believed
 _LEAST = 1e-3  # of the same: what only the second look has found beside others explains at least
 _MORE, _FEW = 1.1, 0.1  # times what the first look leaves above the floor, and floors: the second one leaves no more
+_CHANCE = 2.0  # standard deviations of the floor, if that is more
 _ALIKE = 1.02  # times the shortest spacing of rows, that the longest is
 _USELESS = 1e-3  # of the squared residual of a joint: of whitened rows most is noise that no model can be below
 
@@ -70,18 +71,24 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
     if again.ruling.verdict != "cause" or _names(done) == _names(again):
         return done
     plain = _as_they_are(again, done, case)
-    return plain if _believed(done, plain, floor) else done
+    return plain if _believed(done, plain, floor, twin.scatter) else done
 
 
-def _believed(first: Settled, second: Settled, floor: Array) -> bool:
-    """Whether the second look, told of rows as they are, takes the place of the first."""
+def _believed(first: Settled, second: Settled, floor: Array, scatter: Array) -> bool:
+    """Whether the second look, told of rows as they are, takes the place of the first.
+
+    Args:
+        scatter: (joints,) relative standard deviation of what an arm in order leaves, of its power: where noise is slow, a wrong
+            cause may take the luck of one log in, and stand below the floor.
+    """
     before, now = _names(first), _names(second)
     if now < before:
         return _share(first, before - now, floor) < _LITTLE
     if before and before < now and _share(second, now - before, floor) < _LEAST:
         return False
     left = [excess(one.found.final.rms, floor) for one in (first, second)]
-    return _joints(first) <= _joints(second) and left[1] <= _MORE * left[0] + _FEW
+    few = max(_FEW, _CHANCE * float(np.linalg.norm(scatter)))
+    return _joints(first) <= _joints(second) and left[1] <= _MORE * left[0] + few
 
 
 def _evenly(case: Case, twin: Twin) -> bool:

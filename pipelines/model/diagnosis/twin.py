@@ -50,6 +50,13 @@ class Twin:
         """(joints,) [N m] over all replicas: the floor. Of copies, which keep no basis."""
         return np.asarray(np.sqrt(np.mean(np.square([replace(one).rms for one in self.fits]), axis=0)))
 
+    @property
+    def scatter(self) -> Array:
+        """(joints,) relative standard deviation of the power that a replica leaves."""
+        powers = np.square([replace(one).rms for one in self.fits])
+        return np.asarray(np.std(powers, axis=0, ddof=1) / np.maximum(powers.mean(axis=0), 1e-300) if len(powers) > 1 else
+                          np.zeros(powers.shape[1]))
+
     def weighted(self, weight: Array) -> tuple[Fit, Array]:
         """The fit of the first replica and the residuals (replicas, rows) of all, weighted, joints weighted like this."""
         first = self._weighted(0, weight)
