@@ -44,7 +44,8 @@ def errors() -> tuple[Array, Array]:
         machine = draw_machine(number, "fault")
         truth = np.array([one.sharpness for one in machine.friction])
         done, prepared = fitted(machine, seed)
-        artefact, = smoothed_away([(done.model.arm, np.array(machine.amplifier_noise))], done.data, prepared, seed)
+        artefact = smoothed_away(done.model.arm, np.array(machine.amplifier_noise), done.data, prepared, seed)
+        assert artefact is not None
         before.append(sharpness(done) / truth - 1.0)
         after.append(sharpness(moved_by(done, -artefact)) / truth - 1.0)
     return np.array(before), np.array(after)
@@ -64,7 +65,7 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
 
 def test_logs_that_no_controller_is_known_of_leave_nothing() -> None:
     done, prepared = fitted(draw_machine(1501, "fault"), 0, lambda log: replace(log, controller=None))
-    assert smoothed_away([(done.model.arm, np.zeros(3))], done.data, prepared, 0) == []
+    assert smoothed_away(done.model.arm, np.zeros(3), done.data, prepared, 0) is None
 
 
 @pytest.mark.parametrize("name", ["q", "tau"])
@@ -78,7 +79,8 @@ def test_a_log_with_a_hole_is_run_with_the_hole(name: str, missing: int) -> None
 
     machine = draw_machine(1501, "fault")
     done, prepared = fitted(machine, 0, spoiled)
-    artefact, = smoothed_away([(done.model.arm, np.array(machine.amplifier_noise))], done.data, prepared, 0)
+    artefact = smoothed_away(done.model.arm, np.array(machine.amplifier_noise), done.data, prepared, 0)
+    assert artefact is not None
     assert artefact.shape == (done.data.rows,)
     rms = done.data.rms(artefact)
     assert (rms > 0.0).all()
@@ -91,5 +93,6 @@ def test_rows_that_a_run_does_not_come_to_count_as_if_it_left_nothing(monkeypatc
     done, prepared = fitted(machine, 0)
     spikes = np.arange(prepared.motions[0][0].n_samples)[:, None] // 50 == 60
     monkeypatch.setattr(unbiased, "_as_missing", lambda x, measured: np.where(spikes, np.nan, x))
-    artefact, = smoothed_away([(done.model.arm, np.array(machine.amplifier_noise))], done.data, prepared, 0)
+    artefact = smoothed_away(done.model.arm, np.array(machine.amplifier_noise), done.data, prepared, 0)
+    assert artefact is not None
     np.testing.assert_array_equal(artefact, np.zeros(done.data.rows))

@@ -12,12 +12,12 @@ Gouriéroux, Monfort, Renault 1993, to first order):
 
 Several runs with the noise of the amplifiers are averaged: without it, each reversal falls between samples in the one way that may
 not have been the logs'. Logs that no controller is known of, or that come to other rows, count as if the arm left nothing of them.
-The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction.
+The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction. It is the one with
+all that was found, which is nearest to that of the logs; of the models that have less, the same is taken out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,7 +33,7 @@ from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.refit import Refined, moved_by
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.twin import replayable, replica
-from pipelines.model.simulation import Experiment, Noise, Simulated, simulate_together
+from pipelines.model.simulation import Experiment, Noise, Simulated, choose_steps, simulate_together
 
 __all__ = ["smoothed_away", "unbiased"]
 
@@ -43,16 +43,15 @@ _MOST = 1.2  # times what is left of the logs, that sampling may leave at a join
 
 def unbiased(found: Found, prepared: Prepared, case: Case, seed: int) -> Found:
     """Every model that was accepted, and the nominal one, as arms whose logs would have been fitted as these were."""
-    nominal, final = found.nominal, found.final
-    whole = [nominal] if final is nominal else [nominal, final]
-    artefacts = smoothed_away([(_in_order(one, case), _amplifiers(one)) for one in whole], final.data, prepared, seed)
-    if not artefacts or any((one.data.rms(x) > _MOST * one.rms).any() for one, x in zip(whole, artefacts, strict=True)):
+    final = found.final
+    artefact = smoothed_away(_in_order(final, case), _amplifiers(final), final.data, prepared, seed)
+    if artefact is None or (final.data.rms(artefact) > _MOST * final.rms).any():
         return found
-    done = {id(nominal): moved_by(nominal, -artefacts[0])}
+    done: dict[int, Refined] = {}
 
     def once(one: Refined) -> Refined:
         if id(one) not in done:
-            done[id(one)] = moved_by(one, -artefacts[-1])
+            done[id(one)] = moved_by(one, -artefact)
         return done[id(one)]
 
     def step(one: Step) -> Step:
@@ -62,7 +61,7 @@ def unbiased(found: Found, prepared: Prepared, case: Case, seed: int) -> Found:
         return replace(one, before=once(one.before), best=best,
                        rivals=tuple(best if rival is one.best else rival for rival in one.rivals))
 
-    return replace(found, nominal=once(nominal), final=once(final), steps=tuple(map(step, found.steps)))
+    return replace(found, nominal=once(found.nominal), final=once(final), steps=tuple(map(step, found.steps)))
 
 
 def _amplifiers(done: Refined) -> Array:
@@ -80,34 +79,37 @@ def _in_order(done: Refined, case: Case) -> Arm:
     return done.model.nominal.extended(*(one for one in case.beside if one.effect.friction), *late)
 
 
-def smoothed_away(arms: Sequence[tuple[Arm, Array]], data: Data, prepared: Prepared, seed: int) -> list[Array]:
-    """(rows,) [N m] what each arm leaves on average of its own logs of these experiments; empty where one can be run in none.
+def smoothed_away(arm: Arm, noise: Array, data: Data, prepared: Prepared, seed: int) -> Array | None:
+    """(rows,) [N m] what the arm leaves on average of its own logs of these experiments; None where it can be run in none.
 
     Args:
-        arms: each with the noise (joints,) [N m] of its amplifiers, of one sample.
+        noise: (joints,) [N m] of its amplifiers, of one sample.
     """
     logs = [log for log, _ in prepared.motions]
-    places = replayable(logs)
+    places, drawn = replayable(logs), Noise(noise, np.zeros_like(noise))
+    if not places:
+        return None
 
-    def of_log(piece: tuple[Arm, Array, int]) -> Array:
-        arm, noise, place = piece
-        drawn = Noise(noise, np.zeros_like(noise))
-        done, = simulate_together(arm, [Experiment.of_log(logs[place])], drawn, range(seed, seed + _RUNS))
+    def of_run(piece: tuple[int, int]) -> Array:
+        place, k = piece
         log = logs[place]
+        done, = simulate_together(arm, [Experiment.of_log(log)], drawn, (seed + k,), steps)
         holes = replace(done, q=_as_missing(done.q, log.q), tau=_as_missing(done.tau, log.tau))
-        return np.asarray(np.mean([_left(arm, holes, k, data, prepared, place) for k in range(_RUNS)], axis=0))
+        return _left(arm, holes, data, prepared, place)
 
+    pieces = [(place, k) for place in sorted(places, key=lambda place: -logs[place].n_samples) for k in range(_RUNS)]
     try:
-        every = iter(shared_out(of_log, [(*one, place) for one in arms for place in places]))
+        steps = choose_steps(arm, [Experiment.of_log(logs[place]) for place in places], drawn)
+        every = dict(zip(pieces, shared_out(of_run, pieces), strict=True))
     except InputRejected:  # D15, D17, T04
-        return []
-    none = [np.zeros(one.rows * one.n_joints) for one in data.logs]
-    return [np.concatenate([next(every) if k in places else zero for k, zero in enumerate(none)]) for _ in arms] if places else []
+        return None
+    return np.concatenate([np.mean([every[place, k] for k in range(_RUNS)], axis=0) if place in places else
+                           np.zeros(one.rows * one.n_joints) for place, one in enumerate(data.logs)])
 
 
-def _left(arm: Arm, done: Simulated, k: int, data: Data, prepared: Prepared, place: int) -> Array:
+def _left(arm: Arm, done: Simulated, data: Data, prepared: Prepared, place: int) -> Array:
     """(rows,) of one log and one run; zero where it makes other rows, though it lacks what the log lacks."""
-    one, copy = data.logs[place], replica(prepared.motions[place], done, k, prepared.recipe)
+    one, copy = data.logs[place], replica(prepared.motions[place], done, 0, prepared.recipe)
     own = gather((copy,), one.equations.columns, prepared.recipe, [one.equations.rows], place)
     if not (len(own.y) == one.weighed.size and np.array_equal(own.logs[0].t, one.t)):
         return np.zeros(one.weighed.size)

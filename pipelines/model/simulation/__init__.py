@@ -19,8 +19,8 @@ from pipelines.model.simulation.plant import Plant
 from pipelines.model.simulation.replicas import Noise, Simulated, run, run_together
 from pipelines.model.simulation.windows import Windows, simulate_windows
 
-__all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "run", "simulate", "simulate_together",
-           "simulate_windows"]
+__all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "choose_steps", "run", "simulate",
+           "simulate_together", "simulate_windows"]
 
 
 def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds: Iterable[int] = (0,), p: Array | None = None,
@@ -42,6 +42,17 @@ def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds
     plant = Plant.of(arm, p)
     step = choose_step(plant, experiment, noise) if step is None else step
     return run(plant, experiment, step.per_sample, noise, seeds, step.exact)
+
+
+def choose_steps(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None) -> dict[float, Step]:
+    """Those of the integrator for each sample time, as `simulate_together` takes them, chosen in the first experiment that has it:
+    what suffices for an arm and its controller in one experiment suffices in the next.
+
+    Raises:
+        InputRejected: as `choose_step`.
+    """
+    plant, first = Plant.of(arm), {one.sample_time: one for one in reversed(experiments)}
+    return {time: choose_step(plant, one, noise) for time, one in first.items()}
 
 
 def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None, seeds: Iterable[int] = (0,),
