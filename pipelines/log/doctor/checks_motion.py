@@ -1,4 +1,4 @@
-"""Check the motion of a log: units of angle, limits, reference against measurement, and what moves that should not."""
+"""Check the motion of a log: units of angle, limits, and what moves that should not."""
 
 from __future__ import annotations
 
@@ -7,19 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
+from pipelines.log.doctor.checks_reference import follows_reference
+from pipelines.log.doctor.checks_subject import NotTested, Subject
 from pipelines.log.doctor.checks_unit import angles_in_file
 from pipelines.log.doctor.faults import lagged_speed
 from pipelines.log.doctor.stop import emergency_stop
 from pipelines.log.experiment import Array
-from pipelines.log.limits import percent
 
 __all__ = ["MOTION_CHECKS", "both_ways", "degrees_or_motor"]
 
 _DEGREE = np.pi / 180.0
-_PROPORTIONAL = 0.05  # of a motion: what is left of it beside a multiple of its reference, where it is that
-_MOVES = 0.005  # times its reference: what moves less stands still; a joint's gear is seldom of more than two hundred
-_AT, _NEAR, _STANDS = 0.999, 0.9, 0.02  # of the largest torque: at its limit, and near it; of the time that it stands there
 _NOISE_SPEED = 6.0  # standard deviations that a limit must be exceeded by
 
 
@@ -141,64 +138,6 @@ def held_joints(s: Subject) -> list[Check]:
              for j in range(log.n_joints) if j != mover and s.travel[j] > allowed]
     most = max((float(s.travel[j]) for j in range(log.n_joints) if j != mover), default=0.0)
     return found or s.ok("D16", f"held joints move by at most {most:.3g} rad", signal="q")
-
-
-def follows_reference(s: Subject) -> list[Check]:
-    """S16: reference and measurement are of the same run. A controller lags and sags, but does not do something else.
-
-    S15: nor does it move twice as far as asked; who counts so has another scale.
-    """
-    log = s.good.log
-    if "q_ref" not in log or log.experiment in ("hold", "frf"):
-        return []
-    found, seen = [], []
-    travel = spread(log["q_ref"])
-    for j in np.flatnonzero(travel > 0.01).tolist():
-        q, reference = s.position[:s.good.end, j], log["q_ref"][:s.good.end, j]
-        ok = np.isfinite(q) & np.isfinite(reference)
-        if ok.sum() < 20:
-            continue
-        error = q[ok] - reference[ok]
-        share = float(np.std(error)) / max(float(np.std(reference[ok])), 1e-12)
-        seen.append(percent(share, 2))
-        if share <= 0.5:
-            continue
-        limit, (scale, rest) = _stands_at(log.tau[:s.good.end, j]), _in_scale(q[ok], reference[ok])
-        if limit is None and rest < _PROPORTIONAL and abs(scale) > _MOVES:
-            found.append(s.say("S15", "reject" if share > 0.8 else "warn",
-                               f"position of joint {j + 1} is {scale:.3g} times its reference, within {percent(rest, 2)} of it",
-                               signal="q", joint=int(j), gate=True,
-                               remedy="correct the gear ratio, the direction or the counts per turn of this encoder; if the "
-                               "position is right, the scale of the reference"))
-            continue
-        why = ("they are not of the same run, or not of the same joint" if limit is None else
-               f"its torque stands at ±{limit:.3g} {s.unit('tau', int(j))}, and the joint cannot follow")
-        found.append(s.say("S16", "reject" if share > 0.8 and limit is None else "warn",
-                           f"position and reference differ by {100 * share:.0f} % of the motion "
-                           f"({float(np.std(error)):.3g} {s.unit('q', int(j))}): {why}",
-                           signal="q_ref", joint=int(j), gate=True,
-                           remedy="log both in one recorder, or leave the reference out" if limit is None else
-                           "look for what limits the drive, or drive it more gently"))
-    within = f" within {', '.join(seen)} of the motion" if seen else ""
-    return found or s.ok("S16", f"the position follows its reference{within}", signal="q_ref")
-
-
-def _in_scale(q: Array, reference: Array) -> tuple[float, float]:
-    """How many times the `reference` a position (samples,) is, in least squares, and what share of it that leaves."""
-    x, y = reference - reference.mean(), q - q.mean()
-    scale = float(x @ y) / max(float(x @ x), 1e-300)
-    return scale, float(np.std(y - scale * x)) / max(float(np.std(y)), 1e-12)
-
-
-def _stands_at(tau: Array) -> float | None:
-    """The limit at which a torque (samples,) stands for a good part of the time; None where it has none."""
-    size = np.abs(tau[np.isfinite(tau)])
-    most = float(size.max(initial=0.0))
-    if most == 0.0:  # no sample, or no torque
-        return None
-    there = float(np.mean(size >= _AT * most))
-    near = float(np.mean((size >= _NEAR * most) & (size < _AT * most)))  # a wave is longer near its crest than on it
-    return most if there > max(_STANDS, near) else None
 
 
 def stopped(s: Subject) -> list[Check]:

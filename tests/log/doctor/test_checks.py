@@ -176,47 +176,6 @@ def test_locked_joints_may_stand_still() -> None:
     assert [c for c in check_log(log) if c.level != "ok"] == []
 
 
-def test_a_sagging_controller_still_follows() -> None:
-    """S16 must not take a soft controller, 20 % behind, for another run."""
-    log = good_log()
-    lazy = with_signal(log, q_ref=log.q + 0.2 * (log.q - log.q.mean(axis=0)))
-    assert not any(c.code == "RRID-S16" and c.level != "ok" for c in check_log(lazy))
-
-
-@pytest.mark.parametrize("scale", [2.0, 0.25, -1.0])
-def test_a_position_in_another_scale_is_told_from_one_of_another_run(scale: float) -> None:
-    """S15, not S16: an encoder counts twice as far as the reference asks, or backwards; the controller saw what it should."""
-    log = good_log()
-    counted = log.q.copy()
-    counted[:, 1] *= scale
-    said = [c for c in check_log(with_signal(log, q=counted, q_ref=log.q)) if c.level != "ok" and c.code[-3:] in ("S15", "S16")]
-    assert [c.code for c in said] == ["RRID-S15"]
-    assert f"position of joint 2 is {scale:.3g} times its reference" in said[0].message
-    still = with_signal(log, q=np.where(np.arange(log.n_joints) == 1, log.q[0], log.q) + 1e-3 * counted, q_ref=log.q)
-    assert any(c.code == "RRID-S16" for c in check_log(still) if c.level != "ok")  # a joint that stands still has no scale
-
-
-def test_a_drive_at_its_limit_is_no_log_of_another_run() -> None:
-    """S16: a joint whose torque is at its limit for half of the time does not follow; a fault of the arm, not of the log."""
-    log = good_log()
-    away = with_signal(log, q_ref=log.q[::-1])
-    assert any(c.code == "RRID-S16" and c.level == "reject" for c in check_log(away))
-    weak = with_signal(away, tau=np.clip(log.tau, -0.5 * np.abs(log.tau).max(axis=0), 0.5 * np.abs(log.tau).max(axis=0)))
-    said = [c for c in check_log(weak) if c.code == "RRID-S16"]
-    assert {c.level for c in said} == {"warn"}
-    assert "cannot follow" in said[0].message
-    wave = np.outer(np.sin(np.linspace(0.0, 60.0, len(log.t))), np.abs(log.tau).max(axis=0))
-    assert any(c.code == "RRID-S16" and c.level == "reject" for c in check_log(with_signal(away, tau=wave)))  # a crest
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_reference_of_another_run_is_one_without_any_torque_too() -> None:
-    """S16 looks for a limit in what torque there is."""
-    log = good_log()
-    away = with_signal(log, q_ref=log.q[::-1], tau=np.full_like(log.tau, np.nan))
-    assert any(c.code == "RRID-S16" and c.level == "reject" for c in check_log(away))
-
-
 def test_a_joint_that_spins_for_ever_is_not_in_degrees() -> None:
     """40 rad of travel at a speed within its limit are 40 rad."""
     log = make_log(turning(4.0, 0), "free", duration=10.0)

@@ -1,0 +1,119 @@
+"""Check the position of each joint against its reference: of one run, of one joint, in one unit and scale."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.errors import Check, Level
+from pipelines.log.doctor.checks_subject import Subject, spread
+from pipelines.log.experiment import Array
+from pipelines.log.limits import percent
+
+__all__ = ["follows_reference"]
+
+_DEGREE = np.pi / 180.0
+_FOLLOWS, _AWAY = 0.5, 0.8  # of a motion: a controller lags and sags by no more; a log that is farther off is refused
+_OTHERS = 0.2  # of a motion: a joint that keeps so near to the reference of another follows that
+_PROPORTIONAL = 0.05  # of a motion: what is left of it beside a multiple of its reference, where it is that
+_EXACT = 0.01  # of a scale, that one of units is kept to: a controller follows better than that
+_MOVES = 0.005  # times its reference: what moves less stands still; a joint's gear is seldom of more than two hundred
+_AT, _NEAR, _STANDS = 0.999, 0.9, 0.02  # of the largest torque: at its limit, and near it; of the time that it stands there
+_TRAVEL, _SAMPLES = 0.01, 20  # [rad] of a reference that tells something; of a motion
+
+
+def follows_reference(s: Subject) -> list[Check]:
+    """S16: reference and measurement are of the same run. A controller lags and sags, but does not do something else.
+
+    S15: nor does it move twice as far as asked; who counts so has another scale. S07: 57 times as far are degrees. S13: nor does it
+    do what was asked of another joint.
+    """
+    log = s.good.log
+    if "q_ref" not in log or log.experiment in ("hold", "frf"):
+        return []
+    found, seen = [], []
+    for j in np.flatnonzero(spread(log["q_ref"]) > _TRAVEL).tolist():
+        pair = _both(s, j, j)
+        if pair is None:
+            continue
+        share, _ = _off(*pair)
+        seen.append(percent(share, 2))
+        if share > _FOLLOWS:
+            found.append(_elsewhere(s, j, *pair))
+    within = f" within {', '.join(seen)} of the motion" if seen else ""
+    return found or s.ok("S16", f"the position follows its reference{within}", signal="q_ref")
+
+
+def _elsewhere(s: Subject, j: int, q: Array, reference: Array) -> Check:
+    """Why joint `j` (from 0) is not where it was asked to be."""
+    share, apart = _off(q, reference)
+    limit, (scale, rest), other = _stands_at(s.good.log.tau[:s.good.end, j]), _in_scale(q, reference), _follows(s, j)
+    if limit is None and rest < _PROPORTIONAL and abs(scale) > _MOVES:
+        return _of_scale(s, j, scale, rest, share)
+    if limit is None and other is not None:
+        k, near = other
+        return s.say("S13", "reject" if share > _AWAY else "warn",
+                     f"position of joint {j + 1} follows the reference of joint {k + 1}, within {percent(near, 2)} of it, and not "
+                     f"its own: their columns are mixed up", signal="q", joint=j, gate=True,
+                     remedy=f"in the map of the import, take the position of joint {k + 1} from where that of joint {j + 1} comes "
+                     "from, or give the references the order of the joints; look at torques as well")
+    why = ("they are not of the same run, or not of the same joint" if limit is None else
+           f"its torque stands at ±{limit:.3g} {s.unit('tau', j)}, and the joint cannot follow")
+    return s.say("S16", "reject" if share > _AWAY and limit is None else "warn",
+                 f"position and reference differ by {100 * share:.0f} % of the motion ({apart:.3g} {s.unit('q', j)}): {why}",
+                 signal="q_ref", joint=j, gate=True,
+                 remedy="log both in one recorder, or leave the reference out" if limit is None else
+                 "look for what limits the drive, or drive it more gently")
+
+
+def _of_scale(s: Subject, j: int, scale: float, rest: float, share: float) -> Check:
+    """Of joint `j` (from 0), whose position is `scale` times its reference but for `rest` of it."""
+    level: Level = "reject" if share > _AWAY else "warn"
+    within = f"within {percent(rest, 2)} of it"
+    for name, other, times in (("q", "its reference", scale * _DEGREE), ("q_ref", "the position", _DEGREE / scale)):
+        if s.log.robot.joints[j].revolute and abs(times - 1.0) < _EXACT:
+            return s.say("S07", level, f"{name} of joint {j + 1} is declared in rad, and is in degrees beside {other}, {within}",
+                         signal=name, joint=j, gate=True, remedy=f'declare the unit "deg" of {name}')
+    return s.say("S15", level, f"position of joint {j + 1} is {scale:.3g} times its reference, {within}",
+                 signal="q", joint=j, gate=True,
+                 remedy="correct the gear ratio, the direction or the counts per turn of this encoder; if the position is right, "
+                 "the scale of the reference")
+
+
+def _both(s: Subject, j: int, k: int) -> tuple[Array, Array] | None:
+    """Position of joint `j` and reference of joint `k` where both are known; None of too few samples."""
+    q, reference = s.position[:s.good.end, j], s.good.log["q_ref"][:s.good.end, k]
+    ok = np.isfinite(q) & np.isfinite(reference)
+    return (q[ok], reference[ok]) if ok.sum() >= _SAMPLES else None
+
+
+def _off(q: Array, reference: Array) -> tuple[float, float]:
+    """How far a position is from a reference, as a share of the motion asked for, and standard deviation."""
+    apart = float(np.std(q - reference))
+    return apart / max(float(np.std(reference)), 1e-12), apart
+
+
+def _follows(s: Subject, j: int) -> tuple[int, float] | None:
+    """Which other joint's reference joint `j` follows best, and within what share of that; None where it follows none."""
+    travel = spread(s.good.log["q_ref"])
+    pairs = {k: pair for k in np.flatnonzero(travel > _TRAVEL).tolist() if k != j and (pair := _both(s, j, k)) is not None}
+    near = {k: _off(*pair)[0] for k, pair in pairs.items()}
+    best = min(near, key=near.__getitem__, default=None)
+    return None if best is None or near[best] > _OTHERS else (best, near[best])
+
+
+def _in_scale(q: Array, reference: Array) -> tuple[float, float]:
+    """How many times the `reference` a position (samples,) is, in least squares, and what share of it that leaves."""
+    x, y = reference - reference.mean(), q - q.mean()
+    scale = float(x @ y) / max(float(x @ x), 1e-300)
+    return scale, float(np.std(y - scale * x)) / max(float(np.std(y)), 1e-12)
+
+
+def _stands_at(tau: Array) -> float | None:
+    """The limit at which a torque (samples,) stands for a good part of the time; None where it has none."""
+    size = np.abs(tau[np.isfinite(tau)])
+    most = float(size.max(initial=0.0))
+    if most == 0.0:  # no sample, or no torque
+        return None
+    there = float(np.mean(size >= _AT * most))
+    near = float(np.mean((size >= _NEAR * most) & (size < _AT * most)))  # a wave is longer near its crest than on it
+    return most if there > max(_STANDS, near) else None
