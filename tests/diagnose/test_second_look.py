@@ -16,9 +16,10 @@ from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.diagnosis import diagnose as whole
-from pipelines.model.diagnosis import second_look
+from pipelines.model.diagnosis import second_look, told
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.pruned import NEAR_THE_FLOOR
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.twin import Twin
@@ -50,10 +51,12 @@ def diagnosed(ripple: float, waves: float, seed: int) -> Diagnosis:
         replicas=4, most=2, without=but("cogging", "encoder_eccentricity", "torque_offset"), evidence=False, limits=False))
 
 
-@pytest.mark.parametrize(("waves", "seed"), [(90.0, 4), (90.0, 5)])
+@pytest.mark.parametrize(("waves", "seed"), [(90.0, 4), pytest.param(90.0, 5, marks=pytest.mark.slow)])
 def test_a_ripple_below_slow_noise_is_named_at_a_second_look(waves: float, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """As large as the wander, but quicker. What it brings is told in newton metres of the rows as they are: on the held-out log
-    its own power, with its second harmonic, and not that of whitened rows, of which most is noise."""
+    its own power, with its second harmonic, and not that of whitened rows, of which most is noise. What sampling does to numbers
+    is told of each arm for itself, and left out here."""
+    monkeypatch.setattr(told, "unbiased", lambda found, *_: found)
     found = diagnosed(RIPPLE, waves, seed)
     assert [(one.cause, one.joint) for one in found.findings] == [("cogging", JOINT)]
     size = found.findings[0].parameters["amplitude"]
@@ -69,7 +72,7 @@ def test_a_ripple_below_slow_noise_is_named_at_a_second_look(waves: float, seed:
     np.testing.assert_allclose(found.residual_rms.validate, once.residual_rms.validate)  # of the nominal model of either
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_slow_noise_alone_is_nothing_wrong(seed: int) -> None:
     assert diagnosed(0.0, 0.0, seed).verdict == "nothing-wrong"
 
@@ -84,7 +87,7 @@ class SimpleFit:
 def looked(*causes: tuple[Any, Any]) -> Any:
     """A search that names each of these, and what it left of three joints with a floor of 0.01."""
     found = searched(left(0.1, 0.1, 0.01), *causes)
-    return SimpleNamespace(found=found, ruling=SimpleNamespace(named=range(len(causes))))
+    return SimpleNamespace(found=found, ruling=SimpleNamespace(named=range(len(causes)), reason=""))
 
 
 HUMP, DRAG, OTHER, THERE = effect("stribeck", 1), effect("quadratic_drag", 1), effect("concave_friction", 1), effect("stribeck", 2)
@@ -103,15 +106,18 @@ def test_a_second_look_is_believed_where_it_explains_as_much(first: Any, second:
     assert second_look._believed(looked(*first), looked(*second), FLOOR, np.full(3, 0.02)) is believed
 
 
-@pytest.mark.parametrize(("scatter", "believed"), [(0.02, False), (0.06, True), (0.04, False)])
-def test_a_second_look_leaves_more_by_chance_where_the_floor_itself_is_not_known_better(scatter: float, believed: bool) -> None:
-    """Slow waves at an offset's place fit the wander as well, and leave less than an arm in order; the offset a seventh more."""
+@pytest.mark.parametrize(("scatter", "elsewhere", "leaves", "believed"), [
+    (0.02, 0.02, 0.0107, False), (0.08, 0.02, 0.0107, True), (0.02, 0.5, 0.0107, False), (0.5, 0.5, 0.0117, False)])
+def test_a_second_look_leaves_more_by_as_much_as_one_run_of_an_arm_in_order_may(scatter: float, elsewhere: float, leaves: float,
+                                                                                believed: bool) -> None:
+    """Slow waves at an offset's place fit the wander as well, and leave less than an arm in order; the offset a seventh more. What
+    scatters at another joint is no matter, and a third of a floor is too much for chance."""
     waves, offset = effect("cogging", 1), effect("torque_offset", 1)
-    first, second = looked((waves, left(0.0093, 0.01, 0.01))), looked((offset, left(0.0107, 0.01, 0.01)))
-    assert second_look._believed(first, second, FLOOR, np.array([scatter, scatter, scatter])) is believed
+    first, second = looked((waves, left(0.0093, 0.01, 0.01))), looked((offset, left(leaves, 0.01, 0.01)))
+    assert second_look._believed(first, second, FLOOR, np.array([scatter, elsewhere, elsewhere])) is believed
 
 
-def test_how_well_a_floor_is_known_is_told_by_its_replicas() -> None:
+def test_what_one_run_may_leave_by_chance_is_told_by_the_replicas() -> None:
     """White noise of n rows: its power scatters by sqrt(2/n)."""
     noise: Any = None
     fits: list[Any] = [SimpleFit(rms) for rms in np.sqrt(np.random.default_rng(5).chisquare(200.0, (400, 2)) / 200.0)]
@@ -135,3 +141,13 @@ def test_what_is_unknown_stays_so_and_what_happened_once_is_all(verdict: str, na
     done.ruling.verdict = verdict
     case: Any = SimpleNamespace(families=(SimpleNamespace(cause="cogging", event=True),))
     assert second_look.looked_again(done, case, None, None, 4, FLOOR) is done  # type: ignore[arg-type]
+
+
+def test_what_stands_a_little_above_the_floor_is_looked_at_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Something weak under slow noise may have its name in white rows, whatever first had a part of it."""
+    monkeypatch.setattr(second_look, "_in_white", lambda *_: pytest.fail("looked again"))
+    monkeypatch.setattr(second_look, "_evenly", lambda *_: True)
+    done = looked()
+    done.ruling.verdict, done.ruling.reason = "unknown", NEAR_THE_FLOOR
+    with pytest.raises(pytest.fail.Exception, match="looked again"):
+        second_look.looked_again(done, SimpleNamespace(families=()), None, None, 4, FLOOR)  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -68,8 +69,8 @@ def test_logs_that_no_controller_is_known_of_leave_nothing() -> None:
     assert smoothed_away(done.model.arm, np.zeros(3), done.data, prepared, 0) is None
 
 
-@pytest.mark.parametrize("name", ["q", "tau"])
-@pytest.mark.parametrize("missing", [3, 20, 60, 200, 600])
+@pytest.mark.parametrize(("name", "missing"), [("q", 3), ("tau", 60), ("q", 600), *(
+    pytest.param(name, missing, marks=pytest.mark.slow) for name, missing in product(["q", "tau"], [20, 200]))])
 def test_a_log_with_a_hole_is_run_with_the_hole(name: str, missing: int) -> None:
     """What it leaves there is in the log's own rows, and as large as beside none."""
     def spoiled(log: ExperimentLog) -> ExperimentLog:

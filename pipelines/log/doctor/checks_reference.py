@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.errors import Check, Level
+from pipelines.errors import Check
 from pipelines.log.doctor.checks_subject import Subject, spread
 from pipelines.log.experiment import Array
 from pipelines.log.limits import percent
@@ -15,7 +15,7 @@ _DEGREE = np.pi / 180.0
 _FOLLOWS, _AWAY = 0.5, 0.8  # of a motion: a controller lags and sags by no more; a log that is farther off is refused
 _OTHERS = 0.2  # of a motion: a joint that keeps so near to the reference of another follows that
 _PROPORTIONAL = 0.05  # of a motion: what is left of it beside a multiple of its reference, where it is that
-_EXACT = 0.01  # of a scale, that one of units is kept to: a controller follows better than that
+_UNIT = 0.05  # of a scale, that one of units is kept to: a controller that lags keeps a little less of the motion
 _MOVES = 0.005  # times its reference: what moves less stands still; a joint's gear is seldom of more than two hundred
 _AT, _NEAR, _STANDS = 0.999, 0.9, 0.02  # of the largest torque: at its limit, and near it; of the time that it stands there
 _TRAVEL, _SAMPLES = 0.01, 20  # [rad] of a reference that tells something; of a motion
@@ -24,8 +24,8 @@ _TRAVEL, _SAMPLES = 0.01, 20  # [rad] of a reference that tells something; of a 
 def follows_reference(s: Subject) -> list[Check]:
     """S16: reference and measurement are of the same run. A controller lags and sags, but does not do something else.
 
-    S15: nor does it move twice as far as asked; who counts so has another scale. S07: 57 times as far are degrees. S13: nor does it
-    do what was asked of another joint.
+    S13: nor what was asked of another joint. S15: nor does it move twice as far as asked; who counts so has another scale, and who
+    counts 57 times as far counts degrees.
     """
     log = s.good.log
     if "q_ref" not in log or log.experiment in ("hold", "frf"):
@@ -47,15 +47,16 @@ def _elsewhere(s: Subject, j: int, q: Array, reference: Array) -> Check:
     """Why joint `j` (from 0) is not where it was asked to be."""
     share, apart = _off(q, reference)
     limit, (scale, rest), other = _stands_at(s.good.log.tau[:s.good.end, j]), _in_scale(q, reference), _follows(s, j)
-    if limit is None and rest < _PROPORTIONAL and abs(scale) > _MOVES:
-        return _of_scale(s, j, scale, rest, share)
-    if limit is None and other is not None:
+    in_scale = rest < _PROPORTIONAL and abs(scale) > _MOVES
+    if limit is None and other is not None and not (in_scale and _alone(s, other[0])):
         k, near = other
         return s.say("S13", "reject" if share > _AWAY else "warn",
                      f"position of joint {j + 1} follows the reference of joint {k + 1}, within {percent(near, 2)} of it, and not "
                      f"its own: their columns are mixed up", signal="q", joint=j, gate=True,
                      remedy=f"in the map of the import, take the position of joint {k + 1} from where that of joint {j + 1} comes "
                      "from, or give the references the order of the joints; look at torques as well")
+    if limit is None and in_scale:
+        return _of_scale(s, j, scale, rest, share)
     why = ("they are not of the same run, or not of the same joint" if limit is None else
            f"its torque stands at ±{limit:.3g} {s.unit('tau', j)}, and the joint cannot follow")
     return s.say("S16", "reject" if share > _AWAY and limit is None else "warn",
@@ -67,16 +68,14 @@ def _elsewhere(s: Subject, j: int, q: Array, reference: Array) -> Check:
 
 def _of_scale(s: Subject, j: int, scale: float, rest: float, share: float) -> Check:
     """Of joint `j` (from 0), whose position is `scale` times its reference but for `rest` of it."""
-    level: Level = "reject" if share > _AWAY else "warn"
-    within = f"within {percent(rest, 2)} of it"
-    for name, other, times in (("q", "its reference", scale * _DEGREE), ("q_ref", "the position", _DEGREE / scale)):
-        if s.log.robot.joints[j].revolute and abs(times - 1.0) < _EXACT:
-            return s.say("S07", level, f"{name} of joint {j + 1} is declared in rad, and is in degrees beside {other}, {within}",
-                         signal=name, joint=j, gate=True, remedy=f'declare the unit "deg" of {name}')
-    return s.say("S15", level, f"position of joint {j + 1} is {scale:.3g} times its reference, {within}",
-                 signal="q", joint=j, gate=True,
-                 remedy="correct the gear ratio, the direction or the counts per turn of this encoder; if the position is right, "
-                 "the scale of the reference")
+    said = f"position of joint {j + 1} is {scale:.3g} times its reference, within {percent(rest, 2)} of it"
+    remedy = ("correct the gear ratio, the direction or the counts per turn of this encoder; if the position is right, the scale "
+              "of the reference")
+    for large, small, times in (("q", "q_ref", scale * _DEGREE), ("q_ref", "q", _DEGREE / scale)):
+        if s.log.robot.joints[j].revolute and abs(times - 1.0) < _UNIT:
+            said += f": {large} looks like degrees, declared in rad"
+            remedy = f'declare the unit "deg" of {large}; or, if {small} was converted to rad twice, undo that'
+    return s.say("S15", "reject" if share > _AWAY else "warn", said, signal="q", joint=j, gate=True, remedy=remedy)
 
 
 def _both(s: Subject, j: int, k: int) -> tuple[Array, Array] | None:
@@ -99,6 +98,12 @@ def _follows(s: Subject, j: int) -> tuple[int, float] | None:
     near = {k: _off(*pair)[0] for k, pair in pairs.items()}
     best = min(near, key=near.__getitem__, default=None)
     return None if best is None or near[best] > _OTHERS else (best, near[best])
+
+
+def _alone(s: Subject, k: int) -> bool:
+    """Whether joint `k` does what was asked of it, so that it is not mixed up with another whose reference is like its own."""
+    pair = _both(s, k, k)
+    return pair is not None and _off(*pair)[0] <= _OTHERS
 
 
 def _in_scale(q: Array, reference: Array) -> tuple[float, float]:

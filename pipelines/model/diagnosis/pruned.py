@@ -29,7 +29,6 @@ from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.straying import simulated_steps, strays
 from pipelines.model.diagnosis.verdict import (
     REST_UNKNOWN,
-    TOO_LITTLE,
     Ruling,
     at_floor,
     explained,
@@ -41,7 +40,7 @@ from pipelines.model.diagnosis.verdict import (
 from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Settled", "at_odds", "settled", "vague"]
+__all__ = ["NEAR_THE_FLOOR", "Settled", "at_odds", "settled", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
@@ -56,6 +55,7 @@ _SHAPE = "it only mends the shape of what was found before it at the joint, or s
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
 _NO_SIZE = "its size is within five standard deviations of none"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
+NEAR_THE_FLOOR = "what can be named explains less than half of what stands above the floor, which is not much, but no noise"
 _STOOD = "what was found after it at the joint leaves less without it"
 
 
@@ -118,8 +118,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     alone = _elsewhere(without_steps(plain, floor, known), plain, case, floor, known)
     reason = next((why for why in elsewhere.values() if why), f"{alone.reason}: {next(iter(doubts.values()), '')}")
     reason = reason if alone.verdict == "unknown" else alone.reason
-    if few and alone.verdict == "nothing-wrong":
-        alone, reason = replace(alone, verdict="unknown"), TOO_LITTLE
+    if few and alone.verdict == "nothing-wrong" and case.changed is None:  # of what has changed, other motion may leave a little
+        alone, reason = replace(alone, verdict="unknown"), next((why for why in elsewhere.values() if why), NEAR_THE_FLOOR)
     return Settled(replace(plain, final=plain.nominal), replace(alone, reason=reason, doubts=doubts), ())
 
 

@@ -29,7 +29,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.own_motion import following, put_right
-from pipelines.model.diagnosis.pruned import Settled, settled
+from pipelines.model.diagnosis.pruned import NEAR_THE_FLOOR, Settled, settled
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step, last_step, search
 from pipelines.model.diagnosis.thresholds import Thresholds
@@ -44,7 +44,7 @@ Name = tuple[str, int | None]  # a cause and its joint
 _LITTLE = 1e-2  # of what stands above the floor: what only the first look has found explains no more, where it is not believed
 _LEAST = 1e-3  # of the same: what only the second look has found beside others explains at least
 _MORE, _FEW = 1.1, 0.1  # times what the first look leaves above the floor, and floors: the second one leaves no more
-_CHANCE = 2.0  # standard deviations of the floor, if that is more
+_CHANCE, _MANY = 2.0, 0.3  # standard deviations of what one run of an arm in order leaves, if that is more; no more than so much
 _ALIKE = 1.02  # times the shortest spacing of rows, that the longest is
 _USELESS = 1e-3  # of the squared residual of a joint: of whitened rows most is noise that no model can be below
 
@@ -59,7 +59,8 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
     once = {family.cause for family in case.families if family.event}
     named = [best.effect for k in done.ruling.named if (best := done.found.steps[k].best) is not None]
     enough = any(effect.name in once or effect.evidence == "reversals" for effect in named)
-    if done.ruling.verdict == "unknown" or enough or not _evenly(case, twin):
+    far = done.ruling.verdict == "unknown" and done.ruling.reason != NEAR_THE_FLOOR
+    if far or enough or not _evenly(case, twin):
         return done
     there, whitened, usual = _in_white(case, twin)
     found = search(there, most)
@@ -78,8 +79,8 @@ def _believed(first: Settled, second: Settled, floor: Array, scatter: Array) -> 
     """Whether the second look, told of rows as they are, takes the place of the first.
 
     Args:
-        scatter: (joints,) relative standard deviation of what an arm in order leaves, of its power: where noise is slow, a wrong
-            cause may take the luck of one log in, and stand below the floor.
+        scatter: (joints,) relative standard deviation of the power that an arm in order leaves: where noise is slow, a wrong cause
+            may take in what one log has of it by chance, and stand below the floor.
     """
     before, now = _names(first), _names(second)
     if now < before:
@@ -87,7 +88,9 @@ def _believed(first: Settled, second: Settled, floor: Array, scatter: Array) -> 
     if before and before < now and _share(second, now - before, floor) < _LEAST:
         return False
     left = [excess(one.found.final.rms, floor) for one in (first, second)]
-    few = max(_FEW, _CHANCE * float(np.linalg.norm(scatter)))
+    named = {joint for _, joint in before | now}
+    there = scatter if None in named else scatter[[joint - 1 for joint in named if joint]]
+    few = float(np.clip(_CHANCE * np.linalg.norm(there), _FEW, _MANY))
     return _joints(first) <= _joints(second) and left[1] <= _MORE * left[0] + few
 
 

@@ -97,7 +97,8 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: Floored
     if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:
         return done, responded, own  # what motion shows that the reference logs do not have, they may have had as well
     plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
-    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved)
+    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved,
+                               bool(responded.parts))
     return believed, responded if believed is done else judged(held, believed.found.final), own
 
 

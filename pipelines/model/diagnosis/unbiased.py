@@ -12,8 +12,8 @@ Gouriéroux, Monfort, Renault 1993, to first order):
 
 Several runs with the noise of the amplifiers are averaged: without it, each reversal falls between samples in the one way that may
 not have been the logs'. Logs that no controller is known of, or that come to other rows, count as if the arm left nothing of them.
-The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction. It is the one with
-all that was found, which is nearest to that of the logs; of the models that have less, the same is taken out.
+The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction. That is told best
+beside all that was found; of the models that have less of it, the same is taken out.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.refit import Refined, moved_by
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.twin import replayable, replica
-from pipelines.model.simulation import Experiment, Noise, Simulated, choose_steps, simulate_together
+from pipelines.model.simulation import Experiment, Noise, Simulated, choose_steps, runs_alone, simulate_together
 
 __all__ = ["smoothed_away", "unbiased"]
 
@@ -90,26 +90,30 @@ def smoothed_away(arm: Arm, noise: Array, data: Data, prepared: Prepared, seed: 
     if not places:
         return None
 
-    def of_run(piece: tuple[int, int]) -> Array:
-        place, k = piece
+    def of_runs(piece: tuple[int, tuple[int, ...]]) -> Array:
+        place, seeds = piece
         log = logs[place]
-        done, = simulate_together(arm, [Experiment.of_log(log)], drawn, (seed + k,), steps)
+        done, = simulate_together(arm, [experiments[place]], drawn, seeds, steps)
         holes = replace(done, q=_as_missing(done.q, log.q), tau=_as_missing(done.tau, log.tau))
-        return _left(arm, holes, data, prepared, place)
+        return np.asarray(np.sum([_left(arm, holes, k, data, prepared, place) for k in range(len(seeds))], axis=0))
 
-    pieces = [(place, k) for place in sorted(places, key=lambda place: -logs[place].n_samples) for k in range(_RUNS)]
+    seeds = tuple(range(seed, seed + _RUNS))
+    mean = [np.zeros(one.rows * one.n_joints) for one in data.logs]
     try:
-        steps = choose_steps(arm, [Experiment.of_log(logs[place]) for place in places], drawn)
-        every = dict(zip(pieces, shared_out(of_run, pieces), strict=True))
+        experiments = {place: Experiment.of_log(logs[place]) for place in places}
+        steps = choose_steps(arm, list(experiments.values()), drawn)
+        pieces = [(place, some) for place in sorted(places, key=lambda place: -logs[place].n_samples)
+                  for some in ([(one,) for one in seeds] if runs_alone(arm, experiments[place]) else [seeds])]
+        for (place, _), left in zip(pieces, shared_out(of_runs, pieces), strict=True):
+            mean[place] += left / _RUNS
     except InputRejected:  # D15, D17, T04
         return None
-    return np.concatenate([np.mean([every[place, k] for k in range(_RUNS)], axis=0) if place in places else
-                           np.zeros(one.rows * one.n_joints) for place, one in enumerate(data.logs)])
+    return np.concatenate(mean)
 
 
-def _left(arm: Arm, done: Simulated, data: Data, prepared: Prepared, place: int) -> Array:
+def _left(arm: Arm, done: Simulated, k: int, data: Data, prepared: Prepared, place: int) -> Array:
     """(rows,) of one log and one run; zero where it makes other rows, though it lacks what the log lacks."""
-    one, copy = data.logs[place], replica(prepared.motions[place], done, 0, prepared.recipe)
+    one, copy = data.logs[place], replica(prepared.motions[place], done, k, prepared.recipe)
     own = gather((copy,), one.equations.columns, prepared.recipe, [one.equations.rows], place)
     if not (len(own.y) == one.weighed.size and np.array_equal(own.logs[0].t, one.t)):
         return np.zeros(one.weighed.size)

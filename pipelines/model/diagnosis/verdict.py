@@ -16,8 +16,8 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["REST_UNKNOWN", "TOO_LITTLE", "Ruling", "at_floor", "excess", "explained", "held_out_high", "rule", "seen_in",
-           "too_little", "without_steps"]
+__all__ = ["REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "rule", "seen_in", "too_little",
+           "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -40,7 +40,6 @@ _MOST_OF_IT, _TIMES = 0.8, 15.0
 _TRIFLE = "it takes away less than what the law of a cause found before it may leave"
 REST_UNKNOWN = "most of what stands above the noise where it is seen has no name, and beside that this one is not sure"
 _MISFIT = "beside a gap, where nobody knows how the link lay in it at first, nothing that happened once is told from it"
-TOO_LITTLE = "the best explanation leaves more than half of what stands above the floor"
 _LITTLE = "it explains less than half of what stands above the floor, which is so little that it may be the floor"
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
              "testable without a floor: reference logs, or logs whose controller is known and a twin")
@@ -121,7 +120,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
     if too_little(found.nominal.rms, found.final.rms, floor) and not (near and mended):
         if near:  # without that explanation nothing would be wrong
             return Ruling("nothing-wrong", (), "", dict.fromkeys(range(len(accepted)), _LITTLE))
-        return Ruling("unknown", (), TOO_LITTLE)
+        return Ruling("unknown", (), "the best explanation leaves more than half of what stands above the floor")
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")

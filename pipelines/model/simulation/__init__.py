@@ -10,17 +10,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.accuracy import Step, choose_step
 from pipelines.model.simulation.experiment import Experiment
+from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.plant import Plant
 from pipelines.model.simulation.replicas import Noise, Simulated, run, run_together
 from pipelines.model.simulation.windows import Windows, simulate_windows
 
-__all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "choose_steps", "run", "simulate",
-           "simulate_together", "simulate_windows"]
+__all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "choose_steps", "run",
+           "runs_alone", "simulate", "simulate_together", "simulate_windows"]
 
 
 def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds: Iterable[int] = (0,), p: Array | None = None,
@@ -45,14 +47,23 @@ def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds
 
 
 def choose_steps(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None) -> dict[float, Step]:
-    """Those of the integrator for each sample time, as `simulate_together` takes them, chosen in the first experiment that has it:
-    what suffices for an arm and its controller in one experiment suffices in the next.
+    """Those of the integrator for each sample time, as `simulate_together` takes them: fine enough for all of the experiments.
 
     Raises:
         InputRejected: as `choose_step`.
     """
-    plant, first = Plant.of(arm), {one.sample_time: one for one in reversed(experiments)}
-    return {time: choose_step(plant, one, noise) for time, one in first.items()}
+    plant, found = Plant.of(arm), dict[float, Step]()
+    for one in experiments:
+        step = choose_step(plant, one, noise)
+        before = found.get(one.sample_time)
+        if before is None or (step.per_sample, step.exact) > (before.per_sample, before.exact):
+            found[one.sample_time] = replace(step, exact=step.exact or (before is not None and before.exact))
+    return found
+
+
+def runs_alone(arm: Arm, experiment: Experiment) -> bool:
+    """Whether each replica is simulated by itself, so that several at once save nothing."""
+    return OneLoop.fits(Plant.of(arm), experiment)
 
 
 def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise | None = None, seeds: Iterable[int] = (0,),

@@ -69,13 +69,26 @@ def test_joints_that_follow_the_references_of_each_other_are_mixed_up(name: str)
     assert len(mixed) == 2
 
 
-@pytest.mark.row("S07")
-@pytest.mark.parametrize("scale", [np.pi / 180.0, 180.0 / np.pi])
-def test_a_reference_in_the_other_unit_of_angle_is_no_other_gear(scale: float) -> None:
-    """A reference in degrees, and one that was divided by 57 though it was in rad already."""
+def test_two_references_that_are_alike_but_for_their_size_are_mixed_up_too() -> None:
+    """Half of the motion at one joint and all of it at the other, swapped: no gear of two is to blame."""
     log = good_log()
-    said = said_of(with_signal(log, q_ref=log.q / scale + 1e-4))
-    assert {c.code for c in said} == {"RRID-S07"}
+    reference = log.q.copy()
+    reference[:, 1] = 0.5 * reference[:, 2]
+    position = reference[:, [0, 2, 1]] + 1e-4
+    assert said_of(with_signal(log, q=position, q_ref=reference))[0].code == "RRID-S13"
+    doubled = reference * [1.0, 2.0, 1.0] + [0.0, 1e-4, 0.0]  # where joint 3 should be, and is
+    assert [c.code for c in said_of(with_signal(log, q=doubled, q_ref=reference))] == ["RRID-S15"]
+
+
+@pytest.mark.row("S15")
+@pytest.mark.parametrize("lag", [1.0, 0.97])
+@pytest.mark.parametrize("scale", [np.pi / 180.0, 180.0 / np.pi])
+def test_a_reference_in_the_other_unit_of_angle_is_no_other_gear(scale: float, lag: float) -> None:
+    """A reference in degrees, and one that was divided by 57 though it was in rad already; trusting units does not hide it."""
+    log = good_log()
+    said = said_of(with_signal(log, q_ref=log.q / (lag * scale)))
+    assert {c.code for c in said} == {"RRID-S15"}
     assert len(said) == log.n_joints
-    name = "q_ref" if scale < 1.0 else "q"
-    assert all(c.message.startswith(f"{name} of joint ") and f'"deg" of {name}' in c.remedy for c in said)
+    large, small = ("q_ref", "q") if scale < 1.0 else ("q", "q_ref")
+    assert all(c.message.endswith(f"{large} looks like degrees, declared in rad") and f'"deg" of {large}' in c.remedy and
+               f"if {small} was converted to rad twice" in c.remedy for c in said)

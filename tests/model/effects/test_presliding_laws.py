@@ -103,9 +103,10 @@ def fitted(law: Law) -> tuple[Presliding, float]:
 
 @pytest.mark.parametrize(("law", "inner", "numbers", "share"), [
     (integrated(lambda z, s: (1.0 - s * z) / DISTANCE), 0.0, {"distance": DISTANCE}, 0.01),
-    (integrated(lambda z, s: (1.0 - s * z) / DISTANCE, damping=0.005), 0.0, {"distance": DISTANCE}, 0.01),
+    pytest.param(integrated(lambda z, s: (1.0 - s * z) / DISTANCE, damping=0.005), 0.0, {"distance": DISTANCE}, 0.01,
+                 marks=pytest.mark.slow),
     (integrated(lambda z, s: max(1.0 - s * z, 0.0) ** 0.5 / DISTANCE), 0.0, {}, 0.02),
-    (integrated(dupont), 0.0, {"distance": DISTANCE}, 0.02),
+    pytest.param(integrated(dupont), 0.0, {"distance": DISTANCE}, 0.02, marks=pytest.mark.slow),
     (maxwell_slip, 1.0, {}, 0.03),
     (breaking_away, 0.0, {"distance": DISTANCE, "breakaway": 0.5, "breakaway_speed": 0.1}, 0.02),
 ], ids=["dahl", "lugre", "dahl of exponent one half", "dupont", "maxwell slip", "lugre with breakaway"])
