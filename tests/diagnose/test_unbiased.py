@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import Refined, moved_by, refine
+from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.unbiased import smoothed_away
 
@@ -62,6 +65,25 @@ def test_the_wrist_is_fitted_too_sharp_and_put_right(errors: tuple[Array, Array]
 def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> None:
     before, after = (np.sqrt(np.mean(one**2)) for one in errors)
     assert after < 0.7 * before
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_every_model_of_a_search_is_moved_by_what_the_arm_that_was_found_leaves(known: bool) -> None:
+    """The nominal one, that of the only step, before and after, and the final one; none where no log can be run."""
+    machine = draw_machine(1501, "fault")
+    done, prepared = fitted(machine, 0, lambda log: log if known else replace(log, controller=None))
+    other = refine(done.model, done.data, 2.0 * done.weight)
+    nothing: Any = Step(other, None, (), (), None, ())  # type: ignore[arg-type]
+    case: Any = SimpleNamespace(beside=())
+    found = unbiased.unbiased(Found(other, (nothing,), done), prepared, case, 0)
+    if not known:
+        assert (found.nominal, found.final) == (other, done)
+        return
+    artefact = smoothed_away(done.model.nominal, unbiased._amplifiers(done), done.data, prepared, 0)
+    assert artefact is not None
+    for there, before in ((found.nominal, other), (found.final, done), (found.steps[0].before, other)):
+        np.testing.assert_allclose(sharpness(there), sharpness(moved_by(before, -artefact)), rtol=1e-12)
+        assert (sharpness(there) != sharpness(before)).any()
 
 
 def test_logs_that_no_controller_is_known_of_leave_nothing() -> None:

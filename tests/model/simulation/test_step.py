@@ -11,7 +11,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.simulation import Noise, Plant, choose_step, run
+from pipelines.model.simulation import Noise, Plant, choose_step, choose_steps, run, runs_alone, simulate, simulate_together
 from tests.model.simulation.arms import KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Friction, Loop
 
@@ -52,6 +52,30 @@ def test_the_chosen_step_costs_a_tenth_of_noise_at_most(sharpness: float | None)
     error = np.sqrt(np.mean((run(plant, asked, step.per_sample).true_q[0] - exact) ** 2, axis=0))
     assert (error <= 0.1 * noise).all()
     assert step.per_sample <= (4 if sharpness != 2000.0 else 16)
+
+
+def test_a_step_for_several_experiments_is_fine_enough_for_each() -> None:
+    """A crawl takes fewer steps than a wave that reverses; of another sample time it has a step of its own."""
+    arm, _ = dry(2000.0)
+    quick, crawl = experiment(PD, 600), experiment(PD, 600)
+    crawl = replace(crawl, q_ref=crawl.q_ref[0] + 1e-3 * (crawl.q_ref - crawl.q_ref[0]), dq_ref=1e-3 * crawl.dq_ref)
+    each = [choose_step(Plant.of(arm), one, NOISE).per_sample for one in (quick, crawl)]
+    assert each[0] != each[1]
+    for several in ((quick, crawl), (crawl, quick)):
+        assert {time: step.per_sample for time, step in choose_steps(arm, several, NOISE).items()} == {TS: max(each)}
+    slow = replace(quick, sample_time=2.0 * TS)
+    assert set(choose_steps(arm, (quick, slow), NOISE)) == {TS, 2.0 * TS}
+
+
+def test_a_replica_that_runs_alone_does_the_same_among_others() -> None:
+    """So that runs may be shared out one by one, or as they are where several cost no more than one."""
+    arm, asked = rrr().arm, experiment(PD, 300)
+    assert runs_alone(arm, asked)
+    assert not runs_alone(arm, replace(asked, controller=Controller("computed-torque", KP, KD, velocity="backward-difference")))
+    steps = choose_steps(arm, (asked,), NOISE)
+    together, = simulate_together(arm, (asked,), NOISE, (5, 6, 7), steps)
+    for k, seed in enumerate((5, 6, 7)):
+        np.testing.assert_array_equal(simulate(arm, asked, NOISE, (seed,), step=steps[TS]).q[0], together.q[k])
 
 
 def test_the_step_is_not_wasted() -> None:
