@@ -18,6 +18,7 @@ from pipelines.model.diagnosis.oscillating import oscillation
 from pipelines.model.diagnosis.own_motion import following, lasting, standing_out
 from pipelines.model.diagnosis.pruned import Settled
 from pipelines.model.diagnosis.refit import Refined
+from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
 
@@ -27,9 +28,9 @@ __all__ = ["of_replicas", "unlike_held_out", "unlike_motion", "unlike_noise", "u
 # wrong one 16; of 114 arms in order none left more than 1.9. Of what the nominal model leaves there a wrong name leaves more than a
 # tenth: another such spring left 17 floors of 298.
 _WRONG, _STRANGE, _TENTH = 8.0, 2.5, 0.1
-# Times the floor, that may be the floor; share of what stands above it at the joint of a cause that it explains at least. Of 150
-# right causes that left more the least explained .84, of three wrong ones the most .39.
-_CLEAR, _HALF = 1.2, 0.5
+# Times the floor: more surely stands above it, and so little may be the floor; share of what stands above it at the joint of a
+# cause that it explains at least. Of 180 right causes that left more the least explained .84, wrong ones .32 and .39.
+_SURELY, _CLEAR, _HALF = 1.4, 1.2, 0.5
 _MOST_LEFT = "what explains the fitted logs leaves more than half of what stands above the floor at its joint in those held out"
 # Times the spectrum beside it, and times the most of any replica, that a line of an oscillation has at least. Of 21 arms in order,
 # twelve of them with drives that wander, none had more than 3; drives that hunt 50 to 1100.
@@ -66,13 +67,21 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, mov
 
 
 def _shown(done: Settled, rms: Array, floor: Array, nominal: Array) -> bool:
-    """Whether one of the causes that are named, if any lasts, explains half of what stands above the floor of the held-out logs at
-    its joint, as all of them do of the fitted ones; or leaves what may be the floor."""
-    named = [best for k in done.ruling.named if (best := done.found.steps[k].best) is not None and best.log is None]
-    joints = [int(np.argmax(nominal / floor)) if one.effect.joint is None else one.effect.joint - 1 for one in named]
+    """Whether one of the causes that are named, if any lasts, explains half of what surely stands above the floor of the held-out
+    logs at its joint, as all of them do of the fitted ones; or leaves what may be the floor."""
+    named = [step for k in done.ruling.named if (step := done.found.steps[k]).best is not None and step.best.log is None]
+    joints = [_where(step, floor) for step in named]
     above = np.square(nominal / floor) - 1.0
-    return not joints or any(min(rms[j], nominal[j]) <= _CLEAR * floor[j] or
+    return not joints or any(nominal[j] <= _SURELY * floor[j] or rms[j] <= _CLEAR * floor[j] or
                              above[j] + 1.0 - (rms[j] / floor[j]) ** 2 >= _HALF * above[j] for j in joints)
+
+
+def _where(step: Step, floor: Array) -> int:
+    """The joint (from 0) at which a cause acts; of one of the whole arm, where it takes most."""
+    if step.best is None or step.best.effect.joint is None:
+        after = step.before.rms if step.best is None else step.best.done.rms
+        return int(np.argmax((np.square(step.before.rms) - np.square(after)) / np.square(floor)))
+    return step.best.effect.joint - 1
 
 
 def _not_believed(done: Settled, reason: str) -> Settled:
