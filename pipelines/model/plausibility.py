@@ -6,7 +6,8 @@ No parameter of the arm has to be known. Each joint's torque is explained by its
 (`row_fit`); then other explanations are tried on the same rows: the torque of another joint, the other sign, another
 time. An alternative is reported only where the log as it stands is explained badly **and** the alternative explains it
 well: an arm with friction the model lacks, with a worn gear or with a late drive is badly explained too, but nothing
-explains it better, and what is wrong with it is for `diagnose` to say.
+explains it better, and what is wrong with it is for `diagnose` to say. Where the log describes its controller, that is asked
+first: no model of an arm is needed then.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from pipelines.errors import Check
 from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
 from pipelines.model.clock_offset import clock_offset
+from pipelines.model.commanded import against_command
 from pipelines.model.evidence import Evidence
 from pipelines.model.mix_ups import encoder_scale, position_columns, torque_columns
 from pipelines.model.rigid.body import Array
@@ -40,12 +42,14 @@ _CONDITION = 1e4  # of unit columns: what 0.01 % of noise in the motion makes of
 
 
 def plausibility(subject: Subject) -> tuple[Check, ...]:
-    """S13, S14, S15, T06 and D09 of one log; nothing where it moves too little or too short to tell."""
+    """S10, S13, S14, S15, T06 and D09 of one log; nothing where it moves too little or too short to tell."""
     return tuple(found for found in plausibility_findings(subject) if isinstance(found, Check))
 
 
 def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
     """The same, and which of these questions the log leaves open, and why."""
+    if told := against_command(subject):
+        return told
     evidence = _evidence(subject)
     if not isinstance(evidence, Evidence):
         return evidence
@@ -54,7 +58,9 @@ def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
 
 
 def mismatches(subject: Subject) -> tuple[Check, ...]:
-    """What S13, S14, S15 and T06 have against one log, for a stage that fits it: checks other than "ok"."""
+    """What S10, S13, S14, S15 and T06 have against one log, for a stage that fits it: checks other than "ok"."""
+    if told := against_command(subject):
+        return told
     evidence = _evidence(subject)
     if not isinstance(evidence, Evidence):
         return ()

@@ -43,6 +43,8 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
     declared = s.unit("tau", j)
     others = bool(((peak >= _SMALL) & (peak <= 1.0)).any())  # in a smaller unit every joint's is too large, unless it hardly moves
     guesses, remedies = [f"this looks like {factors}"] if fitting else [], []
+    if not others:
+        guesses.append("motor current in A was taken for it")
     if fitting and not others:
         remedies.append(f"write so to the file: {_to_declare(s, 'tau', fitting[0])}")
     if others:
@@ -50,7 +52,9 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
         remedies += [f"if of joint {j + 1} alone, divide its column of tau by that factor"] if fitting else []
         remedies += [f"if of all joints, {_to_declare(s, 'tau', fitting[0])}"] if fitting else []
         remedies.append("leave out the stretches in which the joint does not follow")
-    guess = ", or ".join(guesses) or "unit or limit is wrong"
+    else:
+        remedies.append("if it is current, import the recording anew with the torque constants")
+    guess = ", or ".join(guesses)
     told = "; or ".join((*remedies, "correct the torque limits of the robot's description (--robot)"))
     return [s.say("S05", "warn" if s.log.torque == "measured" else "reject",
                   f"tau is declared in {declared}, but a tenth of joint {j + 1}'s samples are beyond "

@@ -14,6 +14,7 @@ from pipelines.log.derive import recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.shared_work import shared_out
+from pipelines.model.commanded import against_command
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.plausibility import mismatches
 
@@ -40,7 +41,9 @@ def _said(log: ExperimentLog, allow_mismatch: bool) -> tuple[Check, ...] | Check
     subject = Subject(recording(log))
     checks = [check for check in check_log(subject) if check.level != "ok"]
     if reject := next((check for check in checks if check.level == "reject"), None):
-        return reject
+        # A controller says by how much a torque is too large, its limits only that it is.
+        exact = against_command(subject) if reject.code == "RRID-S05" else ()
+        return next((check for check in exact if check.code == "RRID-S10"), reject)
     against = mismatches(subject)
     if not allow_mismatch and (gate := next((check for check in against if check.gate), None)):
         return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch")

@@ -1,0 +1,114 @@
+"""What a described controller commanded is known: a torque of another unit, sign or clock differs from it, a fault does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from pipelines.bench import experiments
+from pipelines.bench.faults import make
+from pipelines.bench.machine import draw_machine
+from pipelines.bench.session import record
+from pipelines.errors import InputRejected
+from pipelines.log.doctor.checks_subject import Subject
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.commanded import against_command, commanded
+from pipelines.model.diagnosis.gates import examined
+from tests.healthy import with_signal
+
+
+@lru_cache
+def recorded(fault: str = "", joint: int = 2) -> ExperimentLog:
+    """Four seconds of excitation of a machine of the test bench, whose controller is other code."""
+    machine = draw_machine(7, "fault")
+    peak = (40.0, 20.0, 5.0)
+    faults = (make(fault, machine, joint, seed=4, strength=1.0, peak_torque=peak, duration=4.0),) if fault else ()
+    log, = record(machine, faults, [experiments.excitation(machine, 3, 4.0, 1)], 3)
+    return log
+
+
+def with_torque(joint: int, change: Array | float, late: int = 0) -> ExperimentLog:
+    """The torque of one joint (from 1) times `change`, so many samples later."""
+    log = recorded()
+    tau = log.tau.copy()
+    tau[:, joint - 1] = np.interp(np.arange(len(tau)) - late, np.arange(len(tau)), change * tau[:, joint - 1])
+    return with_signal(log, tau=tau)
+
+
+def said(log: ExperimentLog) -> list[tuple[str, str]]:
+    return [(check.code.removeprefix("RRID-"), check.message) for check in against_command(Subject(log))]
+
+
+def test_what_was_commanded_is_what_was_logged() -> None:
+    """To a fraction of a step of the torque, of three joints with a rounded encoder and command."""
+    log = recorded()
+    assert log.controller is not None
+    assert log.controller.torque_resolution is not None
+    wanted = commanded(log)
+    assert wanted is not None
+    assert (np.abs(wanted - log.tau[:len(wanted)]) < 0.5 * log.controller.torque_resolution).all()
+
+
+@pytest.mark.parametrize("fault", ["", "torque_gain", "torque_lag", "time_delay", "drive_lag", "torque_saturation",
+                                   "encoder_eccentricity", "encoder_crosstalk", "torque_offset"])
+def test_faults_of_the_arm_its_drives_and_encoders_are_no_mismatch(fault: str) -> None:
+    """Full strength: what a drive makes of its command, or an encoder of an angle, the controller knows no more of than the log.
+    A recorder that is late by five milliseconds is a cause as well."""
+    assert said(recorded(fault)) == []
+
+
+@pytest.mark.row("S10")
+@pytest.mark.parametrize("joint", [1, 3])
+@pytest.mark.parametrize("factor", [20.0, 0.2, 0.7])
+def test_a_torque_in_another_unit_is_told_with_its_factor(factor: float, joint: int) -> None:
+    """Amperes, say, of drives with twenty N m/A, or five times as many as N m; whatever the description says of masses."""
+    (code, message), = said(with_torque(joint, factor))
+    assert code == "S10"
+    assert f"tau of joint {joint} is {factor:.3g} times what the controller" in message
+
+
+@pytest.mark.row("S14")
+def test_a_torque_of_the_other_sign_is_told() -> None:
+    (code, message), = said(with_torque(2, -1.0))
+    assert (code, "joint 2 is -1 times" in message) == ("S14", True)
+
+
+@pytest.mark.row("T06")
+@pytest.mark.parametrize(("late", "words"), [(20, "20 ms after"), (-12, "12 ms before"), (5, ""), (-5, "")])
+def test_a_torque_of_another_clock_is_told_with_its_time(late: int, words: str) -> None:
+    found = said(with_torque(2, 1.0, late))
+    assert [code for code, _ in found] == (["T06"] if words else [])
+    assert all(f"tau of joint 2 is stamped {words} the controller" in message for _, message in found)
+
+
+def test_a_controller_that_is_described_wrong_says_nothing() -> None:
+    """Twice the stiffness and the same damping make another torque, not a multiple of it."""
+    log = recorded()
+    assert log.controller is not None
+    assert log.controller.kp is not None
+    assert said(replace(log, controller=replace(log.controller, kp=2.0 * log.controller.kp))) == []
+
+
+@pytest.mark.parametrize("spoiled", ["nobody", "open-loop", "gap"])
+def test_without_a_controller_that_can_be_followed_nothing_is_said(spoiled: str) -> None:
+    log = with_torque(2, 20.0)
+    assert log.controller is not None
+    if spoiled == "gap":
+        q = log.q.copy()
+        q[100, 1] = np.nan  # the controller saw a number there, and nobody knows which
+        log = with_signal(log, q=q)
+    else:
+        log = replace(log, controller=None if spoiled == "nobody" else replace(log.controller, law="open-loop"))
+    assert commanded(log) is None
+    assert said(log) == []
+
+
+def test_a_diagnosis_is_refused_before_any_physics_is_blamed() -> None:
+    """By the exact factor, also where the torque is so large that its limits refuse it."""
+    for factor in (0.2, 30.0):
+        log = with_signal(recorded(), tau=factor * recorded().tau)
+        with pytest.raises(InputRejected, match=f"RRID-S10.*joint 1 is {factor:.3g} times what the controller"):
+            examined([log])
