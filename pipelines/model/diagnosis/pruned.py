@@ -33,6 +33,7 @@ from pipelines.model.diagnosis.verdict import (
     at_floor,
     explained,
     held_out_high,
+    much_without_name,
     seen_in,
     too_little,
     without_steps,
@@ -56,6 +57,7 @@ _BESIDE = "most of what is wrong has no name, and beside that this one is not su
 _NO_SIZE = "its size is within five standard deviations of none"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
 NEAR_THE_FLOOR = "what can be named explains less than half of what stands above the floor, which is not much, but no noise"
+_LAW_WITHOUT_NAME = "follows a law in the fitted logs, far above the noise, that held-out time does not bear out as any cause"
 _STOOD = "what was found after it at the joint leaves less without it"
 
 
@@ -118,6 +120,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     alone = _elsewhere(without_steps(plain, floor, known), plain, case, floor, known)
     reason = next((why for why in elsewhere.values() if why), f"{alone.reason}: {next(iter(doubts.values()), '')}")
     reason = reason if alone.verdict == "unknown" else alone.reason
+    if not known and alone.verdict == "nothing-wrong" and (where := much_without_name(found, doubts, floor)):
+        alone, reason = replace(alone, verdict="unknown"), f"{where} {_LAW_WITHOUT_NAME}"
     if few and alone.verdict == "nothing-wrong" and case.changed is None:  # of what has changed, other motion may leave a little
         alone, reason = replace(alone, verdict="unknown"), next((why for why in elsewhere.values() if why), NEAR_THE_FLOOR)
     return Settled(replace(plain, final=plain.nominal), replace(alone, reason=reason, doubts=doubts), ())

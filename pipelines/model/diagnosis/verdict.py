@@ -16,8 +16,8 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "rule", "seen_in", "too_little",
-           "without_steps"]
+__all__ = ["REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "much_without_name", "rule", "seen_in",
+           "too_little", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -141,6 +141,17 @@ def seen_in(step: Step, nominal: Array, final: Array, floor: Array) -> bool:
     taken = np.square(step.before.rms) - np.square(done.rms)
     most = np.argmax(taken / np.maximum(np.square(floor), 1e-300))
     return bool(share[most] >= (_MOST_OF_IT if final[most] > _TIMES * floor[most] else _FIFTH))
+
+
+def much_without_name(found: Found, doubts: Mapping[int, str], floor: Array) -> str:
+    """The joints that stand far above the noise, and of whose power a cause took most before held-out time did not bear it out."""
+    joints = set()
+    for k, step in enumerate(found.steps):
+        if step.best is None or k not in doubts:
+            continue
+        before, after = np.square(step.before.rms), np.square(step.best.done.rms)
+        joints |= set(np.flatnonzero((before - after > _HALF * before) & (step.before.rms > _TIMES * floor)).tolist())
+    return _named(sorted(joints))
 
 
 def _one_more(step: Step, before: Sequence[Step]) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.verdict import excess, explained, rule
+from pipelines.model.diagnosis.verdict import excess, explained, much_without_name, rule
 from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
@@ -20,6 +20,7 @@ from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.effects.viscous_drift import ViscousDrift
+from tests.model.diagnosis.made_up import effect, searched
 
 FLOOR = np.array([0.01, 0.01, 0.01])
 
@@ -185,3 +186,12 @@ def test_without_a_floor_a_weak_drive_is_asked_where_it_is_seen() -> None:
     """A drive of joint 2 that gives too little looks there like a lighter arm, and is seen at joint 1 alone."""
     case = found(left(0.16, 0.9e-3, 0.01), left(0.003, 0.9e-3, 0.01), effects=(TorqueGain(2),))
     assert rule(case, 1e-3 * np.ones(3), known=False).named == (0,)
+
+
+@pytest.mark.parametrize(("before", "after", "doubted", "where"), [
+    (0.3, 0.05, True, "joint 2"), (0.3, 0.05, False, ""), (0.3, 0.25, True, ""), (0.14, 0.02, True, "")])
+def test_what_follows_a_law_far_above_the_noise_is_no_arm_in_order(before: float, after: float, doubted: bool, where: str) -> None:
+    """A rotor's periodic torque, 30 times its noise, of which held-out time does not bear out the orders; a third of the power may
+    be what friction has beside its law, and near the noise every arm has something."""
+    made = searched(left(0.01, before, 0.01), (effect("cogging", 2), left(0.01, after, 0.01)))
+    assert much_without_name(made, {0: "not sure"} if doubted else {}, FLOOR) == where
