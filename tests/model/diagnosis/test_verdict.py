@@ -20,7 +20,7 @@ from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.effects.viscous_drift import ViscousDrift
-from tests.model.diagnosis.made_up import effect, searched
+from tests.model.diagnosis.made_up import searched
 
 FLOOR = np.array([0.01, 0.01, 0.01])
 
@@ -193,5 +193,5 @@ def test_without_a_floor_a_weak_drive_is_asked_where_it_is_seen() -> None:
 def test_what_follows_a_law_far_above_the_noise_is_no_arm_in_order(before: float, after: float, doubted: bool, where: str) -> None:
     """A rotor's periodic torque, 30 times its noise, of which held-out time does not bear out the orders; a third of the power may
     be what friction has beside its law, and near the noise every arm has something."""
-    made = searched(left(0.01, before, 0.01), (effect("cogging", 2), left(0.01, after, 0.01)))
+    made = searched(left(0.01, before, 0.01), (Cogging(2), left(0.01, after, 0.01)))
     assert much_without_name(made, {0: "not sure"} if doubted else {}, FLOOR) == where
