@@ -36,7 +36,8 @@ class TransmissionCoupling(Effect):
     )
     signature = "Inertia and friction that follow the sum of two joints' speeds, felt at both."
     explanation = "One joint's motor sits before the other joint, and turns when either moves: a differential, a long shaft."
-    remedy = "Describe the transmission matrix in the robot description and keep this effect in the model."
+    remedy = ("Keep this effect in the model, and see that the robot description has the transmission matrix: the motor is felt "
+              "through both joints.")
     experiment = "Move the two joints together, against each other, and each alone."
     twins = ("load_friction", "torque_crosstalk", "rotor_inertia")
 
