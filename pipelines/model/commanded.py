@@ -59,29 +59,38 @@ def commanded(log: ExperimentLog) -> Array | None:
 
 
 def against_command(s: Subject) -> tuple[Check, ...]:
-    """S14, S10 and T06 by the controller; nothing where it says nothing, or what was logged."""
+    """S14, T06, and S10 of all joints or S15 of some, by the controller; nothing where it says nothing, or what was logged.
+
+    A gear ratio or a unit may be that of the torque or that of position and reference, from which the command follows.
+    """
     wanted = commanded(s.log)
     if wanted is None:
         return ()
     most = round(_LATEST / s.log.sample_time)
-    found = []
-    for j in range(s.log.n_joints):
-        like = _likeness(s.log.tau[:len(wanted), j], wanted[:, j], most)
-        if like is not None and (check := _said(s, j, like)) is not None:
-            found.append(check)
-    return tuple(found)
+    likes = {j: like for j in range(s.log.n_joints)
+             if (like := _likeness(s.log.tau[:len(wanted), j], wanted[:, j], most)) is not None}
+    every = all(_scaled(like) for like in likes.values())
+    return tuple(check for j, like in likes.items() if (check := _said(s, j, like, every)) is not None)
 
 
-def _said(s: Subject, j: int, like: Likeness) -> Check | None:
+def _scaled(like: Likeness) -> bool:
+    return not 1.0 / _SCALE < abs(like.scale) < _SCALE
+
+
+def _said(s: Subject, j: int, like: Likeness, every: bool) -> Check | None:
     late, size = like.late * s.log.sample_time, abs(like.scale)
     if like.left > _LEFT or like.before < _BETTER * like.left:
         return None
     if like.scale < 0.0:
         return s.say("S14", "warn", f"tau of joint {j + 1} is {like.scale:.3g} times what the controller of this log commands",
                      signal="tau", joint=j, gate=True, remedy="change the sign of this torque on import")
-    if not 1.0 / _SCALE < size < _SCALE:
-        return s.say("S10", "warn", f"tau of joint {j + 1} is {size:.3g} times what the controller of this log commands: motor "
-                     "current in A, torque of another side of the gear, or another unit", signal="tau", joint=j, gate=True,
+    if _scaled(like):
+        what = ("motor current in A, or torque of another side of the gear" if every else
+                "a gear ratio or torque constant of this torque; or its position and reference are "
+                f"{1.0 / size:.3g} times as large as they should be")
+        return s.say("S10" if every else "S15", "warn",
+                     f"tau of joint {j + 1} is {size:.3g} times what the controller of this log commands: {what}",
+                     signal="tau", joint=j, gate=True,
                      remedy=f"divide it by {size:.3g}: import the recording anew with torque constants and gear ratios, or declare "
                      "its unit; or correct the gains of the controller")
     if abs(late) >= _LATE:

@@ -7,7 +7,7 @@ No parameter of the arm has to be known. Each joint's torque is explained by its
 time. An alternative is reported only where the log as it stands is explained badly **and** the alternative explains it
 well: an arm with friction the model lacks, with a worn gear or with a late drive is badly explained too, but nothing
 explains it better, and what is wrong with it is for `diagnose` to say. Where the log describes its controller, that is asked
-first: no model of an arm is needed then.
+as well: no model of an arm is needed then.
 """
 
 from __future__ import annotations
@@ -48,23 +48,19 @@ def plausibility(subject: Subject) -> tuple[Check, ...]:
 
 def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
     """The same, and which of these questions the log leaves open, and why."""
-    if told := against_command(subject):
-        return told
     evidence = _evidence(subject)
     if not isinstance(evidence, Evidence):
-        return evidence
+        return against_command(subject) or evidence
     misplaced = _misplaced(evidence)
-    return misplaced or (*_fitting(evidence), *_excited(evidence))
+    return misplaced or (*_by_either(subject, _fitting(evidence)), *_excited(evidence))
 
 
 def mismatches(subject: Subject) -> tuple[Check, ...]:
     """What S10, S13, S14, S15 and T06 have against one log, for a stage that fits it: checks other than "ok"."""
-    if told := against_command(subject):
-        return told
     evidence = _evidence(subject)
     if not isinstance(evidence, Evidence):
-        return ()
-    found = _misplaced(evidence) or _fitting(evidence)
+        return against_command(subject)
+    found = _misplaced(evidence) or _by_either(subject, _fitting(evidence))
     return tuple(check for check in found if isinstance(check, Check) and check.level != "ok")
 
 
@@ -94,6 +90,14 @@ def _misplaced(e: Evidence) -> tuple[Check, ...]:
 def _fitting(e: Evidence) -> tuple[Check | NotTested, ...]:
     """S13, S14, S15 and T06 of a log whose columns are in their places."""
     return (*_explained(e), *_signs(e), *_ratios(e), *_clock(e))
+
+
+def _by_either(subject: Subject, found: Sequence[Check | NotTested]) -> tuple[Check | NotTested, ...]:
+    """What motion says against a torque; where that closes no gate, what the controller does, in place of the same code."""
+    if any(isinstance(check, Check) and check.gate and check.level != "ok" for check in found):
+        return tuple(found)
+    told = against_command(subject)
+    return (*told, *(one for one in found if one.code not in {check.code for check in told}))
 
 
 def _open(subject: Subject, reason: str) -> tuple[NotTested, ...]:

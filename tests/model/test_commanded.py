@@ -60,14 +60,25 @@ def test_faults_of_the_arm_its_drives_and_encoders_are_no_mismatch(fault: str) -
     assert said(recorded(fault)) == []
 
 
-@pytest.mark.row("S10")
+@pytest.mark.row("S15")
 @pytest.mark.parametrize("joint", [1, 3])
 @pytest.mark.parametrize("factor", [20.0, 0.2, 0.7])
-def test_a_torque_in_another_unit_is_told_with_its_factor(factor: float, joint: int) -> None:
-    """Amperes, say, of drives with twenty N m/A, or five times as many as N m; whatever the description says of masses."""
+def test_a_gear_ratio_of_one_torque_is_told_with_its_factor(factor: float, joint: int) -> None:
+    """Of the torque; or, the other way round, of position and reference, from which the command follows."""
     (code, message), = said(with_torque(joint, factor))
-    assert code == "S10"
+    assert code == "S15"
     assert f"tau of joint {joint} is {factor:.3g} times what the controller" in message
+    assert f"position and reference are {1.0 / factor:.3g} times as large" in message
+
+
+@pytest.mark.row("S10")
+@pytest.mark.parametrize("factor", [20.0, 0.2])
+def test_amperes_are_told_with_their_factor(factor: float) -> None:
+    """Of drives with a twentieth of an A/N m, or with five; whatever the description says of masses."""
+    log = with_signal(recorded(), tau=factor * recorded().tau)
+    found = said(log)
+    assert [code for code, _ in found] == ["S10"] * 3
+    assert all(f"is {factor:.3g} times what the controller" in message and "current" in message for _, message in found)
 
 
 @pytest.mark.row("S14")
