@@ -85,10 +85,10 @@ def _said(s: Subject, j: int, like: Likeness, every: bool) -> Check | None:
         return s.say("S14", "warn", f"tau of joint {j + 1} is {like.scale:.3g} times what the controller of this log commands",
                      signal="tau", joint=j, gate=True, remedy="change the sign of this torque on import")
     if _scaled(like):
-        what = "motor current in A, or torque of another side of the gear" if every else "a gear ratio or torque constant of its own"
+        what = "motor current in A, or torque of another side of the gear" if every else "another gear ratio or torque constant"
         return s.say("S10" if every else "S15", "warn",
-                     f"tau of joint {j + 1} is {size:.3g} times what the controller of this log commands: {what}; or its position and "
-                     f"reference are {1.0 / size:.3g} times as large as they should be", signal="tau", joint=j, gate=True,
+                     f"tau of joint {j + 1} is {size:.3g} times what the controller of this log commands: {what}; or its position "
+                     f"and reference are {1.0 / size:.3g} times as large as they should be", signal="tau", joint=j, gate=True,
                      remedy=f"divide it by {size:.3g}: import the recording anew with torque constants and gear ratios, or declare "
                      "its unit; or correct the gains of the controller")
     if abs(late) >= _LATE:
