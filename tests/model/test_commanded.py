@@ -17,6 +17,7 @@ from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.commanded import against_command, commanded
 from pipelines.model.diagnosis.gates import examined
+from pipelines.model.plausibility import mismatches
 from tests.healthy import with_signal
 
 
@@ -95,12 +96,56 @@ def test_a_torque_of_another_clock_is_told_with_its_time(late: int, words: str) 
     assert all(f"tau of joint 2 is stamped {words} the controller" in message for _, message in found)
 
 
-def test_a_controller_that_is_described_wrong_says_nothing() -> None:
+@pytest.mark.parametrize("time_constant", [5e-3, 1e-2, 3e-2])
+def test_a_recorder_that_smooths_is_a_cause_and_no_other_clock(time_constant: float) -> None:
+    """As late as a shift of so many milliseconds, and not the same: `diagnose` names it."""
+    log = recorded()
+    keep = np.exp(-log.sample_time / time_constant)
+    tau = log.tau.copy()
+    for k in range(1, len(tau)):
+        tau[k] = keep * tau[k - 1] + (1.0 - keep) * log.tau[k]
+    assert said(with_signal(log, tau=tau)) == []
+
+
+def test_a_measured_torque_may_be_what_the_drive_made_of_its_command() -> None:
+    """Seven tenths of it, or later: a cause; an eighth is a unit."""
+    for joint, change, late, codes in ((2, 0.7, 0, []), (2, 1.0, 20, []), (2, 0.125, 0, ["S15"])):
+        found = said(replace(with_torque(joint, change, late), torque="measured"))
+        assert [code for code, _ in found] == codes
+
+
+@pytest.mark.parametrize(("gain", "factor"), [("kp", 2.0), ("kd", 0.5)])
+def test_a_controller_that_is_described_wrong_says_nothing(gain: str, factor: float) -> None:
     """Twice the stiffness and the same damping make another torque, not a multiple of it."""
     log = recorded()
     assert log.controller is not None
-    assert log.controller.kp is not None
-    assert said(replace(log, controller=replace(log.controller, kp=2.0 * log.controller.kp))) == []
+    assert said(replace(log, controller=replace(log.controller, **{gain: factor * getattr(log.controller, gain)}))) == []
+
+
+def test_gains_of_the_other_sign_do_not_turn_a_torque_that_is_right() -> None:
+    """Motion says that inertia is positive: what is wrong is the description of the controller, which no fit takes."""
+    log = recorded()
+    assert log.controller is not None
+    signs = {gain: -getattr(log.controller, gain) for gain in ("kp", "kd")}
+    assert not [check for check in mismatches(Subject(replace(log, controller=replace(log.controller, **signs)))) if check.gate]
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_observer_of_another_sample_time_that_runs_away_says_nothing() -> None:
+    log = recorded()
+    assert log.controller is not None
+    assert log.controller.observer_gain is not None
+    wild = replace(log, controller=replace(log.controller, observer_gain=20.0 * log.controller.observer_gain))
+    assert commanded(wild) is None
+    assert said(wild) == []
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_torque_that_changes_at_the_start_alone_says_nothing() -> None:
+    log = recorded()
+    held = np.repeat(log.tau[:1], len(log.tau), axis=0)
+    held[:5] += 1.0
+    assert said(with_signal(log, tau=held)) == []
 
 
 @pytest.mark.parametrize("spoiled", ["nobody", "open-loop", "gap"])
