@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,14 @@ _REPO = Path(__file__).resolve().parents[1]
 
 
 _FIRST = ("test_mutation.py", "test_hidden_effects.py")
+
+
+def pytest_configure() -> None:
+    """One processor for each worker: what shares its work out among two has the other one's in its way, and forks for nothing."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
+    if worker and hasattr(os, "sched_setaffinity"):
+        there = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {there[int(worker.removeprefix("gw")) % len(there)]})
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
