@@ -18,9 +18,8 @@ from pipelines.model.diagnosis.oscillating import oscillation
 from pipelines.model.diagnosis.own_motion import following, lasting, standing_out
 from pipelines.model.diagnosis.pruned import Settled
 from pipelines.model.diagnosis.refit import Refined
-from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, without_steps
+from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, takes_most, without_steps
 
 __all__ = ["of_replicas", "unlike_held_out", "unlike_motion", "unlike_noise", "unnamed"]
 
@@ -69,19 +68,12 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, mov
 def _shown(done: Settled, rms: Array, floor: Array, nominal: Array) -> bool:
     """Whether one of the causes that are named, if any lasts, explains half of what surely stands above the floor of the held-out
     logs at its joint, as all of them do of the fitted ones; or leaves what may be the floor."""
-    named = [step for k in done.ruling.named if (step := done.found.steps[k]).best is not None and step.best.log is None]
-    joints = [_where(step, floor) for step in named]
+    steps = [done.found.steps[k] for k in done.ruling.named]
+    joints = [takes_most(step, floor) if best.effect.joint is None else best.effect.joint - 1
+              for step in steps if (best := step.best) is not None and best.log is None]
     above = np.square(nominal / floor) - 1.0
     return not joints or any(nominal[j] <= _SURELY * floor[j] or rms[j] <= _CLEAR * floor[j] or
                              above[j] + 1.0 - (rms[j] / floor[j]) ** 2 >= _HALF * above[j] for j in joints)
-
-
-def _where(step: Step, floor: Array) -> int:
-    """The joint (from 0) at which a cause acts; of one of the whole arm, where it takes most."""
-    if step.best is None or step.best.effect.joint is None:
-        after = step.before.rms if step.best is None else step.best.done.rms
-        return int(np.argmax((np.square(step.before.rms) - np.square(after)) / np.square(floor)))
-    return step.best.effect.joint - 1
 
 
 def _not_believed(done: Settled, reason: str) -> Settled:

@@ -17,7 +17,7 @@ from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
 __all__ = ["REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "much_without_name", "rule", "seen_in",
-           "too_little", "without_steps"]
+           "takes_most", "too_little", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -137,10 +137,15 @@ def seen_in(step: Step, nominal: Array, final: Array, floor: Array) -> bool:
     before, after = np.square(nominal), np.square(final)
     above = before - np.square(floor)
     share = np.divide(before - after, above, out=np.zeros(len(above)), where=above > 0.0)
+    most = takes_most(step, floor)
+    return bool(share[most] >= (_MOST_OF_IT if final[most] > _TIMES * floor[most] else _FIFTH))
+
+
+def takes_most(step: Step, floor: Array) -> int:
+    """The joint (from 0) at which what a step found takes most power, in floors."""
     done = step.before if step.best is None else step.best.done
     taken = np.square(step.before.rms) - np.square(done.rms)
-    most = np.argmax(taken / np.maximum(np.square(floor), 1e-300))
-    return bool(share[most] >= (_MOST_OF_IT if final[most] > _TIMES * floor[most] else _FIFTH))
+    return int(np.argmax(taken / np.maximum(np.square(floor), 1e-300)))
 
 
 def much_without_name(found: Found, doubts: Mapping[int, str], floor: Array) -> str:

@@ -53,11 +53,9 @@ def choose_steps(arm: Arm, experiments: Sequence[Experiment], noise: Noise | Non
         InputRejected: as `choose_step`.
     """
     plant, found = Plant.of(arm), dict[float, Step]()
-    for one in experiments:
-        step = choose_step(plant, one, noise)
-        before = found.get(one.sample_time)
-        if before is None or (step.per_sample, step.exact) > (before.per_sample, before.exact):
-            found[one.sample_time] = replace(step, exact=step.exact or (before is not None and before.exact))
+    for time in dict.fromkeys(one.sample_time for one in experiments):
+        chosen = [choose_step(plant, one, noise) for one in experiments if one.sample_time == time]
+        found[time] = replace(max(chosen, key=lambda step: step.per_sample), exact=any(step.exact for step in chosen))
     return found
 
 
@@ -77,10 +75,9 @@ def simulate_together(arm: Arm, experiments: Sequence[Experiment], noise: Noise 
         InputRejected: D17, the arm runs away, or no step is small enough.
     """
     plant, drawn, found = Plant.of(arm), tuple(seeds), dict[int, Simulated]()
+    known = choose_steps(arm, experiments, noise) if steps is None else steps
     for time in dict.fromkeys(one.sample_time for one in experiments):
         places = [k for k, one in enumerate(experiments) if one.sample_time == time]
-        some = [experiments[k] for k in places]
-        chosen = [choose_step(plant, one, noise) for one in some] if steps is None else [steps[time]]
-        count, exact = max(one.per_sample for one in chosen), any(one.exact for one in chosen)
-        found |= dict(zip(places, run_together(plant, some, count, noise, drawn, exact), strict=True))
+        some, step = [experiments[k] for k in places], known[time]
+        found |= dict(zip(places, run_together(plant, some, step.per_sample, noise, drawn, step.exact), strict=True))
     return [found[k] for k in range(len(experiments))]

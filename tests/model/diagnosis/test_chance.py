@@ -10,6 +10,7 @@ import pytest
 
 from pipelines.fit.flips import by_flips
 from pipelines.model.diagnosis import chance
+from pipelines.model.diagnosis.result import TorqueGain
 
 ROWS, FITTED = 2000, 8000  # 12 s of held-out logs beside 40 s of fitted ones, say
 DRAWS = 100
@@ -114,3 +115,40 @@ def test_two_models_that_are_equally_wrong_are_seldom_told_apart_alone() -> None
         false += chance.by_all_time(left(held + one[0], fitted + one[1]), left(held + other[0], fitted + other[1]), 0, HELD, 10,
                                     chance._SELDOM)
     assert false <= 5
+
+
+def seen_at(*share: float) -> Any:
+    """A model that leaves so much of an effect at each joint when it has imitated what it can."""
+    return SimpleNamespace(fit=SimpleNamespace(project=lambda torque: np.sqrt(share)))
+
+
+@pytest.mark.parametrize(("joint", "seen", "lucky"), [
+    (1, (1.0, 0.0, 0.0), False), (3, (0.0, 0.0, 1.0), True), (3, (0.4, 0.0, 0.6), True), (3, (0.9, 0.0, 0.1), False)])
+def test_what_falls_where_a_cause_neither_acts_nor_is_seen_is_no_argument_for_it(
+        joint: int, seen: tuple[float, ...], lucky: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held-out time shows less at joint 1 alone: a cause at joint 3 has no part in that, whatever the fit made of other numbers;
+    but where the model can imitate it at joint 3, and not what that does to joint 1, it is seen there."""
+    acts = np.where(np.arange(1, 4) == joint, 1.0, 1e-15)  # rounding elsewhere: without it the torque is worked out otherwise
+    model = SimpleNamespace(torque=lambda data: acts,
+                            without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(3)))
+    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(3)))
+    less = TorqueGain(np.array([0.5, 0.1, 0.1]), np.array([0.2, 0.1, 0.1]), np.array([[-0.4, -0.2], [-0.1, 0.1], [-0.1, 0.1]]))
+    monkeypatch.setattr(chance, "torque_gain", lambda *_: less)
+    assert chance.by_chance(seen_at(*seen), after, 0, None, 10) is lucky
+
+
+@pytest.mark.parametrize(("rest", "high", "gain", "whole", "lucky"), [
+    (0.093, -0.001, 1.5, False, False),
+    (0.097, -0.001, 1.5, True, True), (0.097, -0.001, 3.0, False, False),  # 3 %, beyond doubt
+    (0.097, 0.001, 3.0, False, True), (0.097, 0.001, 3.0, True, False)])
+def test_what_is_sure_and_little_is_no_name(rest: float, high: float, gain: float, whole: bool, lucky: bool,
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    """An arm in order has 3 % of the held-out error in its ripple: it takes a gain far beyond any replica's to be told by less.
+    What one joint does not bear out, all together may."""
+    model = SimpleNamespace(torque=lambda data: np.ones(1), without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(1)))
+    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(1)))
+    little = TorqueGain(np.array([0.1]), np.array([rest]), np.array([[-0.01, high]]))
+    monkeypatch.setattr(chance, "torque_gain", lambda *_: little)
+    monkeypatch.setattr(chance, "surely_less", lambda *_: whole)
+    step: Any = SimpleNamespace(trials=(SimpleNamespace(accepted=True, gain=gain, threshold=1.0),))
+    assert chance.no_name(step, seen_at(1.0), after, 0, None, 10) is lucky

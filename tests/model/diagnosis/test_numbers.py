@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,7 +12,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.numbers import parameters, standard_deviations
+from pipelines.model.diagnosis.numbers import of_no_size, parameters, standard_deviations
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
@@ -46,3 +49,13 @@ def test_an_inertia_that_is_a_part_of_the_links_is_not_known(joint: int, told: b
     for name, true in (("viscous", VISCOUS), ("coulomb", COULOMB), *((("inertia", INERTIA),) if told else ())):
         assert found[name].value == pytest.approx(true, abs=max(4.0 * found[name].std, 0.02 * true))
         assert 0.0 < found[name].std < 0.2 * true
+
+
+@pytest.mark.parametrize(("size", "small"), [(4.9e-5, [0]), (5.1e-5, []), (-4.9e-5, [0]), (-5.1e-5, [])])
+def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, small: list[int]) -> None:
+    """A delay of some microseconds, as sampling leaves it in an arm in order; a spring has more numbers, each of them poor."""
+    delay = SimpleNamespace(free_amplitudes=True, amplitudes=(size,))
+    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5))
+    done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(3), model=SimpleNamespace(effects=(delay, spring)),
+                                of_effect=lambda place: [0] if place == 0 else [1, 2])
+    assert of_no_size(done) == small

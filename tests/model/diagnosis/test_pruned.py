@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import chance, pruned
+from pipelines.model.diagnosis import pruned
 from pipelines.model.diagnosis.candidates import Family
-from pipelines.model.diagnosis.numbers import of_no_size
-from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects.base import Effect
@@ -181,43 +179,6 @@ def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkey
     assert (kept, final) == ([1], (1,))
 
 
-def seen_at(*share: float) -> Any:
-    """A model that leaves so much of an effect at each joint when it has imitated what it can."""
-    return SimpleNamespace(fit=SimpleNamespace(project=lambda torque: np.sqrt(share)))
-
-
-@pytest.mark.parametrize(("joint", "seen", "lucky"), [
-    (1, (1.0, 0.0, 0.0), False), (3, (0.0, 0.0, 1.0), True), (3, (0.4, 0.0, 0.6), True), (3, (0.9, 0.0, 0.1), False)])
-def test_what_falls_where_a_cause_neither_acts_nor_is_seen_is_no_argument_for_it(
-        joint: int, seen: tuple[float, ...], lucky: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Held-out time shows less at joint 1 alone: a cause at joint 3 has no part in that, whatever the fit made of other numbers;
-    but where the model can imitate it at joint 3, and not what that does to joint 1, it is seen there."""
-    acts = np.where(np.arange(1, 4) == joint, 1.0, 1e-15)  # rounding elsewhere: without it the torque is worked out otherwise
-    model = SimpleNamespace(torque=lambda data: acts,
-                            without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(3)))
-    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(3)))
-    less = TorqueGain(np.array([0.5, 0.1, 0.1]), np.array([0.2, 0.1, 0.1]), np.array([[-0.4, -0.2], [-0.1, 0.1], [-0.1, 0.1]]))
-    monkeypatch.setattr(chance, "torque_gain", lambda *_: less)
-    assert chance.by_chance(seen_at(*seen), after, 0, None, 10) is lucky
-
-
-@pytest.mark.parametrize(("rest", "high", "gain", "whole", "lucky"), [
-    (0.093, -0.001, 1.5, False, False),
-    (0.097, -0.001, 1.5, True, True), (0.097, -0.001, 3.0, False, False),  # 3 %, beyond doubt
-    (0.097, 0.001, 3.0, False, True), (0.097, 0.001, 3.0, True, False)])
-def test_what_is_sure_and_little_is_no_name(rest: float, high: float, gain: float, whole: bool, lucky: bool,
-                                            monkeypatch: pytest.MonkeyPatch) -> None:
-    """An arm in order has 3 % of the held-out error in its ripple: it takes a gain far beyond any replica's to be told by less.
-    What one joint does not bear out, all together may."""
-    model = SimpleNamespace(torque=lambda data: np.ones(1), without=lambda place: SimpleNamespace(torque=lambda data: np.zeros(1)))
-    after: Any = SimpleNamespace(model=model, data=SimpleNamespace(rms=np.abs, joint=np.arange(1)))
-    little = TorqueGain(np.array([0.1]), np.array([rest]), np.array([[-0.01, high]]))
-    monkeypatch.setattr(chance, "torque_gain", lambda *_: little)
-    monkeypatch.setattr(chance, "surely_less", lambda *_: whole)
-    step: Any = SimpleNamespace(trials=(SimpleNamespace(accepted=True, gain=gain, threshold=1.0),))
-    assert chance.no_name(step, seen_at(1.0), after, 0, None, 10) is lucky
-
-
 @pytest.mark.parametrize("ruled", [(0, 1), (1,)])  # by the search's outcome the first may have been refused before
 @pytest.mark.parametrize(("nominal", "rest", "verdict"), [
     (0.1, 0.04, "cause"), (0.1, 0.09, "unknown"),
@@ -310,13 +271,3 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0,), ""), case, case, FLOOR, False)
     assert done.ruling.named == named
     assert done.ruling.verdict == ("cause" if named else "nothing-wrong")
-
-
-@pytest.mark.parametrize(("size", "small"), [(4.9e-5, [0]), (5.1e-5, []), (-4.9e-5, [0]), (-5.1e-5, [])])
-def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, small: list[int]) -> None:
-    """A delay of some microseconds, as sampling leaves it in an arm in order; a spring has more numbers, each of them poor."""
-    delay = SimpleNamespace(free_amplitudes=True, amplitudes=(size,))
-    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5))
-    done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(3), model=SimpleNamespace(effects=(delay, spring)),
-                                of_effect=lambda place: [0] if place == 0 else [1, 2])
-    assert of_no_size(done) == small
