@@ -26,7 +26,6 @@ from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.simulated import with_simulation
 from pipelines.model.named_cause import refuse_unknown
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.report import Report
@@ -126,8 +125,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
                                settings.decimate, settings.min_speed, settings.seed)
     found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)
-    given.tell("simulating what was found")
-    found = _beside_clocks(with_simulation(found, (*chosen.validate, *chosen.identify)), said)
+    found = _beside_clocks(found, said)
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),

@@ -56,6 +56,7 @@ class SealedCase:
     amplifier: float = 1.0  # times the amplifier's noise
     held: bool = True  # the log says that torque was held over each sample, as it was
     robot: str = "rrr"  # see robots.py
+    before: str = ""  # which experiments the reference logs are of, where they are other ones
     loop: str = ""  # "backward-difference": of the speed; "delayed": torque; else on the observer, a quarter with feed-forward
 
     @property
@@ -194,9 +195,22 @@ def elsewhere(seed: int) -> Iterator[SealedCase]:
         yield _case("elsewhere", seed, place, [(cause, joint, 1.0)], robot=robot, loop=loops[place // 2 % len(loops)])
 
 
+def unlike(seed: int) -> Iterator[SealedCase]:
+    """Reference logs of another motion than all later logs: in order, or with one cause at full strength."""
+    ways = (("slow", "fast"), ("fast", "slow"))
+    for place in range(16):
+        now, before = ways[place // 2 % 2]
+        yield _case("unlike", seed, place, [], reference=True, robot=("rrr", "paper")[place % 2], session=now, before=before)
+    for place, cause in enumerate(EASY, start=16):
+        joints = [joint for name, joint in _places(EASY) if name == cause]
+        now, before = ways[place // 2 % 2]
+        yield _case("unlike", seed, place, [(cause, joints[place % len(joints)], 1.0)], reference=True,
+                    robot=("rrr", "paper")[place % 2], session=now, before=before)
+
+
 FAMILIES: dict[str, Callable[[int], Iterable[SealedCase]]] = {
     each.__name__: each for each in (single, compliance, healthy, outside, invisible, payload, pairs, noise, standing, zero,
-                                     uncentred, paper, elsewhere)}
+                                     uncentred, paper, elsewhere, unlike)}
 
 
 def _places(causes: Iterable[str]) -> list[tuple[str, int | None]]:

@@ -1,4 +1,4 @@
-"""What is recorded of a case: 52 s of logs at 1 kHz, in one of four mixtures, with what else the case has.
+"""What is recorded of a case: 52 s of logs at 1 kHz, in a mixture of experiments, with what else the case has.
 
     session = record_case(case)        its logs, of role "identify", "validate" and "reference", and what was hidden
 
@@ -7,6 +7,8 @@
     friction   an excitation, each joint open loop, at rest       judged by an excitation and slow sweeps
     long       an excitation of 20 s and slow sweeps              judged by an excitation of 20 s
     short      two excitations of 6 s                             judged by one of 6 s
+    fast       two excitations                                    judged by one
+    slow       slow sweeps, twice                                 judged by slow sweeps
 """
 
 from __future__ import annotations
@@ -71,7 +73,8 @@ def _record(case: SealedCase, session: str) -> Session:
     standing, hidden = (tuple(_fault(one, case, machine, plans) for one in group) for group in (case.standing, case.hidden))
     logs: list[ExperimentLog] = []
     if case.reference:
-        before = [plan.before() for plan in plans if plan.kind in ("excitation", "free") and plan.role == "identify"]
+        others = _plans(case, machine, case.before) if case.before else plans
+        before = [plan.before() for plan in others if plan.kind in ("excitation", "free") and plan.role == "identify"]
         logs += _recorded(machine, before, standing, 2 * case.seed, _BEFORE)
     for place, plan in enumerate(plans):
         here = [fault for one, fault in zip(case.hidden, hidden, strict=True) if not one.once or place == 0]
@@ -155,8 +158,21 @@ def _short(machine: Machine, seeds: list[int]) -> Plans:
             experiments.excitation(machine, three, 6.0, 1).judging()]
 
 
+def _fast(machine: Machine, seeds: list[int]) -> Plans:
+    one, two, three, _ = seeds
+    return [experiments.excitation(machine, one, 10.0, 2), experiments.excitation(machine, two, 10.0, 1),
+            experiments.excitation(machine, three, 10.0, 1).judging()]
+
+
+def _slow(machine: Machine, seeds: list[int]) -> Plans:
+    one, two, three, _ = seeds
+    return [experiments.free(machine, one, 16.0), experiments.free(machine, two, 12.0),
+            experiments.free(machine, three, 10.0).judging()]
+
+
 _SETS: dict[str, Callable[[Machine, list[int]], Plans]] = {
-    "mixed": _mixed, "periodic": _periodic, "friction": _friction, "long": _long, "short": _short}
+    "mixed": _mixed, "periodic": _periodic, "friction": _friction, "long": _long, "short": _short,
+    "fast": _fast, "slow": _slow}
 
 
 def _compliance_plans(machine: Machine, model: ControllerModel, seed: int) -> Iterator[Experiment]:

@@ -17,7 +17,7 @@ from benchmarks.hidden_effects.score import Score
 __all__ = ["Row", "by_cause", "confusion", "rows", "table", "wilson"]
 
 # Where wrong names have a row of their own, or are the point.
-_APART = ("pairs", "noise", "taken out", "uncentred", "paper", "elsewhere")
+_APART = ("pairs", "noise", "taken out", "uncentred", "paper", "elsewhere", "unlike")
 _FLOOR = 1.3
 _QUICK, _SLOW = 10.0, 90.0  # [s] with reference logs, with a twin
 _SHUFFLES = 200
@@ -95,6 +95,8 @@ def rows(scores: Sequence[Score]) -> list[Row]:
         _least("standing since the reference logs: \"nothing wrong\"", family("standing"), _right, None),
         _least("friction of three sigmoids, with reference logs: right", family("paper"), _right, None),
         _most("friction of three sigmoids: wrong name", family("paper"), _wrong, None),
+        _least("reference logs of another motion: right", family("unlike"), _right, None),
+        _most("reference logs of another motion: wrong name", family("unlike"), _wrong, None),
         _least("other arms and loops: right", family("elsewhere"), _right, None),
         _most("other arms and loops: wrong name", family("elsewhere"), _wrong, None),
         _shuffled(family("single")),

@@ -2,6 +2,10 @@
 
     answers = shared_out(work, pieces)        [work(piece) for piece in pieces]
 
+    with meanwhile(work) as answer:           a single piece, while this process goes on with something else
+        ...
+        found = answer()                      work()
+
 The other process is a copy of this one, made where a second processor is there and nobody else has it: what `work` needs it has
 already, and its answers are copied back. A piece gets the same answer in either: the outcome does not hang on how the pieces fell.
 """
@@ -25,7 +29,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from types import FrameType
 
-__all__ = ["shared_out"]
+__all__ = ["meanwhile", "shared_out"]
 
 P = TypeVar("P")
 A = TypeVar("A")
@@ -60,6 +64,29 @@ def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[]
             other.end()
             os.close(places)
     return [found[k] if k in found else work(piece) for k, piece in enumerate(pieces)]
+
+
+@contextlib.contextmanager
+def meanwhile(work: Callable[[], A]) -> Iterator[Callable[[], A]]:
+    """Another process does `work` while the body runs, which asks for the answer; where there is none, it is done when it is asked
+    for. An answer that nobody asks for is not waited for."""
+    if not _second():
+        yield work
+        return
+    other = _Other()
+
+    def answer() -> A:
+        with contextlib.suppress(EOFError, OSError, MemoryError):  # it came to grief
+            found: A = other.answer()
+            return found
+        return work()
+
+    try:
+        other.begin(work)
+        yield answer
+    finally:
+        with _undisturbed():
+            other.end()
 
 
 def _second() -> bool:

@@ -16,12 +16,14 @@ from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.screen import Screened
+from pipelines.model.diagnosis.stood import Share
 from pipelines.model.diagnosis.thresholds import Thresholds
 
-__all__ = ["Case", "Changed", "held_out"]
+__all__ = ["Case", "Changed", "ShareOf", "held_out"]
 
 _ALIKE = 0.05  # of a joint's torque, by which two arms may differ and have the same columns to first order
 
+ShareOf = Callable[[Refined, int], Share]  # of an effect of a model, by its place
 Changed = Callable[[Refined, Sequence[bool]], tuple[Sequence[Screened], Thresholds]]
 
 
@@ -38,6 +40,8 @@ class Case:
     blocks: int = 10
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Changed | None = None  # what has changed since the reference logs
+    before: ShareOf | None = None  # how much of a cause the reference logs have
+    unlike: frozenset[int] = frozenset()  # joints, from 0, that move as they do in no reference log
     shared: Shared | None = None  # at which of several joints it has, masses being what they were
     again: bool = True  # a cause that may act more than once at its place may be found more than once
     white: bool = False  # its rows were whitened: little of them is signal, and every cause takes a small share

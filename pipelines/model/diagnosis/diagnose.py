@@ -17,6 +17,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
+from pipelines.log.shared_work import meanwhile
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.absorbed import Absorbed, Unexplained
 from pipelines.model.diagnosis.beside import Held, acted
@@ -38,14 +39,15 @@ from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.oscillating import oscillation
 from pipelines.model.diagnosis.own_motion import put_right
-from pipelines.model.diagnosis.pruned import settled
+from pipelines.model.diagnosis.pruned import settled, stood_before
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
 from pipelines.model.diagnosis.search import Explored, Found, gap_first, gives_way, glance, greatest, provisional, search
 from pipelines.model.diagnosis.second_look import looked_again
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.simulated import arms_of, followed_by, with_simulation
+from pipelines.model.diagnosis.since import Known, Since, since_reference
 from pipelines.model.diagnosis.steadied import steady_nominal
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
 from pipelines.model.diagnosis.verdict import Ruling, rule
@@ -57,6 +59,7 @@ __all__ = ["diagnose"]
 
 Tell = Callable[[str], None]
 
+_STOOD = 4  # effects that are taken to stand by what later logs show of them
 _MOVED = ("the base parameters have moved since the reference logs, and no cause that is known moves them so: one set for "
           "before and after leaves {:.2g} times what a set for each leaves; look at the tool, at the zeros of the encoders, and at "
           "the torque constants of all drives")
@@ -183,18 +186,21 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     taken = first.held.case.beside
     since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else
              memory.since(first.held.prepared, chosen))
+    since, found = _compared(first, since, reference, chosen, known, memory)
     case = _nameable(since.case, first.stiff)
+    floor = since.floor_of(case.data)
+    case = replace(case, unlike=frozenset(np.flatnonzero(floor > since.floor).tolist()))
     now = replace(first.held.prepared, data=case.data, judge=case.judge)
     first = replace(first, held=replace(first.held, prepared=now))
-    found = search(case, chosen.most)
-    done = settled(found, rule(found, since.floor), case, now, since.floor)
-    done = replace(done, found=steady_nominal(done.found))
-    done = unlike_noise(done, lambda: oscillation(reference, since.left).stands)
-    noise = noise_in(case.model, reference, since.left, now.referring, now.recipe, chosen.seed)
+    with meanwhile(partial(noise_in, case.model, reference, since.left, now.referring, now.recipe, chosen.seed)) as drives:
+        done = settled(found, rule(found, floor), case, now, floor)
+        done = replace(done, found=steady_nominal(done.found))
+        done = unlike_noise(done, lambda: oscillation(reference, since.left).stands)
+        noise = drives()
     moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
     if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
-        done = unnamed(done, _with_load(found, case, now, since.floor, noise, chosen.seed))
-    floored = Floored(since.floor, "reference logs", None, given, noise)
+        done = unnamed(done, _with_load(found, case, now, floor, noise, chosen.seed))
+    floored = Floored(floor, "reference logs", None, given, noise, None if case.judge is None else since.floor_of(case.judge))
     told = diagnosis_of(first, case, done, floored, chosen, since.probed, isinstance(moved, Absorbed) and not moved.unsure)
     if given is None:
         told = replace(told, calibration=Calibration(
@@ -204,6 +210,23 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     if isinstance(moved, Unexplained):
         return _nameless(told, _MOVED.format(moved.times)) if told.verdict == "nothing-wrong" else told
     return told if moved is None else _with_moved(told, moved, done.found.final, now, case, chosen)
+
+
+def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings, known: Known | None,
+              memory: Memory) -> tuple[Since, Found]:
+    """The search in what has changed. What it finds that stood in the reference logs as well is taken out with the rest that
+    stands, and it searches again."""
+    taken, stood = first.held.case.beside, list[Effect]()
+    while True:
+        case = _nameable(since.case, first.stiff)
+        found = search(case, chosen.most)
+        more = stood_before(found, case)
+        if not more or len(stood) >= _STOOD:
+            return since, found
+        new = {(one.name, one.joint) for one in more}
+        stood = [*(one for one in stood if (one.name, one.joint) not in new), *more]
+        before, since = since, since_reference(first.held.prepared, reference, chosen, taken, known, stood)
+        memory.instead(before, since)
 
 
 def _nameless(told: Diagnosis, why: str) -> Diagnosis:
@@ -231,8 +254,9 @@ def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared,
         told = _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)
         return _nameless(told, _MOVED.format(moved.times)) if moved.far and not told.findings else told
     findings, beside = strongest((one.finding, *told.findings)), told.reason if told.verdict == "cause" else ""
-    return replace(told, verdict="cause", findings=findings, reason=beside, extended=one.arm,
-                   summary=sentence(Ruling("cause", (), beside), findings, turning, told.residual_rms.identify))
+    named = replace(told, verdict="cause", findings=findings, reason=beside, extended=one.arm,
+                    summary=sentence(Ruling("cause", (), beside), findings, turning, told.residual_rms.identify))
+    return with_simulation(named, followed_by(arms_of(named), now.logs)) if named.evidence else named
 
 
 def _not_accepted(told: Diagnosis, cause: str, joint: int | None, why: str) -> Diagnosis:

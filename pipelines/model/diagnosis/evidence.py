@@ -34,13 +34,12 @@ def floors_of(data: Data, left: Array) -> tuple[Floors, ...]:
     return tuple(Floors(None if one is None else one[1], orders) for one, orders in found)
 
 
-def evidence(done: Refined, floor: Array, floors: Sequence[Floors], simulated: tuple[Array, Array] | None) -> Evidence:
+def evidence(done: Refined, floor: Array, floors: Sequence[Floors]) -> Evidence:
     """Of the first log that was fitted; curves and spectra of all.
 
     Args:
         done: the nominal model.
         floors: of each joint, where they are known.
-        simulated: t (samples,) and position error (samples, joints) of the nominal arm in closed loop.
     """
     data, left = done.data, done.left
     predicted = data.y - left
@@ -56,16 +55,10 @@ def evidence(done: Refined, floor: Array, floors: Sequence[Floors], simulated: t
         spectra += _spectra(data, left, joint, floors[joint] if floors else None)
     table = np.array([[_correlation(left[data.joint == i], data.y[data.joint == j]) for j in range(data.n_joints)]
                       for i in range(data.n_joints)])
-    t, error = (None, None) if simulated is None else _thinned(*simulated)
     above = np.clip(1.0 - np.square(floor / done.rms), 0.0, 1.0)
-    return Evidence(data.logs[0].log.name, data.logs[0].t[::every], measured[::every], modelled[::every], rest[::every], t, error,
+    return Evidence(data.logs[0].log.name, data.logs[0].t[::every], measured[::every], modelled[::every], rest[::every], None, None,
                     tuple(curves), tuple(spectra), above, _bands(spectra, data.n_joints), table,
                     _torques(data, predicted))
-
-
-def _thinned(t: Array, error: Array) -> tuple[Array, Array]:
-    every = max(1, -(-len(t) // _POINTS))
-    return t[::every], error[::every]
 
 
 def _correlation(x: Array, y: Array) -> float:

@@ -38,6 +38,7 @@ class Floored:
     thresholds: Thresholds | None
     calibration: Calibration | None
     noise: DriveNoise | None  # None where nobody knows
+    judging: Array | None = None  # (joints,) [N m] what the reference logs leave at the speeds of the logs held out
     twin: Twin | None = None  # whose replicas it is, where it was made for these logs
 
 
@@ -50,7 +51,7 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
     if made is None:
         return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
     return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
-                   twin)
+                   twin=twin)
 
 
 def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,

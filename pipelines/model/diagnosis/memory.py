@@ -43,8 +43,9 @@ class Memory:
         settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed)
         return self.of("rows", (arm, *(log for part in parts for log in part)), settings, lambda: prepare(logs, chosen, arm))
 
-    def instead(self, before: Prepared, after: Prepared) -> None:
-        """Who would be given `before` is given `after`: the same rows, for laws that a diagnosis has found to fit better."""
+    def instead(self, before: A, after: A) -> None:
+        """Who would be given `before` is given `after`, which a diagnosis has found to be better: rows for laws that fit better, a
+        comparison that knows more of what stands."""
         self._known = [(name, things, asked, after if found is before else found) for name, things, asked, found in self._known]
 
     def examined(self, logs: Logs, allow_mismatch: bool) -> tuple[Check, ...]:

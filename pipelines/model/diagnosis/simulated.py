@@ -1,9 +1,13 @@
-"""Measured over simulated: the nominal and the extended model in closed loop, under the controller and references of a log."""
+"""Measured over simulated: the nominal and the extended model in closed loop, under the controller and references of a log.
+
+    followed = followed_by(arms_of(found), logs)      what takes a simulation
+    found = with_simulation(found, followed)
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 
@@ -14,32 +18,53 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.gains import in_loop
+from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.simulation import Experiment, simulate
 
-__all__ = ["with_simulation"]
+__all__ = ["Followed", "arms_of", "followed_by", "with_simulation"]
 
 _SECONDS = 3.0  # of the log that are shown
 _POINTS = 1500
 _TRIED = 2  # logs: where an arm runs away in both, others are hardly worth the time
 
 
-def with_simulation(found: Diagnosis, logs: Sequence[ExperimentLog]) -> Diagnosis:
-    """`found` with the position error of both models in the first log in which neither runs away; as it is where that is neither of
-    the first two that can be simulated."""
-    if not found.evidence or found.nominal is None:
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """How arms follow the references of a log."""
+
+    log: str  # its name
+    t: Array  # [s] (points,) since it began
+    errors: tuple[Array, ...]  # [rad] of each arm (points, joints), simulated minus measured
+
+
+def arms_of(found: Diagnosis) -> tuple[Arm, ...]:
+    """The nominal model, and the extended one where something was found."""
+    nominal = () if found.nominal is None else (found.nominal,)
+    return nominal if found.extended is None or not found.findings else (*nominal, found.extended)
+
+
+def followed_by(arms: Sequence[Arm], logs: Logs) -> Followed | None:
+    """The first log in which no arm runs away, held-out ones first; None where that is neither of the first two that can be run."""
+    if not arms:
+        return None
+    for log in islice(filter(partial(in_loop, arms[0]), (*logs.validate, *logs.identify)), _TRIED):
+        errors = [error for error in shared_out(partial(_error, log=log), arms) if error is not None]
+        if len(errors) == len(arms):
+            t = log.t[:len(errors[0])] - log.t[0]
+            every = max(1, len(t) // _POINTS)
+            return Followed(log.name, t[::every], tuple(error[::every] for error in errors))
+    return None
+
+
+def with_simulation(found: Diagnosis, followed: Followed | None) -> Diagnosis:
+    """`found` with the position errors of its `arms_of` in its first picture; as it is where it has none."""
+    if followed is None or not found.evidence:
         return found
-    arms = (found.nominal, *(() if found.extended is None or not found.findings else (found.extended,)))
-    for log in islice(filter(partial(in_loop, found.nominal), logs), _TRIED):
-        error, *more = shared_out(partial(_error, log=log), arms)
-        if error is None or any(other is None for other in more):
-            continue
-        t = log.t[:len(error)] - log.t[0]
-        every = max(1, len(t) // _POINTS)
-        first = replace(found.evidence[0], simulated_t=t[::every], simulated_position_error=error[::every], simulated_log=log.name,
-                        extended_position_error=more[0][::every] if more and more[0] is not None else None)
-        return replace(found, evidence=(first, *found.evidence[1:]))
-    return found
+    nominal, *extended = followed.errors
+    first = replace(found.evidence[0], simulated_t=followed.t, simulated_position_error=nominal, simulated_log=followed.log,
+                    extended_position_error=extended[0] if extended else None)
+    return replace(found, evidence=(first, *found.evidence[1:]))
 
 
 def _error(arm: Arm, log: ExperimentLog) -> Array | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.absorbed import Absorbed, Sessions, Unexplained, absorbed
 from pipelines.model.diagnosis.beside import less
+from pipelines.model.diagnosis.by_speed import floor_by_speed
 from pipelines.model.diagnosis.candidates import Arms, Family, families, lay_one, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.data import Data
@@ -30,6 +32,7 @@ from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.standing_shapes import fitted_shapes
+from pipelines.model.diagnosis.stood import Share, share_before
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
@@ -54,14 +57,16 @@ class Since:
     absorbed: Moved  # see `absorbed`: beside what was found in the later logs
     chance: Chance
     probed: Probed  # beside a final model: what limits are looked for with
+    floor_of: Callable[[Data], Array]  # (joints,) [N m] of logs of another motion
 
 
 def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = (),
-                    known: Known | None = None) -> Since:
+                    known: Known | None = None, stood: Sequence[Effect] = ()) -> Since:
     """Standing effects, the gate for changes, and causes that base parameters show.
 
     Args:
         before: effects that were taken out of the rows already.
+        stood: effects of which is known that they stand as well, in these shapes.
         known: what chance gives each cause on the same reference logs, where an earlier diagnosis has found it.
     """
     columns, fit = fit_nominal(reference, prepared.columns)
@@ -69,6 +74,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     data, later = joined(reference, prepared.data)
     every = families(columns.laws, whole_motion(data), arm, chosen.without)
     standing, columns, beta = fitted_shapes(standing_set(reference, fit, every, arm), columns, fit)
+    standing = _with(standing, stood, data, arm)
     base = rows_of(data, columns)
     nominal = np.concatenate([base, *law_slopes(data, columns, beta[:len(base)])[0]])
     common = _torques(data, standing, arm)
@@ -80,6 +86,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm), before_and_after)
     start = fit_columns(now, np.concatenate([rows_of(now, columns), *law_slopes(now, columns, beta[:len(base)])[0]]))
 
+    standing = _paying(standing, len(nominal), alone) if stood else standing
     left = alone.left
     floor = reference.rms(left)
     weight, there = (1.0 / np.maximum(floor, 1e-12), {}) if known is None else known
@@ -92,6 +99,14 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     def probed(found: Refined, judge: Data | None, seen: Arms) -> tuple[Probe, Thresholds]:
         fit = fit_changed(data, later, nominal, common, _slopes(found, later), found.weight)
         return Probe.of(found, judge, seen, (data, fit, later)), bounds(every, [True] * len(every), fit, later, chance)
+
+    def share(found: Refined, place: int) -> Share:
+        effects = found.model.effects
+        rest = [k for other in range(len(effects)) if other != place for k in found.of_effect(other)]
+        slopes = np.zeros((len(rest), data.rows))
+        slopes[:, later] = found.slopes[rest]
+        others = np.concatenate([apart(nominal, later), common, slopes])
+        return share_before(lay_one(data, effects[place].effect, arm), data, later, others, found.weight)
 
     acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
     model = replace(Exact.start(columns, start), standing=tuple(one for one in acting if one.effect.adds))
@@ -108,13 +123,34 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         return float(left @ left)
 
     case = Case(now, judge, model, start.weight, every, None, chosen.blocks, changed=changed,
-                shared=of_one_set, beside=(*before, *acting))
+                shared=of_one_set, beside=(*before, *acting), before=share)
 
     def moved(found: Refined, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
         return absorbed(sessions(found), arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)
 
     pairs = list(zip(standing, sizes, strict=True))
-    return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed)
+    return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed,
+                 partial(floor_by_speed, reference, left))
+
+
+def _with(standing: Sequence[Chosen], stood: Sequence[Effect], data: Data, arm: Arm) -> tuple[Chosen, ...]:
+    """With what stands as well, in place of another shape of it."""
+    known = {(one.name, one.joint) for one in stood}
+    more = (Chosen(one, 0.0, np.zeros(len(lay_one(data, one, arm)))) for one in stood)
+    return (*(one for one in standing if (one.effect.name, one.effect.joint) not in known), *more)
+
+
+def _paying(standing: Sequence[Chosen], first: int, alone: Fit) -> tuple[Chosen, ...]:
+    """Each with the share of the squared residual of its joint that it takes away in the reference logs, where its columns are
+    those of the fit from number `first` on."""
+    found = []
+    for one in standing:
+        own, first = range(first, first + len(one.amplitudes)), first + len(one.amplitudes)
+        left = fit_columns(alone.data, np.delete(alone.table, own, axis=0), alone.y, alone.weight).residual
+        here = np.full(alone.data.rows, True) if one.effect.joint is None else alone.data.joint == one.effect.joint - 1
+        gain = 1.0 - float(np.sum(np.square(alone.residual[here]))) / max(float(np.sum(np.square(left[here]))), 1e-300)
+        found.append(replace(one, gain=max(gain, 0.0)))
+    return tuple(found)
 
 
 def _slopes(found: Refined, later: Mask) -> Array:

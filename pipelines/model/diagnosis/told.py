@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.log.shared_work import meanwhile
 from pipelines.model.diagnosis.beside import Judged, acted, judged
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import untold
@@ -30,6 +31,7 @@ from pipelines.model.diagnosis.responding import Responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, ResidualRms, Threshold
 from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.simulated import arms_of, followed_by, with_simulation
 from pipelines.model.diagnosis.since import Probed
 from pipelines.model.diagnosis.steadied import steady, steady_nominal
 from pipelines.model.diagnosis.unbiased import unbiased
@@ -49,6 +51,21 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
     """
     done = replace(done, found=unbiased(steady_nominal(done.found), first.held.prepared, case, chosen.seed))
     done, responded, own = _held_against(first, case, done, floored, chosen, moved)
+    told = _told(first, case, done, responded, floored, chosen, own)
+    arms = arms_of(told) if chosen.evidence else ()
+    with meanwhile(lambda: followed_by(arms, first.held.prepared.logs)) as followed:
+        limits, beyond = _limits(done.found.steps[-1], case, first.held.prepared, probed) if chosen.limits else ((), ())
+        hidden = (*told.not_testable, *beyond, *untold(first.stiff, chosen.without))
+        return with_simulation(replace(told, detectable=limits, not_testable=hidden), followed())
+
+
+def _told(first: Responding, case: Case, done: Settled, responded: Judged, floored: Floored, chosen: DiagnosisSettings,
+          own: Array | None) -> Diagnosis:
+    """All of it but the limits and how the arm follows.
+
+    Args:
+        own: (joints,) [N m] floor of the held-out logs.
+    """
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
     plain = nominal if first.held.plain is None else steady(first.held.plain)  # nothing taken out for what responses name
@@ -61,19 +78,18 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
     thresholds = last.thresholds
     bounds = tuple(Threshold(f.cause, f.joint, float(g / last.before.rss), thresholds.origin)
                    for f, g in zip(case.families, thresholds.gain, strict=True))
-    limits, beyond = _limits(last, case, prepared, probed) if chosen.limits else ((), ())
     hidden = not_testable(prepared.data, nominal.fit, nominal.model.columns, found.steps[0].screened, nominal.model.arm,
                           bool(prepared.referring), chosen.without)
     judge = first.held.judge if parts else prepared.judge
     rms = [ResidualRms(one.rms, (one.data if rows is None else rows).rms(held_out_left(one, rows, chosen.blocks)), floored.rms)
            for one, rows in ((plain, judge), (responded.final, responded.judge))]
     made = floored.calibration
-    pictures = (evidence(plain, floored.rms, () if made is None else made.floors, None),) if chosen.evidence else ()
+    pictures = (evidence(plain, floored.rms, () if made is None else made.floors),) if chosen.evidence else ()
     arm = extended_arm(replace(found, final=responded.final), ruling)
     standing = [one for one in case.beside if one not in first.held.acting]
     return Diagnosis(
-        ruling.verdict, sentence(ruling, named, arm.robot.revolute, plain.rms), named, (), rejected(found, ruling), limits,
-        (*first.undecided, *hidden, *beyond, *untold(first.stiff, chosen.without)), rms[0], "what is wrong",
+        ruling.verdict, sentence(ruling, named, arm.robot.revolute, plain.rms), named, (), rejected(found, ruling), (),
+        (*first.undecided, *hidden), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
         0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise, own,
@@ -90,8 +106,9 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: Floored
     if judge is None or responded.judge is None or floored.noise is None:
         return done, responded, None
     final = responded.final
+    before = floored.rms if floored.judging is None else floored.judging
     own = motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
-                       floored.rms, chosen.seed, case.beside)
+                       before, chosen.seed, case.beside)
     if own is None:
         return done, responded, None
     if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:

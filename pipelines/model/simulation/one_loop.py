@@ -9,8 +9,10 @@ robot, small arrays cost more than the arithmetic of its controller and half as 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from itertools import chain, islice, repeat
 from math import nan
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -55,7 +57,7 @@ class OneLoop:
         self._experiment = experiment
         self._step = OneRRR(plant, experiment.sample_time, steps).step
         scope: dict[str, Any] = {}
-        exec(compile(_text(experiment, steps), "<one RRR arm and its controller>", "exec"), scope)
+        exec(_code(_text(experiment, steps)), scope)
         self._loop: Callable[..., tuple[_Now, tuple[Any, ...]]] = scope["loop"]
 
     @staticmethod
@@ -109,6 +111,11 @@ def _text(experiment: Experiment, steps: int) -> str:
     memory = ", ".join([*(f"a{j}, b{j}, d{j}" for j in _JOINTS), *(f"i{j}" for j in _JOINTS), *(f"w{j}" for j in _JOINTS)])
     law = "\n".join(f"        {line}" for j in _JOINTS for line in _lines(experiment, j))
     return _LOOP.format(memory=memory, law=law, steps="\n".join([_STEP] * steps))
+
+
+@lru_cache(maxsize=32)  # experiments of a robot have one controller, mostly
+def _code(text: str) -> CodeType:
+    return compile(text, "<one RRR arm and its controller>", "exec")
 
 
 def _lines(experiment: Experiment, j: int) -> list[str]:

@@ -8,7 +8,9 @@ would cost as much as the arithmetic.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from math import cos, nan, sin, tanh
+from types import CodeType
 from typing import Any
 
 from pipelines.model.rigid.body import Array
@@ -124,9 +126,14 @@ def _compiled(plant: Plant, h: float) -> _Step:
     unpacked = f"    {', '.join(f'load{k}' for k in range(len(loads)))}, = loads" if loads else ""
     text = _STEP.format(**stages, unpacked=unpacked, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))
     scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, "loads": loads}
-    exec(compile(text, "<one step of an RRR arm>", "exec"), scope)
+    exec(_code(text), scope)
     step: _Step = scope["step"]
     return step
+
+
+@lru_cache(maxsize=32)  # an arm is run again and again: in each experiment, with each noise, with halved steps
+def _code(text: str) -> CodeType:
+    return compile(text, "<one step of an RRR arm>", "exec")
 
 
 def _numbers(plant: Plant) -> dict[str, str]:

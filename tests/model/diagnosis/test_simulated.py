@@ -1,4 +1,4 @@
-"""Which log shows measured over simulated."""
+"""Which log shows measured over simulated, and whose errors."""
 
 from __future__ import annotations
 
@@ -23,16 +23,22 @@ class Evidence:
 @dataclass(frozen=True)
 class Told:
     evidence: tuple[Evidence, ...]
-    nominal: str = "nominal"
-    extended: str = "extended"
+    nominal: str | None = "nominal"
+    extended: str | None = "extended"
     findings: tuple[str, ...] = ("one",)
+
+
+def logs_of(validate: str, identify: str) -> Any:
+    return SimpleNamespace(**{role: [SimpleNamespace(name=name, t=np.arange(3.0) + 5.0) for name in names]
+                              for role, names in (("validate", validate), ("identify", identify))})
 
 
 @pytest.mark.parametrize(("in_loop", "away", "shown", "looked_at"), [
     ("abc", "", "a", "a"), ("bc", "b", "c", "abc"), ("abcd", "ab", "", "ab"), ("d", "", "d", "abcd"), ("", "", "", "abcd")])
 def test_the_first_log_in_which_no_model_runs_away_is_shown(in_loop: str, away: str, shown: str, looked_at: str,
                                                             monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of two that can be simulated; no log behind these is looked at. That the extended model runs away is enough."""
+    """Of two that can be simulated, held-out ones first; no log behind these is looked at. That the extended model runs away is
+    enough."""
     seen: list[str] = []
 
     def known(arm: str, log: Any) -> bool:
@@ -45,11 +51,23 @@ def test_the_first_log_in_which_no_model_runs_away_is_shown(in_loop: str, away: 
     monkeypatch.setattr(simulated, "in_loop", known)
     monkeypatch.setattr(simulated, "_error", error)
     monkeypatch.setattr(simulated, "shared_out", lambda work, arms: [work(arm) for arm in arms])
-    logs: Any = [SimpleNamespace(name=name, t=np.arange(3.0) + 5.0) for name in "abcd"]
     told: Any = Told((Evidence(), Evidence()))
-    found: Any = simulated.with_simulation(told, logs)
+    found: Any = simulated.with_simulation(told, simulated.followed_by(simulated.arms_of(told), logs_of("ab", "cd")))
     first, second = found.evidence
     assert (first.simulated_log, "".join(seen), second) == (shown, looked_at, Evidence())
     if shown:
         assert first.simulated_t.tolist() == [0.0, 1.0, 2.0]
         assert (first.simulated_position_error[0], first.extended_position_error[0]) == (7.0, 8.0)
+
+
+@pytest.mark.parametrize(("told", "arms"), [
+    (Told(()), ("nominal", "extended")), (Told((), findings=()), ("nominal",)), (Told((), extended=None), ("nominal",)),
+    (Told((), nominal=None, extended=None), ())])
+def test_an_arm_is_extended_by_what_was_found(told: Any, arms: tuple[str, ...]) -> None:
+    assert simulated.arms_of(told) == arms
+
+
+def test_no_arm_is_asked_in_no_log() -> None:
+    told: Any = Told((Evidence(),))
+    assert simulated.followed_by((), logs_of("a", "")) is None
+    assert simulated.with_simulation(told, None) is told

@@ -1,0 +1,144 @@
+"""What the reference logs have as well has not changed, though it may pay little in their motion; nor has what is no more than they
+leave of a joint that moves as slowly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.diagnosis.by_speed import floor_by_speed
+from pipelines.model.diagnosis.candidates import lay_one
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.nominal import rows_of
+from pipelines.model.diagnosis.pruned import stood_before
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.standing import apart, joined
+from pipelines.model.diagnosis.stood import Share, share_before
+from pipelines.model.effects import effect_names, find_effect
+from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.body import Motion
+from tests.model.diagnosis.arms import arm, hidden
+
+DRAG = 0.4  # [N m s²/rad²] at joint 2
+SETTINGS = DiagnosisSettings(without=tuple(name for name in effect_names() if name != "quadratic_drag"), evidence=False,
+                             limits=False)
+
+
+def drag(times: float) -> Callable[[Motion], Array]:
+    def load(motion: Motion) -> Array:
+        out = np.zeros_like(motion.q)
+        out[:, 1] = times * DRAG * motion.dq[:, 1] * np.abs(motion.dq[:, 1])
+        return out
+    return load
+
+
+def wave(times: float, phase: float) -> Callable[[Motion], Array]:
+    """0.1 N m at joint 2, eleven waves a turn."""
+    def load(motion: Motion) -> Array:
+        out = np.zeros_like(motion.q)
+        out[:, 1] = times * 0.1 * np.sin(11.0 * motion.q[:, 1] + phase)
+        return out
+    return load
+
+
+def share(effect: Effect, was: Callable[[Motion], Array], now: Callable[[Motion], Array]) -> Share:
+    """Of logs with `was`, then `now`."""
+    before = replace(hidden(4, was), role="reference", name="before")
+    prepared = prepare(Logs((hidden(1, now),), (), (before,)), SETTINGS)
+    assert prepared.reference is not None
+    data, later = joined(prepared.reference, prepared.data)
+    others = apart(rows_of(data, prepared.columns), later)
+    return share_before(lay_one(data, effect, arm()), data, later, others, np.array([50.0, 100.0, 200.0]))
+
+
+@pytest.mark.parametrize(("was", "stood", "doubtful"), [
+    (0.0, False, False), (0.1, False, False), (0.4, False, True), (1.0, True, True), (-1.0, False, False)])
+def test_one_amplitude(was: float, stood: bool, doubtful: bool) -> None:
+    """What was there with the other sign has changed for sure."""
+    found = share(find_effect("quadratic_drag")(joint=2), drag(was), drag(1.0))
+    assert found.same == pytest.approx(was, abs=0.05)
+    assert found.whole == pytest.approx(abs(was), abs=0.05)
+    assert found.std < 0.05
+    assert (found.stood, found.doubtful) == (stood, doubtful)
+
+
+def test_as_much_in_another_phase_is_no_change_that_one_can_be_sure_of() -> None:
+    cogging = replace(find_effect("cogging")(joint=2), order=11.0)  # type: ignore[call-arg]
+    quarter = share(cogging, wave(0.5, 0.6 + 0.5 * np.pi), wave(1.0, 0.6))
+    assert quarter.same == pytest.approx(0.0, abs=0.1)
+    assert quarter.whole == pytest.approx(0.5, abs=0.1)
+    assert (quarter.stood, quarter.doubtful) == (False, True)
+
+
+def test_where_the_reference_logs_do_not_tell_nothing_stood() -> None:
+    assert not Share(0.9, 1.2, 0.6).stood
+
+
+def test_what_is_known_to_stand_is_taken_out_of_the_later_logs() -> None:
+    """Though the reference logs' own standing set lacks it."""
+    logs = Logs((hidden(1, drag(1.0)),), (hidden(2, drag(1.0)),), (replace(hidden(4, drag(1.0)), role="reference"),))
+    prepared = prepare(logs, SETTINGS)
+    assert prepared.reference is not None
+    nothing = replace(SETTINGS, without=effect_names())
+    plain = since_reference(prepared, prepared.reference, nothing)
+    known = since_reference(prepared, prepared.reference, nothing, stood=(find_effect("quadratic_drag")(joint=2),))
+    assert not plain.standing
+    (one,) = known.standing
+    assert (one.cause, one.joint) == ("quadratic_drag", 2)
+    assert one.parameters["coefficient"].value == pytest.approx(DRAG, rel=0.05)
+    assert one.explained > 0.5
+    assert known.floor[1] < 0.5 * plain.floor[1]
+    assert known.case.judge is not None
+    assert plain.case.judge is not None
+    moved = [one.case.data.y - one.case.model.torque(one.case.data) for one in (plain, known)]
+    assert known.case.data.rms(moved[1])[1] < 0.5 * plain.case.data.rms(moved[0])[1]
+
+
+def test_an_event_is_never_asked() -> None:
+    effects = (SimpleNamespace(log=1, effect="contact"), SimpleNamespace(log=None, effect="drag"))
+    found: Any = SimpleNamespace(final=SimpleNamespace(model=SimpleNamespace(effects=effects)))
+    asked: list[int] = []
+
+    def before(_: Any, place: int) -> Share:
+        asked.append(place)
+        return Share(1.0, 1.0, 0.01)
+
+    case: Any = SimpleNamespace(before=before)
+    assert (stood_before(found, case), asked) == (["drag"], [1])
+    nobody: Any = SimpleNamespace(before=None)
+    assert stood_before(found, nobody) == []
+
+
+def rows(log: ExperimentLog) -> Data:
+    return prepare(Logs((log,)), SETTINGS).data
+
+
+def test_where_joints_move_slowly_the_floor_is_what_is_left_at_low_speed() -> None:
+    """Of reference logs that leave three times as much of joint 2 below 0.3 rad/s."""
+    reference = rows(hidden(4))
+    speed = np.concatenate([np.abs(one.at_rows(one.motion.dq)) for one in reference.logs])
+    slow = np.zeros(reference.rows, dtype=bool)
+    slow[reference.joint == 1] = speed[:, 1] < 0.3
+    left = 0.01 * np.random.default_rng(1).standard_normal(reference.rows) * np.where(slow, 3.0, 1.0)
+    floor = reference.rms(left)
+    assert floor_by_speed(reference, left, reference) == pytest.approx(floor)
+    assert floor_by_speed(reference, left, rows(hidden(5))) == pytest.approx(floor)
+    crawl = rows(slowed(hidden(1), 40.0))
+    found = floor_by_speed(reference, left, crawl)
+    assert found[[0, 2]] == pytest.approx(floor[[0, 2]])
+    assert found[1] == pytest.approx(0.03, rel=0.15)
+
+
+def slowed(log: ExperimentLog, times: float) -> ExperimentLog:
+    """The same angles less far from where they begin: every speed is so many times lower."""
+    q = log.signals["q"].values
+    less = replace(log.signals["q"], values=q[0] + (q - q[0]) / times)
+    return replace(log, signals={**log.signals, "q": less})
