@@ -6,8 +6,9 @@
         ...
         found = answer()                      work()
 
-The other process is a copy of this one, made where a second processor is there and nobody else has it: what `work` needs it has
-already, and its answers are copied back. A piece gets the same answer in either: the outcome does not hang on how the pieces fell.
+The other process is a copy of this one, made where there is a second processor and this is none of a batch's workers: what `work`
+needs it has already, and its answers are copied back. A piece gets the same answer in either: the outcome does not hang on how
+the pieces fell.
 """
 
 from __future__ import annotations

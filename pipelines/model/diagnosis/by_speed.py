@@ -16,8 +16,8 @@ from pipelines.model.diagnosis.data import Data
 
 __all__ = ["floor_by_speed"]
 
-_PARTS = 4  # of the rows, by speed, with as many of the later logs in each
-_FEWEST = 30  # rows that tell
+_PARTS = (4, 2, 1)  # of the rows, by speed, with as many of the later logs in each
+_FEWEST = 30  # rows of the reference logs in each
 _MORE = 1.1  # times the floor as it is: less is chance, among motions of one kind
 
 
@@ -34,20 +34,24 @@ def floor_by_speed(reference: Data, left: Array, data: Data) -> Array:
         known, asked = reference.counts[reference.joint == joint], data.counts[data.joint == joint]
         if not (known.any() and asked.any()):
             continue
-        now, then, power = ours[asked, joint], theirs[known, joint], np.square(left[reference.joint == joint][known])
-        there = float(np.sqrt(np.mean([_of_part(part, then, power) for part in np.array_split(np.sort(now), _PARTS) if len(part)])))
+        power = np.square(left[reference.joint == joint][known])
+        there = np.sqrt(_power_at(ours[asked, joint], theirs[known, joint], power))
         out[joint] = there if there > _MORE * floor[joint] else floor[joint]
     return out
 
 
-def _of_part(now: Array, then: Array, power: Array) -> float:
-    """Mean `power` of the rows whose speed `then` is one of `now`, which is sorted; of the nearest, where these are few."""
-    own = (then >= now[0]) & (then <= now[-1])
-    if np.count_nonzero(own) < _FEWEST:
-        own = np.argsort(np.abs(then - np.median(now)), kind="stable")[:_FEWEST]
-    return float(np.mean(power[own]))
+def _power_at(now: Array, then: Array, power: Array) -> float:
+    """Mean `power` of rows of speed `then`, with as many slow and fast ones as there are `now`; of all, where hardly any was as
+    slow, at rest say."""
+    ordered = np.sort(now)
+    for count in _PARTS:
+        parts = [part for part in np.array_split(ordered, count) if len(part)]
+        own = [(then >= part[0]) & (then <= part[-1]) for part in parts]
+        if all(np.count_nonzero(each) >= _FEWEST for each in own):
+            return float(np.mean([power[each].mean() for each in own]))
+    return float(np.mean(power))
 
 
 def _speeds(data: Data) -> Array:
-    """(rows of a joint, joints) [rad/s] at every row, without sign."""
+    """(rows of a joint, joints) [rad/s], or [m/s], at every row, without sign."""
     return np.asarray(np.abs(np.concatenate([one.at_rows(one.motion.dq) for one in data.logs])))

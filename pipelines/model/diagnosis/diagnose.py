@@ -39,7 +39,7 @@ from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.oscillating import oscillation
 from pipelines.model.diagnosis.own_motion import put_right
-from pipelines.model.diagnosis.pruned import settled, stood_before
+from pipelines.model.diagnosis.pruned import settled
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
@@ -50,6 +50,7 @@ from pipelines.model.diagnosis.simulated import arms_of, followed_by, with_simul
 from pipelines.model.diagnosis.since import Known, Since, since_reference
 from pipelines.model.diagnosis.steadied import steady_nominal
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
+from pipelines.model.diagnosis.unchanged import stood_before
 from pipelines.model.diagnosis.verdict import Ruling, rule
 from pipelines.model.diagnosis.words import within
 from pipelines.model.effects import find_effect
@@ -186,6 +187,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     taken = first.held.case.beside
     since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else
              memory.since(first.held.prepared, chosen))
+    alone = since
     since, found = _compared(first, since, reference, chosen, known, memory)
     case = _nameable(since.case, first.stiff)
     floor = since.floor_of(case.data)
@@ -199,13 +201,14 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
         noise = drives()
     moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
     if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
-        done = unnamed(done, _with_load(found, case, now, floor, noise, chosen.seed))
-    floored = Floored(floor, "reference logs", None, given, noise, None if case.judge is None else since.floor_of(case.judge))
+        done = unnamed(done, _with_load(found, case, now, since.floor, floor, noise, chosen.seed))
+    judging = 1.0 if case.judge is None else np.square(since.floor_of(case.judge) / since.floor)
+    floored = Floored(floor, "reference logs", None, given, noise, since.floor, judging)
     told = diagnosis_of(first, case, done, floored, chosen, since.probed, isinstance(moved, Absorbed) and not moved.unsure)
     if given is None:
         told = replace(told, calibration=Calibration(
-            origin_of("reference logs", logs, None, chosen), conditions_of(now), since.chance.weight, since.floor,
-            np.full(case.data.n_joints, np.nan), since.chance.bounds, None, ()))
+            origin_of("reference logs", logs, None, chosen), conditions_of(now), alone.chance.weight, alone.floor,
+            np.full(case.data.n_joints, np.nan), alone.chance.bounds, None, ()))
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
     if isinstance(moved, Unexplained):
         return _nameless(told, _MOVED.format(moved.times)) if told.verdict == "nothing-wrong" else told
@@ -216,16 +219,15 @@ def _compared(first: Responding, since: Since, reference: Data, chosen: Diagnosi
               memory: Memory) -> tuple[Since, Found]:
     """The search in what has changed. What it finds that stood in the reference logs as well is taken out with the rest that
     stands, and it searches again."""
-    taken, stood = first.held.case.beside, list[Effect]()
+    taken, stood = first.held.case.beside, {(one.name, one.joint): one for one in since.stood}
     while True:
         case = _nameable(since.case, first.stiff)
         found = search(case, chosen.most)
-        more = stood_before(found, case)
-        if not more or len(stood) >= _STOOD:
+        more = {(one.name, one.joint): one for one in stood_before(found, case)}
+        if more.keys() <= stood.keys() or len(stood) >= _STOOD:
             return since, found
-        new = {(one.name, one.joint) for one in more}
-        stood = [*(one for one in stood if (one.name, one.joint) not in new), *more]
-        before, since = since, since_reference(first.held.prepared, reference, chosen, taken, known, stood)
+        stood = more | stood  # each once: what is found of it again has changed
+        before, since = since, since_reference(first.held.prepared, reference, chosen, taken, known, tuple(stood.values()))
         memory.instead(before, since)
 
 
@@ -271,9 +273,10 @@ def _alike(effect: Effect, found: Iterable[Finding]) -> Finding | None:
     return next((one for one in found if one.cause in effect.twins or effect.name in find_effect(one.cause).twins), None)
 
 
-def _with_load(found: Found, case: Case, now: Prepared, before: Array, noise: DriveNoise | None, seed: int) -> Array:
-    """(joints,) [N m] floor of the later logs, whose arm is heavier: it reverses more slowly; `before` where nobody can tell."""
+def _with_load(found: Found, case: Case, now: Prepared, before: Array, floor: Array, noise: DriveNoise | None, seed: int) -> Array:
+    """(joints,) [N m] floor of the later logs, whose arm is heavier: it reverses more slowly; `floor`, that of the reference logs
+    `before` at such speeds, where nobody can tell."""
     arm = acted(found.nominal.model.arm, case.beside)
     own = None if noise is None else motion_floor(found.nominal.model, arm, noise, now.motions, case.data, now, before, seed,
-                                                  case.beside)
-    return before if own is None else np.maximum(own, before)
+                                                  case.beside, np.square(floor / before))
+    return floor if own is None else np.maximum(own, floor)

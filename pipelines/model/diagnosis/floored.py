@@ -38,7 +38,8 @@ class Floored:
     thresholds: Thresholds | None
     calibration: Calibration | None
     noise: DriveNoise | None  # None where nobody knows
-    judging: Array | None = None  # (joints,) [N m] what the reference logs leave at the speeds of the logs held out
+    reference: Array | None = None  # (joints,) [N m] what all the reference logs leave, whatever their speeds
+    judging: Array | float = 1.0  # (joints,) times as much power the reference logs leave at the speeds of the logs held out
     twin: Twin | None = None  # whose replicas it is, where it was made for these logs
 
 

@@ -45,7 +45,7 @@ _COPIES = 2
 
 
 def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, data: Data, prepared: Prepared, before: Array,
-                 seed: int, standing: Sequence[Acting] = ()) -> Array | None:
+                 seed: int, standing: Sequence[Acting] = (), times: Array | float = 1.0) -> Array | None:
     """(joints,) [N m] root mean square; None where a log has no controller, or the arm in order cannot be simulated.
 
     Args:
@@ -54,6 +54,7 @@ def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, da
         noise: of the drives.
         motions: the logs, held out or fitted; `data` their rows.
         before: (joints,) [N m] what the reference logs leave, where there are any.
+        times: (joints,) as much power of what no law has there is in this motion as in the reference logs.
         standing: effects of the machine beside the model; what of its friction they are, the arm in order has too.
     """
     bare = replace(model, effects=())
@@ -77,7 +78,7 @@ def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, da
     for _, rows in asked:
         square, count = np.sum([power for piece, power in known if piece.rows is rows], axis=0)
         left.append(square / np.maximum(count, 1.0))
-    misfit = np.maximum(np.square(before) - left[1], 0.0) if len(left) > 1 else 0.0
+    misfit = times * np.maximum(np.square(before) - left[1], 0.0) if len(left) > 1 else 0.0
     return np.asarray(np.sqrt(left[0] + misfit))
 
 

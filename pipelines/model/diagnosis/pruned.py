@@ -27,6 +27,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.straying import simulated_steps, strays
+from pipelines.model.diagnosis.unchanged import no_change
 from pipelines.model.diagnosis.verdict import (
     REST_UNKNOWN,
     Ruling,
@@ -35,14 +36,13 @@ from pipelines.model.diagnosis.verdict import (
     held_out_high,
     much_without_name,
     seen_in,
-    takes_most,
     too_little,
     without_steps,
 )
 from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
 
-__all__ = ["NEAR_THE_FLOOR", "Settled", "at_odds", "settled", "stood_before", "vague"]
+__all__ = ["NEAR_THE_FLOOR", "Settled", "at_odds", "settled", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _MENDS = 0.1  # of the nominal residual's power, by which a twin of an earlier cause is one of its own
@@ -54,8 +54,6 @@ _TRACE = 0.01  # of the nominal residual's power, by which a law like one that s
 _REST_OF_GAP = 0.05  # the same, by which what is found at the joint of a gap is what no law of that has
 _NEXT_TO_NOTHING = 0.02  # of what stands above the noise: all that was found is not what is wrong, where that has no name
 _SHAPE = "it only mends the shape of what was found before it at the joint, or stood there"
-_AS_MUCH = "its joint moves as in no reference log, and no more is left of it than these leave at such speeds"
-_UNCHANGED = "the reference logs may have had it: by itself they ask for some of it as well"
 _BESIDE = "most of what is wrong has no name, and beside that this one is not sure"
 _NO_SIZE = "its size is within five standard deviations of none"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
@@ -81,7 +79,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     simulated = simulated_steps(found, case, prepared)
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
     elsewhere = {k: at_which(plain.steps[k], case.shared) for k in ruling.named}
-    doubts = {k: ONLY_THEN if only_then(found.final, k) else elsewhere[k] or _there_before(found, k, case, floor) or
+    doubts = {k: ONLY_THEN if only_then(found.final, k) else elsewhere[k] or no_change(found, k, case, floor) or
               at_odds(found, k, prepared, case) or
               strays(found, plain, k, simulated, prepared, case, late, partial(_less, found, k, case)) for k in ruling.named}
     doubts = dict(ruling.doubts) | {k: why for k, why in doubts.items() if why}
@@ -154,23 +152,6 @@ def _unseen(found: Found, kept: list[int], final: Refined, case: Case, floor: Ar
     rows = case.data if case.judge is None else case.judge
     nominal, last = (rows.rms(held_out_left(one, case.judge, case.blocks)) for one in (found.nominal, final))
     return [k for k in kept if not seen_in(found.steps[k], nominal, last, floor)]
-
-
-def stood_before(found: Found, case: Case) -> list[Effect]:
-    """What was found of which the reference logs have as much."""
-    every = enumerate(found.final.model.effects)
-    return [] if case.before is None else [one.effect for k, one in every if one.log is None and case.before(found.final, k).stood]
-
-
-def _there_before(found: Found, k: int, case: Case, floor: Array) -> str:
-    """Why step `k` may be no change; empty where it is one."""
-    best = found.steps[k].best
-    if case.before is None or best is None or best.log is not None:
-        return ""
-    own = takes_most(found.steps[k], floor) if best.effect.joint is None else best.effect.joint - 1
-    if own in case.unlike and found.steps[k].before.rms[own] <= floor[own]:
-        return _AS_MUCH
-    return _UNCHANGED if case.before(found.final, k).doubtful else ""
 
 
 def _not_told(step: Step, simulated: Sequence[Simulation], case: Case, late: bool) -> bool:

@@ -58,12 +58,13 @@ def followed_by(arms: Sequence[Arm], logs: Logs) -> Followed | None:
 
 
 def with_simulation(found: Diagnosis, followed: Followed | None) -> Diagnosis:
-    """`found` with the position errors of its `arms_of` in its first picture; as it is where it has none."""
-    if followed is None or not found.evidence:
+    """`found` with the position errors of its `arms_of` in its first picture; without any where they could not be simulated."""
+    if not found.evidence:
         return found
-    nominal, *extended = followed.errors
-    first = replace(found.evidence[0], simulated_t=followed.t, simulated_position_error=nominal, simulated_log=followed.log,
-                    extended_position_error=extended[0] if extended else None)
+    t, log = (None, "") if followed is None else (followed.t, followed.log)
+    nominal, extended = (*(() if followed is None else followed.errors), None, None)[:2]
+    first = replace(found.evidence[0], simulated_t=t, simulated_position_error=nominal, simulated_log=log,
+                    extended_position_error=extended)
     return replace(found, evidence=(first, *found.evidence[1:]))
 
 

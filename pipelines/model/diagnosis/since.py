@@ -58,6 +58,7 @@ class Since:
     chance: Chance
     probed: Probed  # beside a final model: what limits are looked for with
     floor_of: Callable[[Data], Array]  # (joints,) [N m] of logs of another motion
+    stood: tuple[Effect, ...]  # those of the standing effects that later logs have shown
 
 
 def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = (),
@@ -130,7 +131,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
 
     pairs = list(zip(standing, sizes, strict=True))
     return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed,
-                 partial(floor_by_speed, reference, left))
+                 partial(floor_by_speed, reference, left), tuple(stood))
 
 
 def _with(standing: Sequence[Chosen], stood: Sequence[Effect], data: Data, arm: Arm) -> tuple[Chosen, ...]:
@@ -141,11 +142,14 @@ def _with(standing: Sequence[Chosen], stood: Sequence[Effect], data: Data, arm: 
 
 
 def _paying(standing: Sequence[Chosen], first: int, alone: Fit) -> tuple[Chosen, ...]:
-    """Each with the share of the squared residual of its joint that it takes away in the reference logs, where its columns are
-    those of the fit from number `first` on."""
+    """Those of which nobody knows it with the share of the squared residual of their joint that they take away in the reference
+    logs, beside all others; the columns of all are those of the fit from number `first` on."""
     found = []
     for one in standing:
         own, first = range(first, first + len(one.amplitudes)), first + len(one.amplitudes)
+        if one.gain:
+            found.append(one)
+            continue
         left = fit_columns(alone.data, np.delete(alone.table, own, axis=0), alone.y, alone.weight).residual
         here = np.full(alone.data.rows, True) if one.effect.joint is None else alone.data.joint == one.effect.joint - 1
         gain = 1.0 - float(np.sum(np.square(alone.residual[here]))) / max(float(np.sum(np.square(left[here]))), 1e-300)

@@ -27,8 +27,10 @@ from pipelines.model.diagnosis.nominal import fit_columns
 
 __all__ = ["Share", "share_before"]
 
-_SAME, _SURE = 0.5, 0.25  # of what is there now, that was there before at least; its standard deviation at most
+_SAME, _TWICE, _SURE = 0.5, 2.0, 0.25  # of what is there now, that was there before: at least, at most; its standard deviation
 _LIKE = 0.3  # the same in any shape, from which it may have been there
+_CHANCE = 2.0  # of these deviations, below which nobody knows
+_NOTHING = 1e-3  # of the length of columns: what is left of them is rounding
 
 
 @dataclass(frozen=True)
@@ -41,16 +43,20 @@ class Share:
 
     @property
     def stood(self) -> bool:
-        return self.same >= _SAME and self.std <= _SURE
+        return _SAME <= self.same <= _TWICE and self.std <= _SURE
 
     @property
     def doubtful(self) -> bool:
-        """What was there with the other sign is no such thing: it has changed all the more."""
-        return self.whole > _LIKE and self.same > -_SAME
+        """What was there with the other sign is no such thing: it has changed all the more. Nor where the reference logs do not
+        tell: noise has a size as well."""
+        like = np.sqrt(max(self.whole**2 - self.std**2, 0.0))
+        return bool(like > _LIKE and self.whole > _CHANCE * self.std and self.same > -_SAME)
 
 
 def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], others: Array, weight: Array) -> Share:
     """Of a cause's amplitudes in one system, each with its own before and after.
+
+    A cause that stands already, in this shape, has its share in `others`: of what is new the reference logs have nothing.
 
     Args:
         columns: (k, rows) of the cause.
@@ -60,6 +66,9 @@ def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], other
     """
     count = len(columns)
     before, after = np.where(later, 0.0, columns), np.where(later, columns, 0.0)
+    taken = fit_columns(data, np.concatenate([others, after]), weight=weight)
+    if np.linalg.norm(taken.project(before)) <= _NOTHING * np.linalg.norm(before * taken.weights):
+        return Share(0.0, 0.0, 0.0 if before.any() else np.inf)
     fit = fit_columns(data, np.concatenate([others, before, after]), weight=weight)
     own = slice(len(others), len(others) + count)
     was, now = fit.beta[own], fit.beta[own.stop:]

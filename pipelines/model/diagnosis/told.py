@@ -8,6 +8,7 @@ Before it is told, it is held against the logs that nothing was fitted to: they 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -53,7 +54,8 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
     done, responded, own = _held_against(first, case, done, floored, chosen, moved)
     told = _told(first, case, done, responded, floored, chosen, own)
     arms = arms_of(told) if chosen.evidence else ()
-    with meanwhile(lambda: followed_by(arms, first.held.prepared.logs)) as followed:
+    beside = meanwhile(lambda: followed_by(arms, first.held.prepared.logs)) if arms else nullcontext(lambda: None)
+    with beside as followed:
         limits, beyond = _limits(done.found.steps[-1], case, first.held.prepared, probed) if chosen.limits else ((), ())
         hidden = (*told.not_testable, *beyond, *untold(first.stiff, chosen.without))
         return with_simulation(replace(told, detectable=limits, not_testable=hidden), followed())
@@ -106,9 +108,9 @@ def _held_against(first: Responding, case: Case, done: Settled, floored: Floored
     if judge is None or responded.judge is None or floored.noise is None:
         return done, responded, None
     final = responded.final
-    before = floored.rms if floored.judging is None else floored.judging
+    known = floored.rms if floored.reference is None else floored.reference
     own = motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
-                       before, chosen.seed, case.beside)
+                       known, chosen.seed, case.beside, floored.judging)
     if own is None:
         return done, responded, None
     if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:

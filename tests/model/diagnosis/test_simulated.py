@@ -68,6 +68,9 @@ def test_an_arm_is_extended_by_what_was_found(told: Any, arms: tuple[str, ...]) 
 
 
 def test_no_arm_is_asked_in_no_log() -> None:
-    told: Any = Told((Evidence(),))
+    """What an earlier simulation has shown is none of this model's then."""
     assert simulated.followed_by((), logs_of("a", "")) is None
-    assert simulated.with_simulation(told, None) is told
+    told: Any = Told((Evidence(np.zeros(1), np.ones((1, 3)), "old", np.ones((1, 3))), Evidence("kept")))
+    assert simulated.with_simulation(told, None).evidence == (Evidence(), Evidence("kept"))
+    nothing: Any = Told(())
+    assert simulated.with_simulation(nothing, None) is nothing

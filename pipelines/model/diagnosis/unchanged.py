@@ -1,0 +1,36 @@
+"""What was found beside reference logs and is no change since then.
+
+    stood_before(found, case)              effects that stood before, and may be taken out with the rest that stands
+    no_change(found, k, case, floor)       why step `k` is not believed to have changed
+"""
+
+from __future__ import annotations
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.search import Found
+from pipelines.model.diagnosis.verdict import takes_most
+from pipelines.model.effects.base import Effect
+
+__all__ = ["no_change", "stood_before"]
+
+_AS_MUCH = "its joint moves as in no reference log, and no more is left of it than these leave at such speeds"
+_UNCHANGED = "the reference logs may have had it: by itself they ask for some of it as well"
+
+
+def stood_before(found: Found, case: Case) -> list[Effect]:
+    """What was found of which the reference logs have as much, and which the standing set may have."""
+    every = () if case.before is None else tuple(enumerate(found.final.model.effects))
+    able = [(k, one.effect) for k, one in every if one.log is None and not one.effect.needs]
+    return [effect for k, effect in able if case.before is not None and case.before(found.final, k).stood]
+
+
+def no_change(found: Found, k: int, case: Case, floor: Array) -> str:
+    """Why step `k` may be no change; empty where it is one."""
+    best = found.steps[k].best
+    if case.before is None or best is None or best.log is not None:
+        return ""
+    own = takes_most(found.steps[k], floor) if best.effect.joint is None else best.effect.joint - 1
+    if own in case.unlike and found.steps[k].before.rms[own] <= floor[own]:
+        return _AS_MUCH
+    return _UNCHANGED if case.before(found.final, k).doubtful else ""
