@@ -160,14 +160,14 @@ def _short(machine: Machine, seeds: list[int]) -> Plans:
 
 def _fast(machine: Machine, seeds: list[int]) -> Plans:
     one, two, three, _ = seeds
-    return [experiments.excitation(machine, one, 10.0, 2), experiments.excitation(machine, two, 10.0, 1),
-            experiments.excitation(machine, three, 10.0, 1).judging()]
+    return [experiments.excitation(machine, one, 10.0, 2), experiments.excitation(machine, two, 10.0, 2),
+            experiments.excitation(machine, three, 12.0, 1).judging()]
 
 
 def _slow(machine: Machine, seeds: list[int]) -> Plans:
     one, two, three, _ = seeds
-    return [experiments.free(machine, one, 16.0), experiments.free(machine, two, 12.0),
-            experiments.free(machine, three, 10.0).judging()]
+    return [experiments.free(machine, one, 22.0), experiments.free(machine, two, 18.0),
+            experiments.free(machine, three, 12.0).judging()]
 
 
 _SETS: dict[str, Callable[[Machine, list[int]], Plans]] = {
