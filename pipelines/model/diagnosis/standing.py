@@ -11,7 +11,7 @@ against the first, or some of them against the others, is what it has to exceed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -60,13 +60,36 @@ def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> 
     able = [family for family in families if not family.event and not family.shapes[0].needs]
     found = screen(data, fit, able, arm)
     tables = [fit.project(lay_shape(data, one.family, one.family.shapes.index(one.shape[0]), arm)) for one in found]
+    barred = set[int]()
+    while True:
+        chosen = _greedily(fit, found, tables, barred)
+        solved = _amplitudes(fit, [tables[k] for k, _ in chosen]) if chosen else []
+        out = [Chosen(found[k].shape[0], gain, own) for (k, gain), own in zip(chosen, solved, strict=True)]
+        strange = [k for (k, _), one in zip(chosen, out, strict=True) if not _plausible(one)]
+        if not strange:
+            break
+        barred.add(strange[-1])  # another may explain as much: a hump of friction is no law that bends, upside down
+    while chosen:
+        solved = _amplitudes(fit, [tables[k] for k, _ in chosen])
+        out = [Chosen(found[k].shape[0], gain, own) for (k, gain), own in zip(chosen, solved, strict=True)]
+        idle = next((place for place in reversed(range(len(out))) if not _plausible(out[place])
+                     or not _pays(data, fit, [tables[k] for k, _ in chosen], place, out[place].effect.joint)), None)
+        if idle is None:
+            return tuple(out)
+        del chosen[idle]
+    return ()
+
+
+def _greedily(fit: Fit, found: Sequence[Screened], tables: Sequence[Array], barred: Collection[int]) -> list[tuple[int, float]]:
+    """Places of those that take most of what is left, one after the other, with the share of their joint that each took."""
+    data = fit.data
     residual, basis = fit.residual, np.zeros((0, data.rows))
     powers = np.bincount(data.joint, residual**2, minlength=data.n_joints)
     chosen: list[tuple[int, float]] = []
     while len(chosen) < _MOST:
         best, most, left = -1, 0.0, np.zeros((0, data.rows))
         for k, table in enumerate(tables):
-            if k in [place for place, _ in chosen]:
+            if k in barred or k in [place for place, _ in chosen]:
                 continue
             own = orthonormal(table - (table @ basis.T) @ basis)
             gain = float(np.sum(np.square(own @ residual)))
@@ -79,15 +102,7 @@ def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> 
         chosen.append((best, most))
         basis = np.concatenate([basis, left])
         residual = residual - (left @ residual) @ left
-    while chosen:
-        solved = _amplitudes(fit, [tables[k] for k, _ in chosen])
-        out = [Chosen(found[k].shape[0], gain, own) for (k, gain), own in zip(chosen, solved, strict=True)]
-        idle = next((place for place in reversed(range(len(out))) if not _plausible(out[place])
-                     or not _pays(data, fit, [tables[k] for k, _ in chosen], place, out[place].effect.joint)), None)
-        if idle is None:
-            return tuple(out)
-        del chosen[idle]
-    return ()
+    return chosen
 
 
 def _amplitudes(fit: Fit, tables: Sequence[Array], rows: Mask | slice = slice(None)) -> list[Array]:
