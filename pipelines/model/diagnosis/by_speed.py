@@ -1,4 +1,4 @@
-"""The floor of a motion that the reference logs do not have, from what they leave where joints move as slowly or as fast.
+"""The floor of a motion at speeds that the reference logs only pass, from what they leave where joints move as slowly or as fast.
 
     floor = floor_by_speed(reference, left, data)      (joints,) [N m]
 

@@ -41,7 +41,7 @@ class Case:
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
     changed: Changed | None = None  # what has changed since the reference logs
     before: ShareOf | None = None  # how much of a cause the reference logs have
-    unlike: frozenset[int] = frozenset()  # joints, from 0, that move as they do in no reference log
+    unlike: frozenset[int] = frozenset()  # joints, from 0, at speeds at which reference logs leave more than on the whole
     shared: Shared | None = None  # at which of several joints it has, masses being what they were
     again: bool = True  # a cause that may act more than once at its place may be found more than once
     white: bool = False  # its rows were whitened: little of them is signal, and every cause takes a small share

@@ -47,7 +47,7 @@ from pipelines.model.diagnosis.search import Explored, Found, gap_first, gives_w
 from pipelines.model.diagnosis.second_look import looked_again
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.simulated import arms_of, followed_by, with_simulation
-from pipelines.model.diagnosis.since import Known, Since, since_reference
+from pipelines.model.diagnosis.since import Since, since_reference
 from pipelines.model.diagnosis.steadied import steady_nominal
 from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
 from pipelines.model.diagnosis.unchanged import stood_before
@@ -60,7 +60,7 @@ __all__ = ["diagnose"]
 
 Tell = Callable[[str], None]
 
-_STOOD = 4  # effects that are taken to stand by what later logs show of them
+_STOOD = 4  # times that effects are taken to stand by what later logs show of them
 _MOVED = ("the base parameters have moved since the reference logs, and no cause that is known moves them so: one set for "
           "before and after leaves {:.2g} times what a set for each leaves; look at the tool, at the zeros of the encoders, and at "
           "the torque constants of all drives")
@@ -188,7 +188,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else
              memory.since(first.held.prepared, chosen))
     alone = since
-    since, found = _compared(first, since, reference, chosen, known, memory)
+    since, found = _compared(first, since, reference, chosen, memory)
     case = _nameable(since.case, first.stiff)
     floor = since.floor_of(case.data)
     case = replace(case, unlike=frozenset(np.flatnonzero(floor > since.floor).tolist()))
@@ -202,7 +202,7 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
     if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
         done = unnamed(done, _with_load(found, case, now, since.floor, floor, noise, chosen.seed))
-    judging = 1.0 if case.judge is None else np.square(since.floor_of(case.judge) / since.floor)
+    judging = 1.0 if case.judge is None else _times(since.floor_of(case.judge), since.floor)
     floored = Floored(floor, "reference logs", None, given, noise, since.floor, judging)
     told = diagnosis_of(first, case, done, floored, chosen, since.probed, isinstance(moved, Absorbed) and not moved.unsure)
     if given is None:
@@ -215,20 +215,21 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     return told if moved is None else _with_moved(told, moved, done.found.final, now, case, chosen)
 
 
-def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings, known: Known | None,
+def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings,
               memory: Memory) -> tuple[Since, Found]:
     """The search in what has changed. What it finds that stood in the reference logs as well is taken out with the rest that
     stands, and it searches again."""
-    taken, stood = first.held.case.beside, {(one.name, one.joint): one for one in since.stood}
-    while True:
+    taken = first.held.case.beside
+    for _ in range(_STOOD):
         case = _nameable(since.case, first.stiff)
         found = search(case, chosen.most)
-        more = {(one.name, one.joint): one for one in stood_before(found, case)}
-        if more.keys() <= stood.keys() or len(stood) >= _STOOD:
+        more = stood_before(found, case)
+        if not more:
             return since, found
-        stood = more | stood  # each once: what is found of it again has changed
-        before, since = since, since_reference(first.held.prepared, reference, chosen, taken, known, tuple(stood.values()))
+        before, stood = since, (*since.stood, *more)  # beside more that stands, chance gives each cause less: known is no longer
+        since = since_reference(first.held.prepared, reference, chosen, taken, None, stood)
         memory.instead(before, since)
+    return since, search(_nameable(since.case, first.stiff), chosen.most)
 
 
 def _nameless(told: Diagnosis, why: str) -> Diagnosis:
@@ -278,5 +279,10 @@ def _with_load(found: Found, case: Case, now: Prepared, before: Array, floor: Ar
     `before` at such speeds, where nobody can tell."""
     arm = acted(found.nominal.model.arm, case.beside)
     own = None if noise is None else motion_floor(found.nominal.model, arm, noise, now.motions, case.data, now, before, seed,
-                                                  case.beside, np.square(floor / before))
+                                                  case.beside, _times(floor, before))
     return floor if own is None else np.maximum(own, floor)
+
+
+def _times(floor: Array, before: Array) -> Array:
+    """(joints,) how many times the power one floor is of the other; once where there is none to multiply."""
+    return np.square(np.divide(floor, before, out=np.ones_like(floor), where=before > 0.0))

@@ -54,7 +54,7 @@ def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, da
         noise: of the drives.
         motions: the logs, held out or fitted; `data` their rows.
         before: (joints,) [N m] what the reference logs leave, where there are any.
-        times: (joints,) as much power of what no law has there is in this motion as in the reference logs.
+        times: (joints,) times as much power of what no law has is in this motion as in the reference logs.
         standing: effects of the machine beside the model; what of its friction they are, the arm in order has too.
     """
     bare = replace(model, effects=())

@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.linear import deviations
-from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal, law_slopes, rows_of
+from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal, law_slopes, orthonormal, rows_of
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Standing, Value
 from pipelines.model.diagnosis.screen import Screened
@@ -38,6 +38,7 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["Known", "Moved", "Probed", "Since", "since_reference"]
 
+_NEARLY = 0.9  # of the length of columns, that others can imitate
 _ALLOWED, _SHARE = 3.0, 0.1  # standard deviations of the reference logs alone; of an amplitude: no law is that of the machine
 
 Probed = Callable[[Refined, Data | None, Arms], tuple[Probe, Thresholds]]
@@ -106,8 +107,8 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         rest = [k for other in range(len(effects)) if other != place for k in found.of_effect(other)]
         slopes = np.zeros((len(rest), data.rows))
         slopes[:, later] = found.slopes[rest]
-        others = np.concatenate([apart(nominal, later), common, slopes])
-        return share_before(lay_one(data, effects[place].effect, arm), data, later, others, found.weight)
+        others = np.concatenate([apart(nominal, later), slopes])
+        return share_before(lay_one(data, effects[place].effect, arm), data, later, others, common, found.weight)
 
     acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
     model = replace(Exact.start(columns, start), standing=tuple(one for one in acting if one.effect.adds))
@@ -135,10 +136,20 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
 
 
 def _with(standing: Sequence[Chosen], stood: Sequence[Effect], data: Data, arm: Arm) -> tuple[Chosen, ...]:
-    """With what stands as well, in place of another shape of it."""
-    known = {(one.name, one.joint) for one in stood}
-    more = (Chosen(one, 0.0, np.zeros(len(lay_one(data, one, arm)))) for one in stood)
-    return (*(one for one in standing if (one.effect.name, one.effect.joint) not in known), *more)
+    """With what stands as well, in place of nearly the same at its joint: a wave of another order stays."""
+    out = list(standing)
+    for effect in stood:
+        columns = lay_one(data, effect, arm)
+        basis = orthonormal(columns)
+        like = [one for one in out if (one.effect.name, one.effect.joint) == (effect.name, effect.joint)
+                and _covered(lay_one(data, one.effect, arm), basis)]
+        out = [*(one for one in out if one not in like), Chosen(effect, 0.0, np.zeros(len(columns)))]
+    return tuple(out)
+
+
+def _covered(columns: Array, basis: Array) -> bool:
+    """Whether the orthonormal rows of `basis` are most of the columns."""
+    return bool(np.linalg.norm(columns @ basis.T) >= _NEARLY * np.linalg.norm(columns))
 
 
 def _paying(standing: Sequence[Chosen], first: int, alone: Fit) -> tuple[Chosen, ...]:

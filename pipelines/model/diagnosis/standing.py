@@ -52,7 +52,7 @@ class Chosen:
 
 def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> tuple[Chosen, ...]:
     """Effects that explain what the reference logs leave, one after the other, each in its best shape of one screening, as far as
-    they pay on time that they were not fitted to.
+    they pay on time that they were not fitted to. What cannot be, of the last chosen first, is barred before all are chosen anew.
 
     Pati, Rezaiifar & Krishnaprasad 1993: orthogonal matching pursuit. A scale of torque is none of them: at all joints
     together the torque would explain itself.

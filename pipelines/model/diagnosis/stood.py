@@ -1,6 +1,6 @@
 """How much of what was found in the later logs the reference logs have.
 
-    share = share_before(columns, data, later, others, weight)
+    share = share_before(columns, data, later, others, standing, weight)
     share.stood                 it was there before
     share.doubtful              so much of it may have been there before that nobody knows whether it has changed
 
@@ -30,7 +30,7 @@ __all__ = ["Share", "share_before"]
 _SAME, _TWICE, _SURE = 0.5, 2.0, 0.25  # of what is there now, that was there before: at least, at most; its standard deviation
 _LIKE = 0.3  # the same in any shape, from which it may have been there
 _CHANCE = 2.0  # of these deviations, below which nobody knows
-_NOTHING = 1e-3  # of the length of columns: what is left of them is rounding
+_REST = 0.3  # of what shows of it in the reference logs: what stands there is the rest of it, in this shape or nearly
 
 
 @dataclass(frozen=True)
@@ -47,34 +47,37 @@ class Share:
 
     @property
     def doubtful(self) -> bool:
-        """What was there with the other sign is no such thing: it has changed all the more. Nor where the reference logs do not
-        tell: noise has a size as well."""
+        """What was there with the other sign, half as much at least, is no such thing: it has changed all the more. Nor is noise,
+        which has a size as well, where the reference logs do not tell."""
         like = np.sqrt(max(self.whole**2 - self.std**2, 0.0))
         return bool(like > _LIKE and self.whole > _CHANCE * self.std and self.same > -_SAME)
 
 
-def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], others: Array, weight: Array) -> Share:
+def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], others: Array, standing: Array, weight: Array) -> Share:
     """Of a cause's amplitudes in one system, each with its own before and after.
 
-    A cause that stands already, in this shape, has its share in `others`: of what is new the reference logs have nothing.
+    A cause that stands already, in this shape or nearly, is told by `standing` in the reference logs: of what is new in the later
+    ones they have nothing.
 
     Args:
         columns: (k, rows) of the cause.
         data: rows of the reference logs, then of the later ones; `later` says which.
-        others: (n, rows) columns of all else that the model has.
+        others: (n, rows) columns of all else that the model has; `standing`: (m, rows) those of what stands.
         weight: (joints,) [1/(N m)].
     """
     count = len(columns)
     before, after = np.where(later, 0.0, columns), np.where(later, columns, 0.0)
-    taken = fit_columns(data, np.concatenate([others, after]), weight=weight)
-    if np.linalg.norm(taken.project(before)) <= _NOTHING * np.linalg.norm(before * taken.weights):
+    whole = np.concatenate([others, standing])
+    shows, left = (np.linalg.norm(fit_columns(data, np.concatenate([table, after]), weight=weight).project(before))
+                   for table in (others, whole))
+    if left <= _REST * shows:
         return Share(0.0, 0.0, 0.0 if before.any() else np.inf)
-    fit = fit_columns(data, np.concatenate([others, before, after]), weight=weight)
-    own = slice(len(others), len(others) + count)
+    fit = fit_columns(data, np.concatenate([whole, before, after]), weight=weight)
+    own = slice(len(whole), len(whole) + count)
     was, now = fit.beta[own], fit.beta[own.stop:]
-    seen = fit_columns(data, others, weight=weight).project(after)
+    seen = fit_columns(data, whole, weight=weight).project(after)
     gram = seen @ seen.T
     there = max(float(now @ gram @ now), 1e-300)
     spread = float(np.trace(gram @ covariance(fit.table * fit.weights, fit.residual)[own, own]))
-    whole, std = (float(np.sqrt(max(x, 0.0) / there)) for x in (float(was @ gram @ was), spread))
-    return Share(float(was @ gram @ now) / there, whole, std)
+    size, std = (float(np.sqrt(max(x, 0.0) / there)) for x in (float(was @ gram @ was), spread))
+    return Share(float(was @ gram @ now) / there, size, std)

@@ -14,14 +14,14 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["no_change", "stood_before"]
 
-_AS_MUCH = "its joint moves as in no reference log, and no more is left of it than these leave at such speeds"
-_UNCHANGED = "the reference logs may have had it: by itself they ask for some of it as well"
+_AS_MUCH = "its joint moves at other speeds than in the reference logs, and no more is left of it than they leave at such speeds"
+_UNCHANGED = "the reference logs may have had it: fitted to them alone, some of it is there as well"
 
 
 def stood_before(found: Found, case: Case) -> list[Effect]:
     """What was found of which the reference logs have as much, and which the standing set may have."""
     every = () if case.before is None else tuple(enumerate(found.final.model.effects))
-    able = [(k, one.effect) for k, one in every if one.log is None and not one.effect.needs]
+    able = [(k, one.effect) for k, one in every if one.log is None and one.possible and not one.effect.needs]
     return [effect for k, effect in able if case.before is not None and case.before(found.final, k).stood]
 
 
@@ -33,4 +33,6 @@ def no_change(found: Found, k: int, case: Case, floor: Array) -> str:
     own = takes_most(found.steps[k], floor) if best.effect.joint is None else best.effect.joint - 1
     if own in case.unlike and found.steps[k].before.rms[own] <= floor[own]:
         return _AS_MUCH
+    if best.effect.needs:  # with columns of what stands a scale of torque is told apart from itself
+        return ""
     return _UNCHANGED if case.before(found.final, k).doubtful else ""
