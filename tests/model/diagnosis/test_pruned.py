@@ -201,7 +201,8 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(nominal: float,
     monkeypatch.setattr(pruned, "_harm", lambda *args: "")
     monkeypatch.setattr(pruned, "of_no_size", lambda done: [])
     monkeypatch.setattr(pruned, "_without", lambda *args: left(rest, 0.01, 0.01))
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None)
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
+                                unlike=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", ruled, ""), case, case, FLOOR)
     assert done.ruling.verdict == verdict
     assert done.ruling.named == ((1,) if verdict == "cause" else ())
@@ -221,7 +222,8 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     dip = SimpleNamespace(effects=(SimpleNamespace(possible=True), SimpleNamespace(possible=False)))
     both, one = SimpleNamespace(rms=np.array([0.01, 0.01, 0.01]), model=dip), left(0.02, 0.01, 0.01)
     monkeypatch.setattr(pruned, "_without", lambda found, kept, *_: both if len(kept) == 2 else one)
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None)
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
+                                unlike=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
     assert done.ruling.named == (0,)
     assert done.ruling.doubts == {1: pruned._IMPOSSIBLE}
@@ -267,7 +269,8 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     monkeypatch.setattr(pruned, "_turned", lambda found, apart, believed, *_: believed)
     monkeypatch.setattr(pruned, "_asked_again", lambda found, kept, *_: (kept, found.final))
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
-    case: Any = SimpleNamespace(floored=False, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None)
+    case: Any = SimpleNamespace(floored=False, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
+                                unlike=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0,), ""), case, case, FLOOR, False)
     assert done.ruling.named == named
     assert done.ruling.verdict == ("cause" if named else "nothing-wrong")
