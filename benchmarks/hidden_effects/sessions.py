@@ -132,12 +132,6 @@ def _mixed(machine: Machine, seeds: list[int]) -> Plans:
             experiments.excitation(machine, three, 10.0, 1).judging(), experiments.free(machine, four, 8.0).judging()]
 
 
-def _periodic(machine: Machine, seeds: list[int]) -> Plans:
-    one, two, three, _ = seeds
-    return [experiments.excitation(machine, one, 8.0, 2), experiments.excitation(machine, two, 8.0, 2),
-            experiments.excitation(machine, three, 10.0, 2).judging()]
-
-
 def _friction(machine: Machine, seeds: list[int]) -> Plans:
     one, two, three, _ = seeds
     alone = [experiments.friction(machine, joint, two, 15.0 / machine.n) for joint in range(1, machine.n + 1)]
@@ -152,27 +146,23 @@ def _long(machine: Machine, seeds: list[int]) -> Plans:
             experiments.excitation(machine, three, 10.0, 2).judging()]
 
 
-def _short(machine: Machine, seeds: list[int]) -> Plans:
-    one, two, three, _ = seeds
-    return [experiments.excitation(machine, one, 6.0, 1), experiments.excitation(machine, two, 6.0, 1),
-            experiments.excitation(machine, three, 6.0, 1).judging()]
-
-
-def _fast(machine: Machine, seeds: list[int]) -> Plans:
-    one, two, three, _ = seeds
-    return [experiments.excitation(machine, one, 10.0, 2), experiments.excitation(machine, two, 10.0, 2),
-            experiments.excitation(machine, three, 12.0, 1).judging()]
-
-
 def _slow(machine: Machine, seeds: list[int]) -> Plans:
     one, two, three, _ = seeds
     return [experiments.free(machine, one, 22.0), experiments.free(machine, two, 18.0),
             experiments.free(machine, three, 12.0).judging()]
 
 
+def _excited(*lengths: tuple[float, int]) -> Callable[[Machine, list[int]], Plans]:
+    """Excitations of these periods [s] and so many of them, of which the last judges."""
+    def plans(machine: Machine, seeds: list[int]) -> Plans:
+        *made, last = [experiments.excitation(machine, seed, *of) for seed, of in zip(seeds, lengths, strict=False)]
+        return [*made, last.judging()]
+    return plans
+
+
 _SETS: dict[str, Callable[[Machine, list[int]], Plans]] = {
-    "mixed": _mixed, "periodic": _periodic, "friction": _friction, "long": _long, "short": _short,
-    "fast": _fast, "slow": _slow}
+    "mixed": _mixed, "periodic": _excited((8.0, 2), (8.0, 2), (10.0, 2)), "friction": _friction, "long": _long,
+    "short": _excited((6.0, 1), (6.0, 1), (6.0, 1)), "fast": _excited((10.0, 2), (10.0, 2), (12.0, 1)), "slow": _slow}
 
 
 def _compliance_plans(machine: Machine, model: ControllerModel, seed: int) -> Iterator[Experiment]:

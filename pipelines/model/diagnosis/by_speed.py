@@ -3,7 +3,7 @@
     floor = floor_by_speed(reference, left, data)      (joints,) [N m]
 
 What no law of a model has to the last, its friction above all, it lacks at some speeds more than at others. Logs of slow sweeps
-stay where an excitation only passes: of eight arms in order they left 1.1 to 1.9 times what the excitations left, and 0.6 to 1.2
+stay where an excitation only passes: of two arms in order they left 1.0 to 1.9 times what the excitations left, and 0.6 to 1.2
 times what these left at such speeds.
 """
 

@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
 from pipelines.model.diagnosis.straying import simulated_steps, strays
-from pipelines.model.diagnosis.unchanged import no_change
+from pipelines.model.diagnosis.unchanged import near_other_motion, no_change
 from pipelines.model.diagnosis.verdict import (
     REST_UNKNOWN,
     Ruling,
@@ -74,7 +74,7 @@ class Settled:
 def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor: Array, known: bool = True) -> Settled:
     """Only causes that keep every rule of acceptance; `floor` and `known` as in `rule`."""
     if ruling.verdict != "cause":
-        alone = _near_other_motion(replace(ruling, named=()), found, case, floor)
+        alone = near_other_motion(replace(ruling, named=()), found, case, floor)
         return Settled(replace(found, final=found.nominal), _elsewhere(alone, found, case, floor, known), ())
     plain, (found, case) = found, steadied(found, case)
     simulated = simulated_steps(found, case, prepared)
@@ -120,7 +120,7 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
         kept = []
     if kept:
         return Settled(replace(found, final=final), replace(ruling, named=tuple(kept), doubts=doubts), simulated)
-    alone = _elsewhere(_near_other_motion(without_steps(plain, floor, known), plain, case, floor), plain, case, floor, known)
+    alone = _elsewhere(near_other_motion(without_steps(plain, floor, known), plain, case, floor), plain, case, floor, known)
     reason = next((why for why in elsewhere.values() if why), f"{alone.reason}: {next(iter(doubts.values()), '')}")
     reason = reason if alone.verdict == "unknown" else alone.reason
     if not known and alone.verdict == "nothing-wrong" and (where := much_without_name(found, doubts, floor)):
@@ -140,14 +140,6 @@ def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bo
         return ruling
     high = held_out_high(case.judge.rms(held_out_left(found.nominal, case.judge, case.blocks)), floor)
     return Ruling("unknown", (), f"on held-out logs the residual of {high} stands far above the floor") if high else ruling
-
-
-def _near_other_motion(ruling: Ruling, found: Found, case: Case, floor: Array) -> Ruling:
-    """Nothing wrong, instead of something that gives way, where joints move at other speeds than in the reference logs, and no more
-    is left than these leave at such speeds: chance is known of their own motion."""
-    if ruling.verdict != "unknown" or not case.unlike or not at_floor(found.nominal.rms, floor):
-        return ruling
-    return replace(ruling, verdict="nothing-wrong", reason="")
 
 
 def _harm(found: Found, final: Refined, case: Case) -> str:

@@ -63,21 +63,24 @@ def standing_set(data: Data, fit: Fit, families: Sequence[Family], arm: Arm) -> 
     barred = set[int]()
     while True:
         chosen = _greedily(fit, found, tables, barred)
-        solved = _amplitudes(fit, [tables[k] for k, _ in chosen]) if chosen else []
-        out = [Chosen(found[k].shape[0], gain, own) for (k, gain), own in zip(chosen, solved, strict=True)]
-        strange = [k for (k, _), one in zip(chosen, out, strict=True) if not _plausible(one)]
+        strange = [k for (k, _), one in zip(chosen, _sized(fit, found, tables, chosen), strict=True) if not _plausible(one)]
         if not strange:
             break
         barred.add(strange[-1])  # another may explain as much: a hump of friction is no law that bends, upside down
     while chosen:
-        solved = _amplitudes(fit, [tables[k] for k, _ in chosen])
-        out = [Chosen(found[k].shape[0], gain, own) for (k, gain), own in zip(chosen, solved, strict=True)]
+        out = _sized(fit, found, tables, chosen)
         idle = next((place for place in reversed(range(len(out))) if not _plausible(out[place])
                      or not _pays(data, fit, [tables[k] for k, _ in chosen], place, out[place].effect.joint)), None)
         if idle is None:
             return tuple(out)
         del chosen[idle]
     return ()
+
+
+def _sized(fit: Fit, found: Sequence[Screened], tables: Sequence[Array], chosen: Sequence[tuple[int, float]]) -> list[Chosen]:
+    """Each that was chosen with its amplitudes beside the others."""
+    solved = _amplitudes(fit, [tables[k] for k, _ in chosen]) if chosen else []
+    return [Chosen(found[k].shape[0], gain, own) for (k, gain), own in zip(chosen, solved, strict=True)]
 
 
 def _greedily(fit: Fit, found: Sequence[Screened], tables: Sequence[Array], barred: Collection[int]) -> list[tuple[int, float]]:

@@ -9,8 +9,8 @@ speeds that an excitation hardly stays at. In later logs of another motion it st
 these, while the best shape of a screening leaves some of it, which passes for a change. So the amplitude is asked for before and
 after in one system, in the very shape that was found.
 
-Of 30 effects hidden in later logs the reference logs had 0.00 to 0.14, of laws of friction that had always been there 0.92 to 1.03,
-and of what passed for cogging in an arm in order 0.40 and 0.60, of another phase.
+Of 22 effects hidden in later logs the reference logs had 0.00 to 0.14, of four laws of friction that had always been there 0.92 to
+1.03, and of what passed for cogging in an arm in order 0.40 and 0.60, of another phase.
 """
 
 from __future__ import annotations

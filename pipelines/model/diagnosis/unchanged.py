@@ -2,17 +2,20 @@
 
     stood_before(found, case)              effects that stood before, and may be taken out with the rest that stands
     no_change(found, k, case, floor)       why step `k` is not believed to have changed
+    near_other_motion(ruling, ...)         nothing gives way where no more is left than of such a motion
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.search import Found
-from pipelines.model.diagnosis.verdict import takes_most
+from pipelines.model.diagnosis.verdict import Ruling, at_floor, takes_most
 from pipelines.model.effects.base import Effect
 
-__all__ = ["no_change", "stood_before"]
+__all__ = ["near_other_motion", "no_change", "stood_before"]
 
 _AS_MUCH = "its joint moves at other speeds than in the reference logs, and no more is left of it than they leave at such speeds"
 _UNCHANGED = "the reference logs may have had it: fitted to them alone, some of it is there as well"
@@ -36,3 +39,11 @@ def no_change(found: Found, k: int, case: Case, floor: Array) -> str:
     if best.effect.needs:  # with columns of what stands a scale of torque is told apart from itself
         return ""
     return _UNCHANGED if case.before(found.final, k).doubtful else ""
+
+
+def near_other_motion(ruling: Ruling, found: Found, case: Case, floor: Array) -> Ruling:
+    """Nothing wrong, instead of something that gives way, where joints move at other speeds than in the reference logs, and no more
+    is left than these leave at such speeds: chance is known of their own motion."""
+    if ruling.verdict != "unknown" or not case.unlike or not at_floor(found.nominal.rms, floor):
+        return ruling
+    return replace(ruling, verdict="nothing-wrong", reason="")

@@ -19,12 +19,11 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.diagnose import _times
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import rows_of
-from pipelines.model.diagnosis.pruned import _near_other_motion
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import _with, since_reference
 from pipelines.model.diagnosis.standing import Chosen, apart, joined
 from pipelines.model.diagnosis.stood import Share, share_before
-from pipelines.model.diagnosis.unchanged import no_change, stood_before
+from pipelines.model.diagnosis.unchanged import near_other_motion, no_change, stood_before
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import Effect
@@ -246,6 +245,6 @@ def slowed(log: ExperimentLog, times: float) -> ExperimentLog:
 def test_what_gives_way_near_the_floor_of_another_motion_is_no_alarm(left: float, unlike: bool, verdict: str) -> None:
     found: Any = SimpleNamespace(nominal=SimpleNamespace(rms=np.array([0.01, left, 0.01])))
     case: Any = SimpleNamespace(unlike={1} if unlike else set())
-    said = _near_other_motion(Ruling("unknown", (), "the base gives way"), found, case, np.full(3, 0.01))
+    said = near_other_motion(Ruling("unknown", (), "the base gives way"), found, case, np.full(3, 0.01))
     assert said.verdict == verdict
     assert bool(said.reason) == (verdict == "unknown")
