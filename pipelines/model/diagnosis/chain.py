@@ -27,6 +27,7 @@ class Worth:
     gain: Gain
     before: Refined
     after: Refined
+    simulated: tuple[Simulation, Simulation]  # the arm before and after
 
 
 def worth(found: Found, named: Sequence[int], order: Sequence[Sequence[int]], simulated: Sequence[Simulation], prepared: Prepared,
@@ -50,7 +51,7 @@ def worth(found: Found, named: Sequence[int], order: Sequence[Sequence[int]], si
         models = [found.nominal, *(with_some(found, part) for part in parts), found.final]
         known = {0: simulated[0], len(order): simulated[-1]} if whole else None
         runs = simulation_errors([acted(one.model.arm, beside) for one in models], prepared.judging or prepared.motions, known)
-    return [Worth(gain_of(torque_gain(before, after, prepared.judge, blocks), was, now), before, after)
+    return [Worth(gain_of(torque_gain(before, after, prepared.judge, blocks), was, now), before, after, (was, now))
             for (before, after), (was, now) in zip(pairwise(models), pairwise(runs), strict=True)]
 
 

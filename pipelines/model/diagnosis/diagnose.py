@@ -10,6 +10,7 @@ is left; search with the twin's thresholds; judge what was found on held-out log
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -49,7 +50,7 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.simulated import arms_of, followed_by, with_simulation
 from pipelines.model.diagnosis.since import Since, since_reference
 from pipelines.model.diagnosis.steadied import steady_nominal
-from pipelines.model.diagnosis.told import diagnosis_of, sentence, strongest
+from pipelines.model.diagnosis.told import diagnosis_of, limits_of, sentence, strongest
 from pipelines.model.diagnosis.unchanged import stood_before
 from pipelines.model.diagnosis.verdict import Ruling, rule
 from pipelines.model.diagnosis.words import within
@@ -188,23 +189,26 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else
              memory.since(first.held.prepared, chosen))
     alone = since
-    since, found = _compared(first, since, reference, chosen, memory)
+    drives = partial(_drives, first, reference, seed=chosen.seed)
+    with meanwhile(partial(drives, alone)) as noise_beside:
+        since, found = _compared(first, alone, reference, chosen, memory)
+        noise = noise_beside() if since is alone else None
     case = _nameable(since.case, first.stiff)
     floor = since.floor_of(case.data)
     case = replace(case, unlike=frozenset(np.flatnonzero(floor > since.floor).tolist()))
     now = replace(first.held.prepared, data=case.data, judge=case.judge)
     first = replace(first, held=replace(first.held, prepared=now))
-    with meanwhile(partial(noise_in, case.model, reference, since.left, now.referring, now.recipe, chosen.seed)) as drives:
+    with meanwhile(partial(limits_of, found.steps[-1], case, first, since.probed)) if chosen.limits else nullcontext() as limits:
         done = settled(found, rule(found, floor), case, now, floor)
         done = replace(done, found=steady_nominal(done.found))
         done = unlike_noise(done, lambda: oscillation(reference, since.left).stands)
-        noise = drives()
-    moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
-    if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
-        done = unnamed(done, _with_load(found, case, now, since.floor, floor, noise, chosen.seed))
-    judging = 1.0 if case.judge is None else _times(since.floor_of(case.judge), since.floor)
-    floored = Floored(floor, "reference logs", None, given, noise, since.floor, judging)
-    told = diagnosis_of(first, case, done, floored, chosen, since.probed, isinstance(moved, Absorbed) and not moved.unsure)
+        noise = noise if since is alone else drives(since)
+        moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
+        if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
+            done = unnamed(done, _with_load(found, case, now, since.floor, floor, noise, chosen.seed))
+        judging = 1.0 if case.judge is None else _times(since.floor_of(case.judge), since.floor)
+        floored = Floored(floor, "reference logs", None, given, noise, since.floor, judging)
+        told = diagnosis_of(first, case, done, floored, chosen, limits, isinstance(moved, Absorbed) and not moved.unsure)
     if given is None:
         told = replace(told, calibration=Calibration(
             origin_of("reference logs", logs, None, chosen), conditions_of(now), alone.chance.weight, alone.floor,
@@ -213,6 +217,12 @@ def _changed(first: Responding, reference: Data, chosen: DiagnosisSettings, give
     if isinstance(moved, Unexplained):
         return _nameless(told, _MOVED.format(moved.times)) if told.verdict == "nothing-wrong" else told
     return told if moved is None else _with_moved(told, moved, done.found.final, now, case, chosen)
+
+
+def _drives(first: Responding, reference: Data, since: Since, seed: int) -> DriveNoise | None:
+    """The noise of the drives, from what the standing effects leave of the reference logs."""
+    prepared = first.held.prepared
+    return noise_in(since.case.model, reference, since.left, prepared.referring, prepared.recipe, seed)
 
 
 def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings,

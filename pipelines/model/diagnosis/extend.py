@@ -199,7 +199,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
     arms = [found.nominal.model.arm, *(step.best.done.model.arm for step in steps if step.best is not None)]
     simulated = simulation_errors([acted(arm, case.beside) for arm in arms], prepared.judging or prepared.motions)
     told = findings(found, ruling, simulated, prepared, found.nominal.rms, white(case.data, found.final.left), chosen.blocks,
-                    chosen.evidence, case.beside)
+                    chosen.evidence, case.beside).findings
     why: dict[tuple[str, int | None], str] = {}
     late = any(step.best is not None and step.best.effect.last for step in steps)
     for k, step in enumerate(steps):

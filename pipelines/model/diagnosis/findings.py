@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -25,7 +26,7 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Val
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
-__all__ = ["agreement", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
+__all__ = ["Named", "agreement", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
 
 _ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
@@ -33,8 +34,16 @@ _BLOCKS = 10  # of one log, that must agree as logs do
 _TELLS = 9.0  # times its variance, that the power of the predicted part must have in a log to be asked
 
 
+@dataclass(frozen=True, eq=False)
+class Named:
+    """The causes that are named."""
+
+    findings: tuple[Finding, ...]
+    simulated: tuple[Simulation, ...]  # the nominal arm and that with all of them; empty where nothing is named
+
+
 def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prepared: Prepared, nominal: Array, floor: Array,
-             blocks: int, draw: bool, beside: Sequence[Acting] = ()) -> tuple[Finding, ...]:
+             blocks: int, draw: bool, beside: Sequence[Acting] = ()) -> Named:
     """Each named cause, the one that explains most first; the final model holds them, in the order of their steps.
 
     Args:
@@ -48,10 +57,11 @@ def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prep
     taken = [explained(before.rms, after.rms, nominal, floor) for before, after in models]
     order = _told([(best.effect.name, best.effect.joint) for step in steps if (best := step.best) is not None], taken)
     told = worth(found, ruling.named, order, simulated, prepared, beside, blocks) if order else []
-    return once_each(
+    each = once_each(
         _finding(found, steps[place], best, place, models[place] if len(places) == 1 else (one.before, one.after), covariance,
                  taken[place], floor, one.gain, draw)
         for places, one in zip(order, told, strict=True) for place in places if (best := steps[place].best) is not None)
+    return Named(each, (told[0].simulated[0], told[-1].simulated[1]) if told else ())
 
 
 def _told(causes: Sequence[tuple[str, int | None]], taken: Sequence[float]) -> list[list[int]]:

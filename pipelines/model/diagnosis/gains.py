@@ -30,7 +30,7 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Plant, Windows, choose_step, simulate_together, simulate_windows
 
-__all__ = ["Simulation", "farther", "gain_of", "in_loop", "nearer", "simulation_errors", "surely_less", "torque_gain",
+__all__ = ["Simulation", "Strayed", "farther", "gain_of", "in_loop", "nearer", "simulation_errors", "surely_less", "torque_gain",
            "torque_gain_of", "worse_log"]
 
 Mask = npt.NDArray[np.bool_]
@@ -49,6 +49,15 @@ _WORSE = 1.1  # times the error of a held-out log, that an extension must not ex
 
 
 @dataclass(frozen=True, eq=False)
+class Strayed:
+    """How a simulated arm strays from the measured one in a log whose controller moves both."""
+
+    log: str  # its name
+    t: Array  # [s] (samples,) since it began
+    error: Array  # [rad] (samples, joints) simulated minus measured
+
+
+@dataclass(frozen=True, eq=False)
 class Simulation:
     """How far the simulated arm is from the measured one, over the held-out logs."""
 
@@ -57,6 +66,7 @@ class Simulation:
     tip_rms: float  # [m]
     power: Array  # [rad^2] (blocks,) summed over the joints and the samples of each block of time
     samples: Array  # (blocks,)
+    first: Strayed | None = None  # in the first of the logs; None where no controller is known
 
     @classmethod
     def none(cls, joints: int) -> Simulation:
@@ -186,8 +196,7 @@ def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simula
 
 def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
     square, away = [], []
-    pairs = (_closed(arm, motions, _SOFT if soft else _LONGEST) if closed else
-             _in_windows(arm, motions, _ROUGH if soft else _EXACT))
+    pairs = _closed(arm, motions, _SOFT if soft else _LONGEST) if closed else _in_windows(arm, motions, _ROUGH if soft else _EXACT)
     for q, seen in pairs:
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
@@ -196,8 +205,10 @@ def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
     block = np.arange(len(each)) * _BLOCKS // max(len(each), 1)
     power = np.asarray(np.bincount(block, each.sum(axis=1), minlength=_BLOCKS), dtype=np.float64)
     samples = np.asarray(np.bincount(block, minlength=_BLOCKS), dtype=np.float64)
+    (log, _), (q, seen) = motions[0], pairs[0]
+    first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
     return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
-                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples)
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first)
 
 
 def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array]]:

@@ -1,6 +1,7 @@
 """Measured over simulated: the nominal and the extended model in closed loop, under the controller and references of a log.
 
     followed = followed_by(arms_of(found), logs)      what takes a simulation
+    followed = as_simulated((nominal, extended))      what was simulated already
     found = with_simulation(found, followed)
 """
 
@@ -17,12 +18,12 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.gains import in_loop
+from pipelines.model.diagnosis.gains import Simulation, in_loop
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.simulation import Experiment, simulate
 
-__all__ = ["Followed", "arms_of", "followed_by", "with_simulation"]
+__all__ = ["Followed", "arms_of", "as_simulated", "followed_by", "with_simulation"]
 
 _SECONDS = 3.0  # of the log that are shown
 _POINTS = 1500
@@ -44,6 +45,14 @@ def arms_of(found: Diagnosis) -> tuple[Arm, ...]:
     return nominal if found.extended is None or not found.findings else (*nominal, found.extended)
 
 
+def as_simulated(arms: Sequence[Simulation]) -> Followed | None:
+    """What simulations of arms, made for what these gain, have of the first of their logs; None where one of them has nothing."""
+    first = [one.first for one in arms if one.first is not None]
+    if not 0 < len(first) == len(arms):
+        return None
+    return _shown(first[0].log, first[0].t, [one.error for one in first])
+
+
 def followed_by(arms: Sequence[Arm], logs: Logs) -> Followed | None:
     """The first log in which no arm runs away, held-out ones first; None where that is neither of the first two that can be run."""
     if not arms:
@@ -51,10 +60,14 @@ def followed_by(arms: Sequence[Arm], logs: Logs) -> Followed | None:
     for log in islice(filter(partial(in_loop, arms[0]), (*logs.validate, *logs.identify)), _TRIED):
         errors = [error for error in shared_out(partial(_error, log=log), arms) if error is not None]
         if len(errors) == len(arms):
-            t = log.t[:len(errors[0])] - log.t[0]
-            every = max(1, len(t) // _POINTS)
-            return Followed(log.name, t[::every], tuple(error[::every] for error in errors))
+            return _shown(log.name, log.t[:len(errors[0])] - log.t[0], errors)
     return None
+
+
+def _shown(log: str, t: Array, errors: Sequence[Array]) -> Followed:
+    samples = int(np.searchsorted(t, _SECONDS))
+    every = max(1, samples // _POINTS)
+    return Followed(log, t[:samples:every], tuple(error[:samples:every] for error in errors))
 
 
 def with_simulation(found: Diagnosis, followed: Followed | None) -> Diagnosis:

@@ -7,9 +7,10 @@ Before it is told, it is held against the logs that nothing was fitted to: they 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -20,61 +21,79 @@ from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import untold
 from pipelines.model.diagnosis.doubted import unlike_held_out
 from pipelines.model.diagnosis.evidence import evidence
-from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
+from pipelines.model.diagnosis.findings import Named, extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.floored import Floored
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.injection import Probe
-from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.limits import detectable, not_testable
 from pipelines.model.diagnosis.motion_floor import motion_floor
 from pipelines.model.diagnosis.pruned import Settled
+from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, ResidualRms, Threshold
 from pipelines.model.diagnosis.search import Step
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.simulated import arms_of, followed_by, with_simulation
+from pipelines.model.diagnosis.simulated import arms_of, as_simulated, followed_by, with_simulation
 from pipelines.model.diagnosis.since import Probed
 from pipelines.model.diagnosis.steadied import steady, steady_nominal
 from pipelines.model.diagnosis.unbiased import unbiased
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.diagnosis.words import taken_in, where
 
-__all__ = ["diagnosis_of", "sentence", "strongest"]
+__all__ = ["Limits", "diagnosis_of", "limits_of", "sentence", "strongest"]
+
+Limits = tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]
 
 
 def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings,
-                 probed: Probed | None = None, moved: bool = False) -> Diagnosis:
+                 limits: Callable[[], Limits] | None = None, moved: bool = False) -> Diagnosis:
     """What was found, as a result tells it.
 
     Args:
-        probed: how limits are looked for beside reference logs.
+        limits: those that are looked for meanwhile; by default they are here.
         moved: whether there is a cause that the base parameters show.
     """
-    done = replace(done, found=unbiased(steady_nominal(done.found), first.held.prepared, case, chosen.seed))
-    done, responded, own = _held_against(first, case, done, floored, chosen, moved)
-    told = _told(first, case, done, responded, floored, chosen, own)
-    arms = arms_of(told) if chosen.evidence else ()
-    beside = meanwhile(lambda: followed_by(arms, first.held.prepared.logs)) if arms else nullcontext(lambda: None)
+    done = replace(done, found=steady_nominal(done.found))
+    with meanwhile(partial(_own_floor, first, case, done, floored, chosen)) as floor:  # sampling moves an arm in order by no more
+        done = replace(done, found=unbiased(done.found, first.held.prepared, case, chosen.seed))
+        own = floor()
+    done, responded = _held_against(first, case, done, own, chosen, moved)
+    named = _named(first, case, done, floored, chosen)
+    told = _told(first, case, done, responded, floored, chosen, own, named.findings)
+    known = None if responded.parts else as_simulated(named.simulated)
+    arms = arms_of(told) if chosen.evidence and known is None else ()
+    beside = meanwhile(lambda: followed_by(arms, first.held.prepared.logs)) if arms else nullcontext(lambda: known)
     with beside as followed:
-        limits, beyond = _limits(done.found.steps[-1], case, first.held.prepared, probed) if chosen.limits else ((), ())
+        found, beyond = ((), ()) if not chosen.limits else limits() if limits else limits_of(done.found.steps[-1], case, first)
         hidden = (*told.not_testable, *beyond, *untold(first.stiff, chosen.without))
-        return with_simulation(replace(told, detectable=limits, not_testable=hidden), followed())
+        return with_simulation(replace(told, detectable=found, not_testable=hidden), followed())
+
+
+def _plain(first: Responding, done: Settled) -> Refined:
+    """The nominal model with nothing taken out for what responses name."""
+    return done.found.nominal if first.held.plain is None else steady(first.held.plain)
+
+
+def _named(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings) -> Named:
+    plain = _plain(first, done).rms
+    return findings(done.found, done.ruling, done.simulated, first.held.prepared, plain, floored.rms, chosen.blocks, chosen.evidence,
+                    case.beside)
 
 
 def _told(first: Responding, case: Case, done: Settled, responded: Judged, floored: Floored, chosen: DiagnosisSettings,
-          own: Array | None) -> Diagnosis:
+          own: Array | None, causes: tuple[Finding, ...]) -> Diagnosis:
     """All of it but the limits and how the arm follows.
 
     Args:
         own: (joints,) [N m] floor of the held-out logs.
+        causes: those that residuals name.
     """
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
-    plain = nominal if first.held.plain is None else steady(first.held.plain)  # nothing taken out for what responses name
+    plain = _plain(first, done)
     parts = responded.parts
     held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
-    named = strongest((*held, *findings(found, ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks,
-                                         chosen.evidence, case.beside)))
+    named = strongest((*held, *causes))
     if held:
         ruling = replace(ruling, verdict="cause")
     thresholds = last.thresholds
@@ -98,36 +117,48 @@ def _told(first: Responding, case: Case, done: Settled, responded: Judged, floor
         acted(plain.model.arm, standing), acted(arm, responded.acting), made)
 
 
-def _held_against(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings,
-                  moved: bool) -> tuple[Settled, Judged, Array | None]:
-    """What is believed beside the floor of the held-out logs, what responses have named beside that, and this floor (joints,)
-    [N m]; None where there is none."""
+def _own_floor(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings) -> Array | None:
+    """(joints,) [N m] floor of the held-out logs; None where there is none."""
+    held, prepared = replace(first.held, case=case), first.held.prepared
+    if prepared.judge is None or floored.noise is None:
+        return None
+    responded = judged(held, done.found.final)
+    judge = first.held.judge if responded.parts else prepared.judge
+    if judge is None or responded.judge is None:
+        return None
+    final = responded.final
+    known = floored.rms if floored.reference is None else floored.reference
+    return motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
+                        known, chosen.seed, case.beside, floored.judging)
+
+
+def _held_against(first: Responding, case: Case, done: Settled, own: Array | None, chosen: DiagnosisSettings,
+                  moved: bool) -> tuple[Settled, Judged]:
+    """What is believed beside the floor of the held-out logs, `own` (joints,) [N m], and what responses have named beside that."""
     held, prepared = replace(first.held, case=case), first.held.prepared
     responded = judged(held, done.found.final)
     judge = first.held.judge if responded.parts else prepared.judge
-    if judge is None or responded.judge is None or floored.noise is None:
-        return done, responded, None
-    final = responded.final
-    known = floored.rms if floored.reference is None else floored.reference
-    own = motion_floor(final.model, acted(final.model.arm, responded.acting), floored.noise, prepared.judging, judge, prepared,
-                       known, chosen.seed, case.beside, floored.judging)
-    if own is None:
-        return done, responded, None
+    if own is None or judge is None or responded.judge is None:
+        return done, responded
     if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:
-        return done, responded, own  # what motion shows that the reference logs do not have, they may have had as well
+        return done, responded  # what motion shows that the reference logs do not have, they may have had as well
     plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
+    final = responded.final
     believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved,
                                bool(responded.parts))
-    return believed, responded if believed is done else judged(held, believed.found.final), own
+    return believed, responded if believed is done else judged(held, believed.found.final)
 
 
-def _limits(last: Step, case: Case, prepared: Prepared, probed: Probed | None,
-            ) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
-    """By hiding causes in what the last model leaves; with reference logs beside these."""
+def limits_of(last: Step, case: Case, first: Responding, probed: Probed | None = None) -> Limits:
+    """What would have been found, and what not however large, by hiding causes in what the last model leaves.
+
+    Args:
+        probed: with reference logs beside these.
+    """
     arms = case.arms(last.before.model)
     probe, bounds = ((Probe.of(last.before, case.judge, arms), last.thresholds) if probed is None else
                      probed(last.before, case.judge, arms))
-    return detectable(last.screened, bounds, prepared.data.logs[0].log.robot.revolute, probe)
+    return detectable(last.screened, bounds, first.held.prepared.data.logs[0].log.robot.revolute, probe)
 
 
 def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool], left: Array) -> str:

@@ -17,7 +17,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.rrr import RRR
 from pipelines.model.simulation.plant import Plant
 
-__all__ = ["OneRRR"]
+__all__ = ["OneRRR", "acceleration_of"]
 
 # dq = D⁻¹ (u - τ_f(v) - c - h) at angles {q2}, {q3} and speeds {v1} {v2} {v3}, into {a1} {a2} {a3}; S = q2 + q3.
 _ACCELERATION = """
@@ -88,9 +88,17 @@ def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=
             q3 + {sixth} * (v3 + 2.0 * (w3 + z3) + o3), v1 + {sixth} * (k1 + 2.0 * (l1 + m1) + n1),
             v2 + {sixth} * (k2 + 2.0 * (l2 + m2) + n2), v3 + {sixth} * (k3 + 2.0 * (l3 + m3) + n3))
 """
+# The slope of the speed alone.
+_SLOPE = """
+def acceleration(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads):
+{unpacked}
+{first}
+    return k1, k2, k3
+"""
 _STAGES = {"first": ("q", "v", "k"), "second": ("y", "w", "l"), "third": ("y", "z", "m"), "fourth": ("y", "o", "n")}
 
 _Step = Callable[..., tuple[float, float, float, float, float, float]]
+_Acceleration = Callable[..., tuple[float, float, float]]
 
 
 class OneRRR:
@@ -120,15 +128,25 @@ class OneRRR:
 
 def _compiled(plant: Plant, h: float) -> _Step:
     """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, u1, u2, u3) -> the first six after it."""
+    step: _Step = _written(_STEP, plant, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))["step"]
+    return step
+
+
+def acceleration_of(plant: Plant) -> _Acceleration:
+    """(q1, q2, q3, v1, v2, v3, u1, u2, u3) -> accelerations, of the rigid body, friction and the loads of single joints."""
+    found: _Acceleration = _written(_SLOPE, plant)["acceleration"]
+    return found
+
+
+def _written(text: str, plant: Plant, **more: str) -> dict[str, Any]:
+    """What `text` defines, compiled with the arm's numbers in it."""
     numbers = _numbers(plant)
     stages = {name: _ACCELERATION.format(**numbers, **_names(plant, *letters)) for name, letters in _STAGES.items()}
     loads = tuple(load for _, load in plant.own_loads)
     unpacked = f"    {', '.join(f'load{k}' for k in range(len(loads)))}, = loads" if loads else ""
-    text = _STEP.format(**stages, unpacked=unpacked, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))
     scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, "loads": loads}
-    exec(_code(text), scope)
-    step: _Step = scope["step"]
-    return step
+    exec(_code(text.format(**stages, unpacked=unpacked, **more)), scope)
+    return scope
 
 
 @lru_cache(maxsize=32)  # an arm is run again and again: in each experiment, with each noise, with halved steps

@@ -130,6 +130,8 @@ class MovingPlant:
         self._loaded = [(hook.load, own) for hook, own in self._hooked if hook.load]
         # each effect acts around those before it: a command meets the last one first, a position reaches it last
         self._driven = [(hook.actuator, own) for hook, own in reversed(self._hooked) if hook.actuator]
+        self._changing = [(hook, own) for hook, own in reversed(self._hooked) if hook.actuator or hook.rate]
+        self._shared = [(hook.load, own) for hook, own in self._hooked if hook.load and hook.alone is None]
         self._left = np.empty((plant.n_joints, replicas))
         self._zeros = np.zeros((replicas, plant.n_joints))
 
@@ -158,6 +160,19 @@ class MovingPlant:
         for load, own in self._loaded:
             torque = torque - load(motion, states[:, own])
         return np.ascontiguousarray(torque.T)
+
+    def through(self, motion: Motion, states: Array, command: Array) -> tuple[Array, Array | float]:
+        """What comes of `command` (replicas, joints) to the rigid body, with the loads but those of single joints taken off, and
+        d(states)/dt (replicas, states)."""
+        rates: Array | float = np.zeros_like(states) if self._changing else 0.0
+        torque = command
+        for hook, own in self._changing:
+            if hook.rate and not isinstance(rates, float):
+                rates[:, own] = hook.rate(motion, torque, states[:, own])
+            torque = hook.actuator(torque, motion, states[:, own]) if hook.actuator else torque
+        for load, own in self._shared:
+            torque = torque - load(motion, states[:, own])
+        return torque, rates
 
     def rates(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
         """d(states)/dt (replicas, states)."""

@@ -19,11 +19,14 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.control import Controlling
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.integrate import HeldBody, RungeKutta
+from pipelines.model.simulation.one_hooked import OneHooked
 from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.one_rrr import OneRRR
 from pipelines.model.simulation.plant import MovingPlant, Plant
 
 __all__ = ["Noise", "Simulated", "run", "run_together"]
+
+Integrator = RungeKutta | OneRRR | OneHooked
 
 _CHUNK = 2048  # samples whose noise is drawn at once
 _POSTURES = 32  # of the reference in which the inertia matrix is looked at
@@ -81,7 +84,7 @@ def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, no
     for lane in alone:
         lane.run_alone(steps, drawn)
     active, k = sorted((lane for lane in every if lane not in alone), key=lambda lane: -lane.experiment.n_samples), 0
-    before: RungeKutta | OneRRR | None = None
+    before: Integrator | None = None
     while active:
         own = plant if plant.p.ndim == 1 else replace(plant, p=np.tile(plant.p, (len(active), 1)))
         moving = own.prepared(len(drawn) * len(active))
@@ -95,7 +98,7 @@ def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, no
 
 
 @np.errstate(all="ignore")  # of an arm that runs away numbers are no longer finite, some samples before it is refused
-def _advance(moving: MovingPlant, integrator: RungeKutta | OneRRR, lanes: Sequence[_Lane], first: int, last: int) -> None:
+def _advance(moving: MovingPlant, integrator: Integrator, lanes: Sequence[_Lane], first: int, last: int) -> None:
     """All lanes from sample `first` to `last`, side by side."""
     n, width = moving.plant.n_joints, len(lanes[0].t)
     own = [slice(i * width, (i + 1) * width) for i in range(len(lanes))]
@@ -163,9 +166,11 @@ class _Lane:
         return Simulated(times, q, tau, moved[..., :n], moved[..., n:], steps)
 
 
-def _integrator(moving: MovingPlant, sample_time: float, steps: int, exact: bool) -> RungeKutta | OneRRR:
+def _integrator(moving: MovingPlant, sample_time: float, steps: int, exact: bool) -> Integrator:
     if moving.replicas == 1 and OneRRR.fits(moving.plant):
         return OneRRR(moving.plant, sample_time, steps)
+    if moving.replicas == 1 and OneHooked.fits(moving.plant):
+        return OneHooked(moving, sample_time, steps)
     if not exact and HeldBody.fits(moving):
         return HeldBody(moving, sample_time, steps)
     return RungeKutta(moving, sample_time, steps)
