@@ -76,8 +76,8 @@ def _plain(first: Responding, done: Settled) -> Refined:
 
 def _named(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings) -> Named:
     plain = _plain(first, done).rms
-    return findings(done.found, done.ruling, done.simulated, first.held.prepared, plain, floored.rms, chosen.blocks, chosen.evidence,
-                    case.beside)
+    return findings(done.found, done.ruling, done.simulated, first.held.prepared, plain, floored.rms, chosen.blocks,
+                    chosen.evidence, case.beside)
 
 
 def _told(first: Responding, case: Case, done: Settled, responded: Judged, floored: Floored, chosen: DiagnosisSettings,

@@ -15,6 +15,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, run
+from pipelines.model.simulation.one_hooked import OneHooked
 from tests.model.simulation.arms import KD, KP, TS, Case, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop
 
@@ -40,11 +41,14 @@ class Hooked(Effect):
 
 
 def simulated(make: Callable[[ArmModel], Hooks], replicas: int = 2) -> Array:
-    """True position (samples, joints) of the last of some replicas."""
+    """True position (samples, joints) of the last of some replicas; one alone, whose body takes no arrays, moves as they do."""
     plant = Plant.of(rrr().arm.extended(Acting(Hooked(make=make), ())))
     controller = Controller("pd", KP, KD, velocity="backward-difference")
     found = run(plant, experiment(controller, SAMPLES), 8, seeds=range(replicas))
     np.testing.assert_array_equal(found.true_q[0], found.true_q[-1])
+    assert OneHooked.fits(plant)
+    alone = run(plant, experiment(controller, SAMPLES), 8)
+    np.testing.assert_allclose(alone.true_q[0], found.true_q[-1], rtol=0.0, atol=1e-11)
     return found.true_q[-1]
 
 
