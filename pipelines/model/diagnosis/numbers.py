@@ -22,7 +22,7 @@ __all__ = ["acting", "of_no_size", "parameters", "standard_deviations"]
 
 _STEP = 1e-4
 # Deviations from zero: of 410 named causes of the test bench the least true one of one number was 6.9, a false gain 4.9; delays of
-# two arms in order 2.3 and 3.5. Touches of the bench stand 31 and more, what looked like one beside another cause 0.6.
+# two arms in order 2.3 and 3.5. Touches of the bench stand 24 and more, what looked like one beside another cause 0.6.
 _STDS = 5.0
 
 
