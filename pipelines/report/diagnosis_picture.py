@@ -75,7 +75,8 @@ def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:
                                  torque, quantity="residual")]
     if one.simulated_t is not None and one.simulated_position_error is not None:
         found.append(Figure(f"position-error{suffix}", "What the simulation gets wrong: simulated minus measured position, in "
-                            f"closed loop with controller and references of {one.simulated_log}.",
+                            f"closed loop with controller and references of {one.simulated_log}, over its first "
+                            f"{one.simulated_t[-1]:.0f} s.",
                             lambda drawing: _simulated(joint_axes(drawing, joints), one, units.thousandths), joint_size(joints)))
     for over, words in (("order", "Orders of the joint's angle: a peak at 18 is a torque that repeats 18 times a turn."),
                         ("frequency", "Spectrum of the residual.")):

@@ -19,7 +19,7 @@ from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.evidence import proof
-from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of, worse_log
+from pipelines.model.diagnosis.gains import Simulation, farther, gain_of, simulation_errors, torque_gain_of, worse_log
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import rigid_rows
@@ -39,6 +39,7 @@ class Carried:
     bare: Arm  # without the load
     left: Array  # (rows,) [N m] of held-out rows, without the load
     doubt: str  # why it is not believed; empty where it is
+    simulated: tuple[Simulation, ...]  # the bare arm, and that with the load
 
 
 def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, standing: Sequence[Acting], blocks: int,
@@ -74,7 +75,7 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     by = masses.copy()
     by[list(done.model.columns.kept)] -= shift
     arm = _with_base(whole, by)
-    return Carried(finding, replace(arm, effects=(*arm.effects, acting)), arms[0], left[0], doubt)
+    return Carried(finding, replace(arm, effects=(*arm.effects, acting)), arms[0], left[0], doubt, tuple(simulated))
 
 
 def _with_base(arm: Arm, by: Array) -> Arm:

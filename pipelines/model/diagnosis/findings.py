@@ -26,7 +26,7 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Val
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
-__all__ = ["Named", "agreement", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
+__all__ = ["Causes", "agreement", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
 
 _ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
@@ -35,7 +35,7 @@ _TELLS = 9.0  # times its variance, that the power of the predicted part must ha
 
 
 @dataclass(frozen=True, eq=False)
-class Named:
+class Causes:
     """The causes that are named."""
 
     findings: tuple[Finding, ...]
@@ -43,8 +43,10 @@ class Named:
 
 
 def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prepared: Prepared, nominal: Array, floor: Array,
-             blocks: int, draw: bool, beside: Sequence[Acting] = ()) -> Named:
-    """Each named cause, the one that explains most first; the final model holds them, in the order of their steps.
+             blocks: int, draw: bool, beside: Sequence[Acting] = ()) -> Causes:
+    """Each named cause, the one that explains most first, and how the arms without and with all of them follow.
+
+    The final model holds them, in the order of their steps.
 
     Args:
         simulated: the nominal arm and that after each step.
@@ -61,7 +63,7 @@ def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prep
         _finding(found, steps[place], best, place, models[place] if len(places) == 1 else (one.before, one.after), covariance,
                  taken[place], floor, one.gain, draw)
         for places, one in zip(order, told, strict=True) for place in places if (best := steps[place].best) is not None)
-    return Named(each, (told[0].simulated[0], told[-1].simulated[1]) if told else ())
+    return Causes(each, (told[0].simulated[0], told[-1].simulated[1]) if told else ())
 
 
 def _told(causes: Sequence[tuple[str, int | None]], taken: Sequence[float]) -> list[list[int]]:

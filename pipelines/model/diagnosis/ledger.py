@@ -44,7 +44,7 @@ class Tried:
 def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
             best: Tried | None, now: Refined, number: int, refused: Collection[int] = ()) -> tuple[Trial, ...]:
     """The lines of step `number`, greatest gain first; `judged` holds the gains that `thresholds` are for, `refused` the ids of
-    those screened that time held out does not bear out."""
+    those screened that time held out does not bear out, or, of an event, what is left when it is fitted exactly."""
     exact = {id(one.screened): one for one in tried}
     rows: list[Trial] = []
     order = sorted(range(len(screened)), key=lambda k: -judged[k].gain[0])
@@ -61,6 +61,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
                   UNBELIEVABLE if not fitted.believable else
                   "impossible numbers" if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else
+                  "fitted exactly it stays below its threshold" if fitted.log is not None and id(one) in refused else
                   _REFUSED if id(one) in refused else
                   "takes more numbers, or a second of its kind" if best is not None and fitted.rank < best.rank else
                   "explains less than the one accepted")

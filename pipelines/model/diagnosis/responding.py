@@ -46,6 +46,10 @@ class Responding:
     standing: tuple[Standing, ...] = ()
     undecided: tuple[NotTestable, ...] = ()
 
+    def nameable(self, case: Case) -> Case:
+        """`case`, where frequency responses show no spring: what gives way may be a gap then, which the residual names."""
+        return replace(case, nameable=(*case.nameable, "reversals")) if self.stiff is not None and not self.stiff.named else case
+
 
 def responding(case: Case, prepared: Prepared, without: Sequence[str] = (), only: Sequence[str] | None = None) -> Responding:
     """What gives way is taken out of all rows: out of those of the reference where it did before as well.

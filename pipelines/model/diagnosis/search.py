@@ -282,7 +282,11 @@ def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, 
     now, screened, thresholds = explored.before, explored.screened, gate.thresholds
     passes = {id(one) for one in gate.passed}
     tried = [one for one in explored.tried if id(one.screened) in passes]
-    refused = gate.refused
+    bound = {id(one): gain for one, gain in zip(screened, thresholds.gain, strict=True)}
+    # What happened once no other time asks for: fitted exactly it has to take as much as its columns had to.
+    happened = {id(one.screened) for one in tried if one.log is not None and now.rss - one.done.rss <= bound[id(one.screened)]}
+    refused = gate.refused | happened
+    tried = [one for one in tried if id(one.screened) not in happened]
     if not case.floored:
         refused |= {id(one.screened) for one in tried if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
         tried = [one for one in tried if id(one.screened) not in refused]

@@ -25,7 +25,7 @@ from pipelines.model.simulation import Experiment, simulate
 
 __all__ = ["Followed", "arms_of", "as_simulated", "followed_by", "with_simulation"]
 
-_SECONDS = 3.0  # of the log that are shown
+_SECONDS = 3.0  # of the log that are shown at most
 _POINTS = 1500
 _TRIED = 2  # logs: where an arm runs away in both, others are hardly worth the time
 
@@ -46,7 +46,10 @@ def arms_of(found: Diagnosis) -> tuple[Arm, ...]:
 
 
 def as_simulated(arms: Sequence[Simulation]) -> Followed | None:
-    """What simulations of arms, made for what these gain, have of the first of their logs; None where one of them has nothing."""
+    """What simulations of arms, made for what these gain, have of the first of their logs; None where one of them has nothing.
+
+    They are the arms as they were judged: what sampling has moved their numbers by, which is little, was not taken out yet.
+    """
     first = [one.first for one in arms if one.first is not None]
     if not 0 < len(first) == len(arms):
         return None
@@ -71,7 +74,8 @@ def _shown(log: str, t: Array, errors: Sequence[Array]) -> Followed:
 
 
 def with_simulation(found: Diagnosis, followed: Followed | None) -> Diagnosis:
-    """`found` with the position errors of its `arms_of` in its first picture; without any where they could not be simulated."""
+    """`found` with the position errors of a nominal and an extended arm in its first picture; without any where they could not be
+    simulated."""
     if not found.evidence:
         return found
     t, log = (None, "") if followed is None else (followed.t, followed.log)

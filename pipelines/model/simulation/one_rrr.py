@@ -151,7 +151,7 @@ def _written(text: str, plant: Plant, **more: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=32)  # an arm is run again and again: in each experiment, with each noise, with halved steps
 def _code(text: str) -> CodeType:
-    return compile(text, "<one step of an RRR arm>", "exec")
+    return compile(text, "<one RRR arm>", "exec")
 
 
 def _numbers(plant: Plant) -> dict[str, str]:

@@ -29,5 +29,5 @@ def searched(nominal: Any, *causes: tuple[Effect, Any]) -> Any:
     return SimpleNamespace(nominal=nominal, steps=steps, final=SimpleNamespace(rms=before.rms, model=model))
 
 
-def effect(name: str, joint: int) -> Effect:
+def effect(name: str, joint: int | None) -> Effect:
     return find_effect(name)(joint=joint)

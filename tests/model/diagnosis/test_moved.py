@@ -12,7 +12,7 @@ import pytest
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.robot import format_robot
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis import diagnose as diagnose_module
+from pipelines.model.diagnosis import changed as changed_module
 from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs, prepare
@@ -135,7 +135,7 @@ def test_base_parameters_that_moved_as_no_cause_moves_them_are_no_arm_in_order(w
 def test_a_load_that_is_not_accepted_leaves_no_arm_in_order(mass: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The base parameters have moved all the same, and the ledger says why the load has no name."""
     doubted = SimpleNamespace(doubt="it is farther", finding=SimpleNamespace(cause="payload", joint=None))
-    monkeypatch.setattr(diagnose_module, "carried", lambda *_: doubted)
+    monkeypatch.setattr(changed_module, "carried", lambda *_: doubted)
     found = diagnose(Logs((loaded(1, mass), loaded(2, mass)), (loaded(3, mass, "validate"),),
                           (loaded(4, 0.0, "reference"), loaded(5, 0.0, "reference"))), SETTINGS)
     assert (found.verdict, found.findings) == (verdict, ())

@@ -1,4 +1,4 @@
-"""What is dropped again after a search, on made-up numbers: mended shapes, causes that others do as well, held-out alarms."""
+"""What is dropped again after a search, on made-up numbers: causes that others do as well, held-out alarms."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import pruned
-from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis import mended, pruned
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects.base import Effect
@@ -27,77 +26,6 @@ def twins() -> tuple[str, str]:
 def among(*causes: Effect) -> Any:
     there = tuple(SimpleNamespace(cause=one.name, joint=one.joint) for one in causes)
     return SimpleNamespace(families=there, judge=None, blocks=10, white=False, beside=())
-
-
-@pytest.fixture
-def alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Twins take half of what the other one took."""
-    monkeypatch.setattr(pruned, "imitated", lambda step, family, case: 0.5)
-
-
-@pytest.mark.usefixtures("alike")
-def test_what_only_mends_the_shape_of_an_earlier_cause_is_no_cause() -> None:
-    """The second takes off a hundredth of what the nominal model leaves, and is a twin of the first at its joint."""
-    one, other = twins()
-    found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.05, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
-    assert pruned._apart(found, [0, 1], among(effect(other, 1))) == [0]
-
-
-def test_a_twin_by_name_that_could_not_have_passed_for_the_earlier_is_one_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of what the first took away it takes a fiftieth: it mends no shape of that."""
-    monkeypatch.setattr(pruned, "imitated", lambda step, family, case: 0.02)
-    one, other = twins()
-    found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.05, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
-    assert pruned._apart(found, [0, 1], among(effect(other, 1))) == [0, 1]
-
-
-@pytest.mark.parametrize(("joint", "rest", "kept"), [(2, 0.0101, [0]), (2, 0.06, [0, 1]), (3, 0.0101, [0, 1])])
-def test_a_trace_of_a_law_like_one_that_stands_is_the_rest_of_that(joint: int, rest: float, kept: list[int]) -> None:
-    """Beside a great cause it takes a thousandth off what the nominal model leaves, at the joint where a law of friction stands."""
-    found = searched(left(0.1, 0.1, 0.01), (effect("encoder_crosstalk", 1), left(0.01, rest, 0.01)),
-                     (effect("stribeck", 2), left(0.01, 0.01, 0.01)))
-    case = among(effect("encoder_crosstalk", 1), effect("stribeck", 2))
-    case.beside = (SimpleNamespace(effect=effect("concave_friction", joint)),)
-    assert pruned._apart(found, [0, 1], case) == kept
-
-
-@pytest.mark.parametrize(("joint", "rest", "kept"), [(1, 0.012, [0]), (1, 0.05, [0, 1]), (2, 0.012, [0, 1])])
-def test_a_trace_at_the_joint_of_a_gap_is_what_no_law_of_it_has(joint: int, rest: float, kept: list[int]) -> None:
-    """A tenth of a millisecond beside a gap at the joint, that takes a hundredth of what it left; elsewhere it is a cause."""
-    before = [0.1, 0.1, 0.01]
-    between = [0.01, 0.01, 0.01]
-    between[joint - 1] = rest
-    found = searched(left(*before), (effect("backlash", 1), left(*between)), (effect("time_delay", joint), left(0.01, 0.01, 0.01)))
-    assert pruned._apart(found, [0, 1], among(effect("backlash", 1), effect("time_delay", joint))) == kept
-
-
-@pytest.mark.parametrize(("share", "kept"), [(0.9, [0]), (0.2, [0, 1])])
-def test_what_an_earlier_law_would_take_in_a_looser_form_is_the_rest_of_it(share: float, kept: list[int],
-                                                                           monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two and a half waves beside a spring a hundred times as great: the polynomial with more terms takes as much of them."""
-    spring, waves = effect("spring", 1), effect("cogging", 1)
-    found = searched(left(0.5, 0.01, 0.01), (spring, left(0.05, 0.01, 0.01)), (waves, left(0.01, 0.01, 0.01)))
-
-    def taken(step: Any, family: Any, case: Any) -> float:
-        return share if step is found.steps[1] and family.shapes == (spring.looser(),) else 0.0
-
-    monkeypatch.setattr(pruned, "imitated", taken)
-    case = SimpleNamespace(families=(Family("cogging", 1, (waves,)),), judge=None, blocks=10, beside=())
-    assert pruned._apart(found, [0, 1], case) == kept
-
-
-@pytest.mark.usefixtures("alike")
-def test_a_twin_that_takes_off_much_is_one_of_its_own() -> None:
-    one, other = twins()
-    found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.3, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
-    assert pruned._apart(found, [0, 1], among(effect(other, 1), effect(other, 2))) == [0, 1]
-
-
-@pytest.mark.usefixtures("alike")
-def test_the_same_at_another_joint_is_no_twin() -> None:
-    one, other = twins()
-    found = searched(left(0.5, 0.05, 0.01), (effect(one, 1), left(0.01, 0.05, 0.01)), (effect(other, 2), left(0.01, 0.01, 0.01)))
-    assert pruned._apart(found, [0, 1], among(effect(other, 1), effect(other, 2))) == [0, 1]
 
 
 @pytest.mark.parametrize(("held_out", "verdict"), [((0.011, 0.012, 0.01), "nothing-wrong"), ((0.01, 0.2, 0.01), "unknown")])
@@ -133,7 +61,7 @@ def test_the_cause_that_is_missed_least_goes_first(monkeypatch: pytest.MonkeyPat
                      (effect("torque_offset", 2), left(0.01, 0.01, 0.01)))
     final: Any = SimpleNamespace(rss=100.0, weight=np.ones(3))
     without = {(1,): model_of(rss=200.0), (0,): model_of(rss=105.0)}
-    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last: without[tuple(kept)])
+    monkeypatch.setattr(pruned, "without", lambda found, kept, case, last: without[tuple(kept)])
     monkeypatch.setattr(pruned, "held_out", lambda done, case: done.rss)
     families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="torque_offset", joint=2))
     thresholds = SimpleNamespace(at=lambda weight: SimpleNamespace(gain=np.array([10.0, 10.0])))
@@ -150,18 +78,35 @@ def test_a_cause_that_brings_nothing_held_out_is_idle_however_much_it_fits(monke
     found = searched(left(0.5, 0.05, 0.01), (effect("cogging", 1), left(0.01, 0.05, 0.01)),
                      (effect("torque_offset", 2), left(0.01, 0.01, 0.01)))
     final: Any = SimpleNamespace(rss=100.0, weight=np.ones(3))
-    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last: model_of(rss=1000.0, kept=kept))
+    monkeypatch.setattr(pruned, "without", lambda found, kept, case, last: model_of(rss=1000.0, kept=kept))
     monkeypatch.setattr(pruned, "held_out", lambda done, case: 2.0 if getattr(done, "kept", None) == [1] else 1.0)
     families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="torque_offset", joint=2))
     case: Any = SimpleNamespace(families=families, thresholds=None)
     assert pruned._idle(found, [0, 1], case, final) == 1
 
 
+@pytest.mark.parametrize(("missed", "idle"), [(0.5, 1), (20.0, None)])
+def test_what_happened_once_is_idle_where_the_others_leave_hardly_more_without_it(missed: float, idle: int | None,
+                                                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held-out time says nothing of it; its own threshold, of ten, does."""
+    found = searched(left(0.5, 0.05, 0.01), (effect("cogging", 1), left(0.01, 0.05, 0.01)),
+                     (effect("contact", None), left(0.01, 0.01, 0.01)))
+    found.final.model.effects[1].log = 0
+    final: Any = SimpleNamespace(rss=100.0, weight=np.ones(3))
+    others = {(1,): model_of(rss=900.0), (0,): model_of(rss=100.0 + missed)}
+    monkeypatch.setattr(pruned, "without", lambda found, kept, case, last: others[tuple(kept)])
+    monkeypatch.setattr(pruned, "held_out", lambda done, case: 1.0 if done is not others[1,] else 2.0)
+    families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="contact", joint=None))
+    thresholds = SimpleNamespace(at=lambda weight: SimpleNamespace(gain=np.array([10.0, 10.0])))
+    case: Any = SimpleNamespace(families=families, thresholds=thresholds)
+    assert pruned._idle(found, [0, 1], case, final) == idle
+
+
 def test_what_gained_no_more_than_chance_is_asked_again_beside_what_was_found_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside the third the first is sure; the second, a twin of nothing, still is not."""
     found = searched(left(0.5, 0.5, 0.5), (effect("cogging", 1), left(0.4, 0.5, 0.5)), (effect("cogging", 2), left(0.4, 0.4, 0.5)),
                      (effect("cogging", 3), left(0.4, 0.4, 0.1)))
-    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, last=None: tuple(kept))
+    monkeypatch.setattr(pruned, "without", lambda found, kept, case, last=None: tuple(kept))
     monkeypatch.setattr(pruned, "no_name", lambda step, before, after, place, *_: (before, after, place) != ((2,), (0, 2), 0))
     assert pruned._asked_again(found, [2], [0, 1], among()) == ([0, 2], (0, 2))
     assert pruned._asked_again(found, [], [0, 1], among()) == ([], ())
@@ -171,9 +116,9 @@ def test_a_cause_that_takes_the_ground_from_a_later_one_is_not_taken_back(monkey
     """With it the later one would only mend its shape: one of two names has to go, and the later one was surer."""
     one, other = twins()
     found = searched(left(0.5, 0.01, 0.01), (effect(one, 1), left(0.05, 0.01, 0.01)), (effect(other, 1), left(0.01, 0.01, 0.01)))
-    monkeypatch.setattr(pruned, "imitated", lambda step, family, case: 0.5)
+    monkeypatch.setattr(mended, "imitated", lambda step, family, case: 0.5)
     monkeypatch.setattr(pruned, "no_name", lambda *_: False)
-    monkeypatch.setattr(pruned, "_without", lambda found, kept, case, final=None: tuple(kept))
+    monkeypatch.setattr(pruned, "without", lambda found, kept, case, final=None: tuple(kept))
     case = among(effect(one, 1), effect(other, 1))
     kept, final = pruned._asked_again(found, [1], [0], case)
     assert (kept, final) == ([1], (1,))
@@ -200,7 +145,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(nominal: float,
     monkeypatch.setattr(pruned, "_not_told", lambda *args: False)
     monkeypatch.setattr(pruned, "_harm", lambda *args: "")
     monkeypatch.setattr(pruned, "of_no_size", lambda done: [])
-    monkeypatch.setattr(pruned, "_without", lambda *args: left(rest, 0.01, 0.01))
+    monkeypatch.setattr(pruned, "without", lambda *args: left(rest, 0.01, 0.01))
     case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
                                 unlike=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", ruled, ""), case, case, FLOOR)
@@ -215,13 +160,13 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     for step in made.steps:
         step.best.log, step.other = None, None
     for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
-                         "of_no_size": [], "_apart": [0, 1], "_idle": None}.items():
+                         "of_no_size": [], "not_mending": [0, 1], "_idle": None}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
-    monkeypatch.setattr(pruned, "_turned", lambda found, kept, *_: kept)
+    monkeypatch.setattr(pruned, "turned", lambda found, kept, *_: kept)
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
     dip = SimpleNamespace(effects=(SimpleNamespace(possible=True), SimpleNamespace(possible=False)))
     both, one = SimpleNamespace(rms=np.array([0.01, 0.01, 0.01]), model=dip), left(0.02, 0.01, 0.01)
-    monkeypatch.setattr(pruned, "_without", lambda found, kept, *_: both if len(kept) == 2 else one)
+    monkeypatch.setattr(pruned, "without", lambda found, kept, *_: both if len(kept) == 2 else one)
     case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
                                 unlike=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
@@ -237,7 +182,7 @@ def test_what_did_harm_in_a_log_when_it_was_found_is_asked_again_beside_what_was
                      (effect("spring", 2), left(0.01, 0.01, 0.01)))
     for step in found.steps:
         step.best.log = None
-    monkeypatch.setattr(pruned, "_without", lambda *args: left(0.05, 0.01, 0.01))
+    monkeypatch.setattr(pruned, "all_but", lambda *args: left(0.05, 0.01, 0.01))
     monkeypatch.setattr(pruned, "unlike", lambda before, after, *args: beside if after is found.final else "worse in free-1")
     case = SimpleNamespace(blocks=10)
     assert bool(pruned.at_odds(found, 0, SimpleNamespace(), case)) is odd
@@ -263,10 +208,10 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     made = searched(left(0.01, elsewhere, 0.03), (waves, left(0.01, elsewhere, 0.01)))
     made.steps[0].best.log, made.steps[0].other = None, None
     for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
-                         "of_no_size": [], "_apart": [], "_idle": None, "only_then": False, "_possible": True,
+                         "of_no_size": [], "not_mending": [], "_idle": None, "only_then": False, "possible": True,
                          "_unseen": []}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
-    monkeypatch.setattr(pruned, "_turned", lambda found, apart, believed, *_: believed)
+    monkeypatch.setattr(pruned, "turned", lambda found, apart, believed, *_: believed)
     monkeypatch.setattr(pruned, "_asked_again", lambda found, kept, *_: (kept, found.final))
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
     case: Any = SimpleNamespace(floored=False, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,

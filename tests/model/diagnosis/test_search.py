@@ -156,6 +156,13 @@ def test_an_event_belongs_to_its_log() -> None:
     values = best.done.model.effects[0].values
     assert values["start"] == pytest.approx(3.0, abs=0.01)
     assert values["force"] == pytest.approx(np.hypot(6.0, 10.0), rel=0.05)
+    step = found.steps[0]
+    gained, passed = step.before.rss - best.done.rss, (best.screened,)
+    for share, event in ((0.9, True), (1.1, False)):  # of what it takes fitted exactly, that its columns had to
+        thresholds = replace(step.thresholds, gain=np.full(len(step.screened), share * gained))
+        asked = search_module._step(case, search_module.Explored(step.before, step.screened, step.rivals),
+                                    search_module._Gate(step.screened, thresholds, passed, frozenset()), 1, True)
+        assert (asked.best is best) is event
 
 
 def test_eleven_waves_a_turn_could_have_passed_for_themselves_and_for_no_spring(waving: Case) -> None:

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.diagnosis import diagnose as diagnosed
+from pipelines.model.diagnosis import changed as changed_module
 from pipelines.model.diagnosis.by_speed import floor_by_speed
 from pipelines.model.diagnosis.candidates import lay_one
+from pipelines.model.diagnosis.changed import _times
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.diagnose import _times
+from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import rows_of
 from pipelines.model.diagnosis.settings import DiagnosisSettings
@@ -145,14 +146,13 @@ def test_it_searches_until_nothing_more_stood(answers: list[str], searched: int,
         known.append(given[-1])
         return SimpleNamespace(case=len(known), stood=given[-1])
 
-    monkeypatch.setattr(diagnosed, "search", lambda case, most: count.append(case))
-    monkeypatch.setattr(diagnosed, "stood_before", lambda *_: list(next(told)))
-    monkeypatch.setattr(diagnosed, "since_reference", since_with)
-    monkeypatch.setattr(diagnosed, "_nameable", lambda case, stiff: case)
-    first: Any = SimpleNamespace(held=SimpleNamespace(case=SimpleNamespace(beside=()), prepared=None), stiff=None)
+    monkeypatch.setattr(changed_module, "search", lambda case, most: count.append(case))
+    monkeypatch.setattr(changed_module, "stood_before", lambda *_: list(next(told)))
+    monkeypatch.setattr(changed_module, "since_reference", since_with)
+    first: Any = SimpleNamespace(held=SimpleNamespace(case=SimpleNamespace(beside=()), prepared=None), nameable=lambda case: case)
     memory: Any = SimpleNamespace(instead=lambda *_: None)
     start: Any = SimpleNamespace(case=0, stood=())
-    diagnosed._compared(first, start, None, SETTINGS, memory)  # type: ignore[arg-type]
+    changed_module._compared(first, start, None, SETTINGS, memory)  # type: ignore[arg-type]
     assert count == list(range(searched))
     assert known == [tuple(answers[:k]) for k in range(1, searched)]
 
@@ -175,7 +175,7 @@ def test_a_floor_of_nothing_multiplies_nothing() -> None:
 def test_what_stood_and_has_grown_has_changed(now: float, named: list[tuple[str, int]]) -> None:
     """By what it has grown."""
     before = replace(hidden(4, drag(1.0)), role="reference", name="before")
-    found = diagnosed.diagnose(Logs((hidden(1, drag(now)),), (), (before,)), SETTINGS)
+    found = diagnose(Logs((hidden(1, drag(now)),), (), (before,)), SETTINGS)
     assert [(one.cause, one.joint) for one in found.findings] == named
     if named:
         assert found.findings[0].parameters["coefficient"].value == pytest.approx((now - 1.0) * DRAG, rel=0.1)

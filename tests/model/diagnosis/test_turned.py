@@ -12,11 +12,12 @@ from pipelines.model.diagnosis import search as search_module
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.fewer import without
 from pipelines.model.diagnosis.findings import _in_steps
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.ledger import Tried
+from pipelines.model.diagnosis.mended import not_mending, turned
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import _apart, _turned, _without
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.verdict import Ruling, explained
@@ -62,9 +63,9 @@ def test_an_offset_gives_way_to_the_friction_that_it_stood_for(monkeypatch: pyte
     assert sorted(names) == ["asymmetric_friction", "quadratic_drag", "torque_offset"]
     every = [0, 1, 2]
     others = [k for k in every if names[k] != "asymmetric_friction"]
-    kept = _turned(found, others, every, case)
+    kept = turned(found, others, every, case)
     assert [names[k] for k in kept] == [name for name in names if name != "torque_offset"]
-    ruling, all_left = Ruling("cause", tuple(kept), ""), _without(found, kept, case)
+    ruling, all_left = Ruling("cause", tuple(kept), ""), without(found, kept, case)
     models = _in_steps(replace(found, final=all_left), ruling.named, [found.steps[k] for k in kept])
     shares = [explained(before.rms, after.rms, found.nominal.rms, all_left.rms) for before, after in models]
     assert sum(shares) == pytest.approx(1.0, abs=0.01), "what they explain is told beside each other, and not beside the offset"
@@ -75,5 +76,5 @@ def test_an_offset_that_is_one_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     names = [step.best.effect.name for step in found.steps if step.best is not None]
     assert "torque_offset" in names
     every = list(range(len(names)))
-    kept = _turned(found, _apart(found, every, case), every, case)
+    kept = turned(found, not_mending(found, every, case), every, case)
     assert "torque_offset" in [names[k] for k in kept]

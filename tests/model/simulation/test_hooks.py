@@ -10,9 +10,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.quadratic_drag import QuadraticDrag
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, run
 from pipelines.model.simulation.one_hooked import OneHooked
@@ -112,6 +114,28 @@ def test_the_last_effect_meets_the_command_first() -> None:
     found = run(Plant.of(rrr().arm.extended(inner, outer)), experiment(controller, SAMPLES), 8).true_q[0]
     expected = judge(drive=lambda tau: gain * np.clip(tau, -limit, limit)).position()
     assert np.abs(found - expected).max() < 1e-7
+
+
+@pytest.mark.parametrize("replicas", [1, 2])
+def test_a_load_of_one_joint_counts_once_beside_a_drive_that_is_changed(replicas: int) -> None:
+    """Which effects take arrays is no matter: a drag that needs none stands below and above one that does."""
+    gain, drag = np.array([1.5, 1.5, 1.5]), 0.4
+    drives = Acting(Hooked(make=lambda arm: Hooks(actuator=lambda command, motion, _: gain * command)), ())
+    below, above = (Acting.of(QuadraticDrag(joint), {"coefficient": drag}) for joint in (2, 3))
+    controller = Controller("pd", KP, KD, velocity="backward-difference")
+    plant = Plant.of(rrr().arm.extended(below, drives, above))
+    found = run(plant, experiment(controller, SAMPLES), 8, seeds=range(replicas)).true_q[-1]
+    where = np.array([0.0, drag, drag])
+    expected = judge(drive=lambda tau: gain * tau, load=lambda t, q, dq: where * dq * np.abs(dq)).position()
+    assert np.abs(found - expected).max() < 1e-7
+    assert np.abs(found - judge(drive=lambda tau: gain * tau).position()).max() > 1e-5
+
+
+@pytest.mark.parametrize("replicas", [1, 2])
+def test_an_arm_whose_drives_turn_the_wrong_way_runs_away(replicas: int) -> None:
+    plant = Plant.of(rrr().arm.extended(Acting(Hooked(make=lambda arm: Hooks(actuator=lambda tau, motion, _: -3.0 * tau)), ())))
+    with pytest.raises(InputRejected, match="runs away"):
+        run(plant, experiment(Controller("pd", KP, KD, velocity="backward-difference"), 4 * SAMPLES), 8, seeds=range(replicas))
 
 
 def test_a_sensor_is_in_the_loop() -> None:

@@ -1,0 +1,195 @@
+"""The second question: what has changed since the reference logs, and what it is worth.
+
+    found = changed(first, reference, settings, calibration, memory)
+
+The search is `search` with the gate of `since_reference`; what is beside it, the base parameters that have moved, is `absorbed`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.log.shared_work import meanwhile
+from pipelines.model.diagnosis.absorbed import Absorbed, Unexplained
+from pipelines.model.diagnosis.beside import acted
+from pipelines.model.diagnosis.calibrated import conditions_of, origin_of, refuse_unfit
+from pipelines.model.diagnosis.calibration import Calibration
+from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.carried import carried
+from pipelines.model.diagnosis.case import Case
+from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.doubted import unlike_noise, unnamed
+from pipelines.model.diagnosis.floored import Floored
+from pipelines.model.diagnosis.imperfections import DriveNoise
+from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.memory import Memory
+from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
+from pipelines.model.diagnosis.oscillating import oscillation
+from pipelines.model.diagnosis.pruned import settled
+from pipelines.model.diagnosis.refit import Refined
+from pipelines.model.diagnosis.responding import Responding
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
+from pipelines.model.diagnosis.search import Found, search
+from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.simulated import arms_of, as_simulated, followed_by, with_simulation
+from pipelines.model.diagnosis.since import Since, since_reference
+from pipelines.model.diagnosis.standing import Chance
+from pipelines.model.diagnosis.steadied import steadied, steady_nominal
+from pipelines.model.diagnosis.told import Limits, diagnosis_of, limits_of, sentence, strongest
+from pipelines.model.diagnosis.unchanged import stood_before
+from pipelines.model.diagnosis.verdict import Ruling, rule
+from pipelines.model.diagnosis.words import within
+from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
+
+__all__ = ["changed"]
+
+Gained = dict[Family, float]  # by each cause where nothing has changed
+
+_STOOD = 4  # times that effects are taken to stand by what later logs show of them
+_MOVED = ("the base parameters have moved since the reference logs, and no cause that is known moves them so: one set for "
+          "before and after leaves {:.2g} times what a set for each leaves; look at the tool, at the zeros of the encoders, and at "
+          "the torque constants of all drives")
+
+
+def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given: Calibration | None,
+             memory: Memory) -> Diagnosis:
+    """What is different since the reference logs."""
+    logs = [log for log, _ in first.held.prepared.referring]
+    if given is not None:
+        refuse_unfit(given, first.held.prepared, first.held.case.families, "reference logs", logs)
+    known = None if given is None else (given.weight, {(one.cause, one.joint): one.own for one in given.causes})
+    taken = first.held.case.beside
+    since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else
+             memory.since(first.held.prepared, chosen))
+    alone = since
+    drives = partial(_drives, first, reference, seed=chosen.seed)
+    with meanwhile(partial(drives, alone)) as noise_beside:
+        since, found = _compared(first, alone, reference, chosen, memory)
+        noise = noise_beside() if since is alone else None
+    case = first.nameable(since.case)
+    floor = since.floor_of(case.data)
+    case = replace(case, unlike=frozenset(np.flatnonzero(floor > since.floor).tolist()))
+    now = replace(first.held.prepared, data=case.data, judge=case.judge)
+    first = replace(first, held=replace(first.held, prepared=now))
+    limits_beside = partial(_limits, found, case, first, since)
+    with meanwhile(limits_beside) if chosen.limits else nullcontext(limits_beside) as limits:
+        done = settled(found, rule(found, floor), case, now, floor)
+        done = replace(done, found=steady_nominal(done.found))
+        done = unlike_noise(done, lambda: oscillation(reference, since.left).stands)
+        noise = noise if since is alone else drives(since)
+        moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
+        if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
+            done = unnamed(done, _with_load(found, case, now, since.floor, floor, noise, chosen.seed))
+        judging = 1.0 if case.judge is None else _times(since.floor_of(case.judge), since.floor)
+        floored = Floored(floor, "reference logs", None, given, noise, since.floor, judging)
+        sure = isinstance(moved, Absorbed) and not moved.unsure
+        told = diagnosis_of(first, case, done, floored, chosen, partial(_taken, limits, since.chance), sure)
+    if given is None:
+        told = replace(told, calibration=Calibration(
+            origin_of("reference logs", logs, None, chosen), conditions_of(now), alone.chance.weight, alone.floor,
+            np.full(case.data.n_joints, np.nan), alone.chance.bounds, None, ()))
+    told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
+    if isinstance(moved, Unexplained):
+        return _nameless(told, _MOVED.format(moved.times)) if told.verdict == "nothing-wrong" else told
+    return told if moved is None else _with_moved(told, moved, done.found.final, now, case, chosen)
+
+
+def _drives(first: Responding, reference: Data, since: Since, seed: int) -> DriveNoise | None:
+    """The noise of the drives, from what the standing effects leave of the reference logs."""
+    prepared = first.held.prepared
+    return noise_in(since.case.model, reference, since.left, prepared.referring, prepared.recipe, seed)
+
+
+def _limits(found: Found, case: Case, first: Responding, since: Since) -> tuple[Limits, Gained]:
+    """What would have been found of what has changed; and what chance gives each cause, as far as it has been asked by then."""
+    found, case = steadied(found, case)
+    return limits_of(found.steps[-1], case, first, since.probed), dict(since.chance.known)
+
+
+def _taken(limits: Callable[[], tuple[Limits, Gained]], chance: Chance) -> Limits:
+    """What another process has found out, chance's part for the next diagnosis too."""
+    found, known = limits()
+    chance.known.update(known)
+    return found
+
+
+def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings,
+              memory: Memory) -> tuple[Since, Found]:
+    """The search in what has changed. What it finds that stood in the reference logs as well is taken out with the rest that
+    stands, and it searches again."""
+    taken = first.held.case.beside
+    for _ in range(_STOOD):
+        case = first.nameable(since.case)
+        found = search(case, chosen.most)
+        more = stood_before(found, case)
+        if not more:
+            return since, found
+        before, stood = since, (*since.stood, *more)  # beside more that stands, chance gives each cause less: known is no longer
+        since = since_reference(first.held.prepared, reference, chosen, taken, None, stood)
+        memory.instead(before, since)
+    return since, search(first.nameable(since.case), chosen.most)
+
+
+def _nameless(told: Diagnosis, why: str) -> Diagnosis:
+    turning = () if told.nominal is None else told.nominal.robot.revolute
+    return replace(told, verdict="unknown", reason=why,
+                   summary=sentence(Ruling("unknown", (), why), (), turning, told.residual_rms.identify))
+
+
+def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared, case: Case,
+                chosen: DiagnosisSettings) -> Diagnosis:
+    """With what the base parameters say has changed, where nothing that was found says it already."""
+    turning = now.data.logs[0].log.robot.revolute
+    if told.verdict == "unknown" or told.extended is None:
+        why = "the base parameters have moved as it moves them, beside something that has no name"
+        return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
+    if (like := _alike(moved.effect, told.findings)) is not None:
+        why = f"the base parameters have moved, but {within(like.title)}, which was found, moves them too"
+        return _not_accepted(told, moved.effect.name, moved.effect.joint, why)
+    if why := moved.unsure:
+        if told.findings:
+            return _not_accepted(told, moved.effect.name, moved.effect.joint, why)
+        return _nameless(told, why)
+    one = carried(moved, final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
+    if one.doubt:
+        told = _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)
+        return _nameless(told, _MOVED.format(moved.times)) if moved.far and not told.findings else told
+    findings, beside = strongest((one.finding, *told.findings)), told.reason if told.verdict == "cause" else ""
+    named = replace(told, verdict="cause", findings=findings, reason=beside, extended=one.arm,
+                    summary=sentence(Ruling("cause", (), beside), findings, turning, told.residual_rms.identify))
+    if not named.evidence:
+        return named
+    return with_simulation(named, as_simulated(one.simulated) or followed_by(arms_of(named), now.logs))
+
+
+def _not_accepted(told: Diagnosis, cause: str, joint: int | None, why: str) -> Diagnosis:
+    return replace(told, rejected=(*told.rejected, Rejected(cause, joint, why)))
+
+
+def _alike(effect: Effect, found: Iterable[Finding]) -> Finding | None:
+    """What was found that `effect` could be mistaken for.
+
+    A longer link, say, moves masses that lie beyond it, and which part of a base parameter these are no torque tells.
+    """
+    return next((one for one in found if one.cause in effect.twins or effect.name in find_effect(one.cause).twins), None)
+
+
+def _with_load(found: Found, case: Case, now: Prepared, before: Array, floor: Array, noise: DriveNoise | None, seed: int) -> Array:
+    """(joints,) [N m] floor of the later logs, whose arm is heavier: it reverses more slowly; `floor`, that of the reference logs
+    `before` at such speeds, where nobody can tell."""
+    arm = acted(found.nominal.model.arm, case.beside)
+    own = None if noise is None else motion_floor(found.nominal.model, arm, noise, now.motions, case.data, now, before, seed,
+                                                  case.beside, _times(floor, before))
+    return floor if own is None else np.maximum(own, floor)
+
+
+def _times(floor: Array, before: Array) -> Array:
+    """(joints,) how many times the power one floor is of the other; once where there is none to multiply."""
+    return np.square(np.divide(floor, before, out=np.ones_like(floor), where=before > 0.0))
