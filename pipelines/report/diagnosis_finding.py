@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -36,13 +37,14 @@ _HIDDEN = 2.0  # times the share of the whole, from which the share at its own j
 
 
 def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool = True, floor: str = "the floor",
-                    units: Units = _TURNING) -> Section:
+                    units: Units = _TURNING, beside: Sequence[Finding] = ()) -> Section:
     """What it is, what to check, what it is worth, and the figure that proves it.
 
     Args:
         nominal: what the model without any finding leaves, and the floor of the held-out logs.
         offer: say how to extend the model by it.
         floor: what its share is counted from.
+        beside: every finding, this one among them.
     """
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
@@ -58,7 +60,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     if one.doubt:
         text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
     if offer and not one.doubt and not _happens_once(one):
-        text.append(_offer(one))
+        text.append(_offer(one, [other for other in beside if not other.doubt and not _happens_once(other)]))
     if one.rivals:
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
@@ -73,13 +75,19 @@ def numbers_section(number: int, one: Finding, units: Units = _TURNING) -> Secti
         one.gain, f"Gain on held-out time, root mean square, beside {beside}.", units)))
 
 
-def _offer(one: Finding) -> str:
-    """How to extend the model; and what held-out logs lack where no joint's gain is beyond its interval there."""
-    command = f"\"rrrid extend LOGS --with {cause_at(one.cause, one.joint)}\""
+def _offer(one: Finding, every: Sequence[Finding]) -> str:
+    """How to extend the model, by all findings where there are others; and what held-out logs lack where no joint's gain is beyond
+    its interval there."""
+    command = _extending([one])
     if one.origin not in ("residual", "reversals") or (one.gain.validate_torque_rms.ci95[:, 1] < 0.0).any():
-        return f"{command} writes the model with it"
+        return f"{command} writes the model with it{f', {_extending(every)} that with all' if len(every) > 1 else ''}"
     return (f"On the held-out time alone no joint's gain is beyond its 95 % interval. {command} writes the model with it where "
             "that of the whole arm is; else record more with the purpose \"validate\"")
+
+
+def _extending(some: Sequence[Finding]) -> str:
+    causes = dict.fromkeys(cause_at(one.cause, one.joint) for one in some)
+    return f"\"rrrid extend LOGS {' '.join(f'--with {cause}' for cause in causes)}\""
 
 
 def _frequency(one: Finding) -> float:

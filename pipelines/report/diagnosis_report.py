@@ -53,7 +53,8 @@ def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
     units, nominal = units_in(result), replace(result.residual_rms, floor=held_out_floor(result)[0])
     found = [section for number, one in enumerate(result.findings, 1)
-             for section in (finding_section(number, one, nominal, units=units), numbers_section(number, one, units))]
+             for section in (finding_section(number, one, nominal, units=units, beside=result.findings),
+                             numbers_section(number, one, units))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
@@ -161,7 +162,8 @@ def _others(result: Result) -> list[Section]:
         sections.append(Section("Ledger of hypotheses", text, (Table(
             ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
-            f"believed. {_OUT_OF_REACH}{_alike(len(result.residual_rms.identify))}", tones),)))
+            f"believed. {_OUT_OF_REACH} So is that of a cause that takes next to nothing: none was worked out."
+            f"{_alike(len(result.residual_rms.identify))}", tones),)))
     return sections
 
 

@@ -295,11 +295,17 @@ def torque_errors(before: ResidualRms, after: ResidualRms, rated: Sequence[float
     return Table(("joint", *heads), rows, f"Of what was held out, root mean square. {words}".strip())
 
 
+def _times(times: float) -> str:
+    """On its own side of what is in order."""
+    near = (times <= _ORDER) != (float(f"{times:.2g}") <= _ORDER)
+    return f"{format_number(times, 3 if near else 2)}×"
+
+
 def _judged(errors: Sequence[float], floor: float) -> str:
     """Whether an error is in order, and how many times what an arm in order leaves it is: now, then extended."""
     if not floor > 0.0:
         return "–"
     fine = [error <= _ORDER * floor for error in errors]
-    times = [f"{format_number(error / floor, 2)}×" for error in errors]
+    times = [_times(error / floor) for error in errors]
     shown = " → ".join(dict.fromkeys(times[-1:] if fine[0] and fine[-1] else times))
     return f"{shown}, {'in order' if fine[-1] else 'above it'}"

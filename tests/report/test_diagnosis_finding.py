@@ -97,6 +97,17 @@ def test_a_gain_that_held_out_logs_leave_open_is_not_offered_as_sure(high: float
     assert ("beyond its 95 % interval" in said) is not sure
 
 
+def test_several_findings_are_one_extension() -> None:
+    """Each by itself, or all: not one after the other into the same folder."""
+    change = np.array([[-0.1, -0.05]] * 3)
+    gain = replace(finding().gain, validate_torque_rms=TorqueGain(np.array([0.5, 0.4, 0.02]), np.array([0.1, 0.1, 0.019]), change))
+    one = replace(finding(), gain=gain)
+    two = replace(one, cause="cogging", joint=1)
+    said = " ".join(finding_section(1, one, NOMINAL, beside=(one, two, two)).text)
+    assert '"rrrid extend LOGS --with quadratic_drag:3 --with cogging:1" that with all' in said
+    assert "with all" not in " ".join(finding_section(1, one, NOMINAL, beside=(one,)).text)
+
+
 def test_a_small_joint_is_not_hidden_by_a_large_one() -> None:
     """All that is wrong with joint 3 is little of what is wrong with the arm; both are said, where they differ."""
     said = " ".join(finding_section(1, finding(), NOMINAL).text)

@@ -18,6 +18,7 @@ __all__ = ["UNBELIEVABLE", "WEAKER", "Tried", "ledger"]
 WEAKER = "weaker than others"
 UNBELIEVABLE = "the arm could not have moved so with it"
 _REFUSED = "time held out does not bear it out"
+_TOO_LITTLE = "takes next to nothing"  # so that nobody has asked what it would have to
 _SHOWN = 12  # lines of a step, of causes that stay below their thresholds
 
 
@@ -54,7 +55,8 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         accepted = best is not None and fitted is best
         if fitted is None and gain <= thresholds.gain[k] and len(rows) >= _SHOWN:
             continue
-        reason = ("accepted" if accepted else "below its threshold" if gain <= thresholds.gain[k] else
+        reason = ("accepted" if accepted else _TOO_LITTLE if np.isinf(thresholds.gain[k]) else
+                  "below its threshold" if gain <= thresholds.gain[k] else
                   "comes again at other moments" if not one.stands_out else
                   _REFUSED if id(one) in refused and fitted is None else
                   WEAKER if fitted is None else
