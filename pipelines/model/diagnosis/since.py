@@ -32,7 +32,7 @@ from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
 from pipelines.model.diagnosis.standing_shapes import fitted_shapes
-from pipelines.model.diagnosis.stood import Share, share_before
+from pipelines.model.diagnosis.stood import ANYTHING, Share, share_before
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
@@ -105,6 +105,8 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     @lru_cache(maxsize=4)  # it is asked whether it stood, then whether it has changed
     def share(found: Refined, place: int) -> Share:
         effects = found.model.effects
+        if _farther(effects[place].effect, standing, prepared.data, reference):
+            return ANYTHING
         rest = [k for other in range(len(effects)) if other != place for k in found.of_effect(other)]
         slopes = np.zeros((len(rest), data.rows))
         slopes[:, later] = found.slopes[rest]
@@ -134,6 +136,12 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     pairs = list(zip(standing, sizes, strict=True))
     return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed,
                  partial(floor_by_speed, reference, left), tuple(stood))
+
+
+def _farther(effect: Effect, standing: Sequence[Chosen], now: Data, reference: Data) -> bool:
+    """Whether the same stands at its joint, and the later logs go where the reference logs say nothing of that."""
+    stands = any((one.effect.name, one.effect.joint) == (effect.name, effect.joint) for one in standing)
+    return stands and effect.beyond(*([one.motion for one in rows.logs] for rows in (now, reference)))
 
 
 def _with(standing: Sequence[Chosen], stood: Sequence[Effect], data: Data, arm: Arm) -> tuple[Chosen, ...]:

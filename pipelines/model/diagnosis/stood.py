@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.linear import covariance
 from pipelines.model.diagnosis.nominal import fit_columns
 
-__all__ = ["Share", "share_before"]
+__all__ = ["ANYTHING", "Share", "share_before"]
 
 _SAME, _TWICE, _SURE = 0.5, 2.0, 0.25  # of what is there now, that was there before: at least, at most; its standard deviation
 _LIKE = 0.3  # the same in any shape, from which it may have been there
@@ -51,6 +51,9 @@ class Share:
         which has a size as well, where the reference logs do not tell."""
         like = np.sqrt(max(self.whole**2 - self.std**2, 0.0))
         return bool(like > _LIKE and self.whole > _CHANCE * self.std and self.same > -_SAME)
+
+
+ANYTHING = Share(0.0, 1.0, 0.0)  # all of it may have been there, and nobody knows
 
 
 def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], others: Array, standing: Array, weight: Array) -> Share:

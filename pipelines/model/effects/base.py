@@ -30,6 +30,7 @@ What a search over effects asks, so that it need not know any of them:
     per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
     again                whether one place may have it more than once: waves of several orders along one turn
     moving               ways in which it moves base parameters that its own numbers do not say: reference logs show these
+    beyond               whether logs go where those that it was fitted to say nothing of it
     acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
     reported             the parameters as causes.md names them
 
@@ -125,6 +126,10 @@ class Effect(ABC):
     def moving(self, arm: ArmModel) -> Array | None:
         """(base parameters, k): directions in which it moves them beyond its columns, each by a number that nobody knows."""
         return None
+
+    def beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
+        """Whether `motions` go where those it was fitted to, `known`, say nothing of it."""
+        return False
 
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
         """The samples in which it acts, where it acts for a moment only."""

@@ -16,6 +16,7 @@ __all__ = ["Spring"]
 
 _DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
 _ANY = 11  # of what a polynomial leaves of a spring that hardens and gives way again
+_BEYOND = 0.1  # of the range in which it was seen: behind that nobody knows how it goes on
 _FAR = 1e3  # [rad] where nobody says how far it was seen
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …
 
@@ -70,6 +71,11 @@ class Spring(Effect):
         closed = math.isinf(high - low) and self.goes_round(motion) and arm.robot.revolute[self._index]
         q = self.own(motion.q)
         yield replace(self, degree=1, highest=1 if closed else self.highest, seen_from=float(q.min()), seen_to=float(q.max()))
+
+    def beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
+        """By more than a tenth of the range in which it was seen."""
+        now, then = (np.concatenate([self.own(motion.q) for motion in some]) for some in (motions, known))
+        return bool(max(now.max() - then.max(), then.min() - now.min()) > _BEYOND * np.ptp(then))
 
     def full(self) -> Self:
         return replace(self, degree=self.highest)

@@ -21,9 +21,9 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import rows_of
 from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import _with, since_reference
+from pipelines.model.diagnosis.since import _farther, _with, since_reference
 from pipelines.model.diagnosis.standing import Chosen, apart, joined
-from pipelines.model.diagnosis.stood import Share, share_before
+from pipelines.model.diagnosis.stood import ANYTHING, Share, share_before
 from pipelines.model.diagnosis.unchanged import near_other_motion, no_change, stood_before
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects import effect_names, find_effect
@@ -186,12 +186,28 @@ def test_what_stood_and_has_grown_has_changed(now: float, named: list[tuple[str,
     (0.0, 0.011, True, "moves at other speeds"), (0.0, 0.011, False, "")])
 def test_why_it_is_no_change(whole: float, left: float, unlike: bool, why: str) -> None:
     """So much may have been there; or of a joint of another motion no more is left than the floor of that motion, 0.012 N m."""
-    step = SimpleNamespace(best=SimpleNamespace(log=None, effect=SimpleNamespace(joint=2, needs=())),
+    step = SimpleNamespace(best=SimpleNamespace(log=None, effect=SimpleNamespace(name="drag", joint=2, needs=())),
                            before=SimpleNamespace(rms=np.array([0.5, left, 0.5])))
     found: Any = SimpleNamespace(steps=[step], final=None)
-    case: Any = SimpleNamespace(before=lambda final, k: Share(whole, whole, 0.01), unlike={1} if unlike else set())
+    case: Any = SimpleNamespace(before=lambda final, k: Share(whole, whole, 0.01), unlike={1} if unlike else set(), beside=())
     assert why in (said := no_change(found, 0, case, np.array([0.1, 0.012, 0.1])))
     assert bool(said) == bool(why)
+
+
+@pytest.mark.parametrize(("name", "joint", "to", "unknown"), [
+    ("spring", 2, 2.35, False), ("spring", 2, 2.8, True), ("spring", 3, 2.8, False), ("quadratic_drag", 2, 2.8, False)])
+def test_what_stands_is_known_as_far_as_the_reference_logs_went(name: str, joint: int, to: float, unknown: bool) -> None:
+    """From 0.7 to 2.3 rad: a spring of later logs that reach 2.8 rad may be what stands at that joint."""
+    def over(first: float, last: float) -> Any:
+        q = np.linspace(first, last, 10)[:, None] * np.ones(3)
+        return SimpleNamespace(logs=(SimpleNamespace(motion=Motion(np.arange(10.0), q, 0.0 * q, 0.0 * q)),))
+
+    stands = Chosen(find_effect("spring")(joint=2), 0.4, np.zeros(2))
+    found = find_effect(name)(joint=joint)
+    assert _farther(found, [stands], over(1.0, to), over(0.7, 2.3)) is unknown
+    assert not _farther(found, [], over(1.0, to), over(0.7, 2.3))
+    assert ANYTHING.doubtful
+    assert not ANYTHING.stood
 
 
 def test_an_event_is_never_asked() -> None:
