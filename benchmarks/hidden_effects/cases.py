@@ -12,6 +12,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -223,11 +224,11 @@ def _places(causes: Iterable[str]) -> list[tuple[str, int | None]]:
     return found
 
 
-def _case(family: str, seed: int, place: int, hidden: Iterable[tuple[str, int | None, float]], **others: object) -> SealedCase:
+def _case(family: str, seed: int, place: int, hidden: Iterable[tuple[str, int | None, float]], **others: Any) -> SealedCase:
     rng = np.random.default_rng([92, seed, place, *family.encode()])
     own = 100_000 * seed + 1000 * list(FAMILIES).index(family) + place  # no two cases share motions or noise
     causes = tuple(Hidden(cause, joint, strength, own, once=cause == "contact" and place % 2 == 0)
                    for cause, joint, strength in hidden)
     case = SealedCase(family, causes, 100 * seed + (place + place // MACHINES) % MACHINES, own,
                       _SESSIONS[int(rng.integers(len(_SESSIONS)))])
-    return replace(case, **others)  # type: ignore[arg-type]
+    return replace(case, **others)

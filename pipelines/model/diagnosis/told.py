@@ -21,7 +21,7 @@ from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import untold
 from pipelines.model.diagnosis.doubted import unlike_held_out
 from pipelines.model.diagnosis.evidence import evidence
-from pipelines.model.diagnosis.findings import Causes, extended_arm, findings, held_finding, rejected
+from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.floored import Floored
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.injection import Probe
@@ -54,15 +54,23 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
         moved: whether there is a cause that the base parameters show.
     """
     done = replace(done, found=steady_nominal(done.found))
-    floor_of = partial(_own_floor, first, case, done, floored, chosen)
-    plain = not first.held.acting and first.held.prepared.judge is not None and floored.noise is not None
-    # Of the model as it was fitted: an arm in order that reverses one or two in a hundred more sharply leaves as much of itself.
-    with meanwhile(floor_of) if plain else nullcontext(floor_of) as floor:
-        done = replace(done, found=unbiased(done.found, first.held.prepared, case, chosen.seed))
-        own = floor()
-    done, responded = _held_against(first, case, done, own, chosen, moved)
-    named = _named(first, case, done, floored, chosen)
-    told = _told(first, case, done, responded, floored, chosen, own, named.findings)
+    held, prepared = replace(first.held, case=case), first.held.prepared
+    floor_of = partial(_own_floor, first=first, case=case, floored=floored, chosen=chosen)
+    if held.acting or prepared.judge is None or floored.noise is None:  # to judge what responses name is work: it is done once
+        done = replace(done, found=unbiased(done.found, prepared, case, chosen.seed))
+        responded = judged(held, done.found.final)
+        own = floor_of(responded)
+    else:
+        # Of the model as it was fitted: an arm in order that reverses one or two in a hundred more sharply leaves as much.
+        with meanwhile(partial(floor_of, judged(held, done.found.final))) as floor:
+            done = replace(done, found=unbiased(done.found, prepared, case, chosen.seed))
+            own = floor()
+        responded = judged(held, done.found.final)
+    done, responded = _held_against(first, case, done, responded, own, chosen, moved)
+    plain = done.found.nominal if held.plain is None else steady(held.plain)  # nothing taken out for what responses name
+    named = findings(done.found, done.ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks, chosen.evidence,
+                     case.beside)
+    told = _told(first, case, done, responded, floored, chosen, own, plain, named.findings)
     known = as_simulated(named.simulated) if case.changed is not None and not responded.parts else None
     arms = arms_of(told) if chosen.evidence and known is None else ()
     with meanwhile(partial(followed_by, arms, first.held.prepared.logs)) if arms else nullcontext(lambda: known) as followed:
@@ -72,28 +80,17 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
         return with_simulation(replace(told, detectable=found, not_testable=hidden), followed())
 
 
-def _plain(first: Responding, done: Settled) -> Refined:
-    """The nominal model with nothing taken out for what responses name."""
-    return done.found.nominal if first.held.plain is None else steady(first.held.plain)
-
-
-def _named(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings) -> Causes:
-    plain = _plain(first, done).rms
-    return findings(done.found, done.ruling, done.simulated, first.held.prepared, plain, floored.rms, chosen.blocks,
-                    chosen.evidence, case.beside)
-
-
 def _told(first: Responding, case: Case, done: Settled, responded: Judged, floored: Floored, chosen: DiagnosisSettings,
-          own: Array | None, causes: tuple[Finding, ...]) -> Diagnosis:
+          own: Array | None, plain: Refined, causes: tuple[Finding, ...]) -> Diagnosis:
     """All of it but the limits and how the arm follows.
 
     Args:
         own: (joints,) [N m] floor of the held-out logs.
+        plain: the nominal model with nothing taken out for what responses name.
         causes: those that residuals name.
     """
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
-    plain = _plain(first, done)
     parts = responded.parts
     held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
     named = strongest((*held, *causes))
@@ -120,14 +117,11 @@ def _told(first: Responding, case: Case, done: Settled, responded: Judged, floor
         acted(plain.model.arm, standing), acted(arm, responded.acting), made)
 
 
-def _own_floor(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings) -> Array | None:
+def _own_floor(responded: Judged, first: Responding, case: Case, floored: Floored, chosen: DiagnosisSettings) -> Array | None:
     """(joints,) [N m] floor of the held-out logs; None where there is none."""
-    held, prepared = replace(first.held, case=case), first.held.prepared
-    if prepared.judge is None or floored.noise is None:
-        return None
-    responded = judged(held, done.found.final)
+    prepared = first.held.prepared
     judge = first.held.judge if responded.parts else prepared.judge
-    if judge is None or responded.judge is None:
+    if judge is None or responded.judge is None or floored.noise is None:
         return None
     final = responded.final
     known = floored.rms if floored.reference is None else floored.reference
@@ -135,11 +129,10 @@ def _own_floor(first: Responding, case: Case, done: Settled, floored: Floored, c
                         known, chosen.seed, case.beside, floored.judging)
 
 
-def _held_against(first: Responding, case: Case, done: Settled, own: Array | None, chosen: DiagnosisSettings,
+def _held_against(first: Responding, case: Case, done: Settled, responded: Judged, own: Array | None, chosen: DiagnosisSettings,
                   moved: bool) -> tuple[Settled, Judged]:
     """What is believed beside the floor of the held-out logs, `own` (joints,) [N m], and what responses have named beside that."""
     held, prepared = replace(first.held, case=case), first.held.prepared
-    responded = judged(held, done.found.final)
     judge = first.held.judge if responded.parts else prepared.judge
     if own is None or judge is None or responded.judge is None:
         return done, responded
