@@ -38,6 +38,7 @@ _ALONE = 0.9  # the same of a law, which has to put all of them back by its few 
 _WORTH = 0.05  # of the squared residual, that separate parameters take away at least
 _SURE = 5.0  # standard deviations of a number
 _TELLS = 25.0  # of what is left of the move, in variances: five standard deviations between two stories
+_NUMBER = 2.0  # variances, that each number more has to explain (Akaike 1974)
 _PARSIMONY = 0.02  # of the move
 _CHANCE = 3.0  # times what the parameters move between parts of the reference logs
 # Of the squared residual that two sets of parameters leave. Of 8 arms in order, moved otherwise than before, none had over 0.8 %.
@@ -214,17 +215,18 @@ def chosen(found: Sequence[Absorbed], move: Move) -> Absorbed | None:
     or has as few.
 
     Masses that nobody knows let a longer link pass for much that is none, a load on a link say: it has to explain as much as the
-    best, as far as five standard deviations tell, and what does so too is its rival.
+    best, as far as five standard deviations tell, and what does so too is its rival, its own numbers counted (Akaike 1974).
     """
     if not found:
         return None
     best = max(one.gain for one in found)
-    told = _TELLS / max(move.variances, 1e-300)
+    variance = 1.0 / max(move.variances, 1e-300)
+    told = _TELLS * variance
     near = [one for one in found if one.gain >= best - (told if one.unknowns else max(_PARSIMONY, told))]
     near.sort(key=lambda one: (one.count, -one.gain))
     first = near[0]
     rivals = [one for one in near[1:] if _elsewhere(one.effect, first.effect) or one.count == first.count
-              or (first.unknowns and one.gain >= best - told)]
+              or (first.unknowns and one.gain >= best - told + _NUMBER * variance * (one.count - first.count))]
     return replace(first, rivals=tuple(one.effect for one in rivals))
 
 
