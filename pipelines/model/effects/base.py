@@ -239,9 +239,10 @@ class Effect(ABC):
         """Column of its own joint, (samples,)."""
         return np.asarray(signal[..., self._index])
 
-    def goes_round(self, motion: Motion) -> bool:
-        """Whether its own joint travels all of a circle but for a fiftieth: what it does there comes back to where it began."""
-        return float(np.ptp(self.own(motion.q))) > 0.98 * 2.0 * np.pi
+    def goes_round(self, motion: Motion, but: float = 0.02) -> bool:
+        """Whether its own joint travels all of a circle but for a fiftieth, or such a part of it: what it does there comes back to
+        where it began."""
+        return float(np.ptp(self.own(motion.q))) > (1.0 - but) * 2.0 * np.pi
 
     def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
         """`columns`, each (samples,), as (samples, joints, columns): they act on its own joint only. Samples lie side by side."""

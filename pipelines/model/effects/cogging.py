@@ -15,6 +15,9 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["Cogging"]
 
 _WAVES = 1.5  # in the range travelled, at least: fewer are the curve of a spring (causes.md: a full turn tells them apart)
+# Of a turn, that may be missing where whole orders are looked for. Stops leave many joints 330 or 340 degrees, which tell waves of
+# neighbouring whole orders apart; a drive with 7, 12 and 28 waves, recorded over .95 of a turn, was taken for 6.8 and its like.
+_MISSING = 0.1
 _HIGHEST = 150.0  # order that is searched for; of a slide: of its whole travel
 _FINEST = 1000.0  # of a slide: a wave of 6 mm, as leads of screws have them; on more than a metre of travel the waves are longer
 _MOST = 200  # orders on the grid
@@ -80,11 +83,11 @@ class Cogging(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """From the fewest waves in the range travelled, in steps of half of what it can tell apart: whole ones over many turns.
 
-        Where the joint closes its circle, whole orders are held: as long as waves of other orders are missing from the model, they
-        would pull a free one off its place. From one on, for what comes back to where it began is no spring.
+        Where the joint closes its circle, or nearly, whole orders are held: as long as waves of other orders are missing from the
+        model, they would pull a free one off its place. From one on, for what comes back to where it began is no spring.
         """
         travel = max(float(np.ptp(self.own(motion.q))), 1e-3)
-        if self.goes_round(motion) and arm.robot.revolute[self._index]:
+        if self.goes_round(motion, _MISSING) and arm.robot.revolute[self._index]:
             step = 0.5 if travel < 4.0 * math.pi else 1.0
             for order in np.arange(1.0, _HIGHEST, step).tolist():
                 whole = order.is_integer()
@@ -101,8 +104,8 @@ class Cogging(Effect):
         return _HIGHEST if arm.robot.revolute[self._index] else float(np.clip(_HIGHEST * 2.0 * math.pi / travel, _HIGHEST, _FINEST))
 
     def again(self, motion: Motion) -> bool:
-        """Magnets, teeth and poles each have their own order; a full turn tells them apart, on less any curve is a few waves."""
-        return self.goes_round(motion)
+        """Magnets, teeth and poles each have their own order; a turn tells them apart, on much less any curve is a few waves."""
+        return self.goes_round(motion, _MISSING)
 
     @property
     def free(self) -> tuple[str, ...]:

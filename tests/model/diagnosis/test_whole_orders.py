@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
@@ -15,8 +17,10 @@ from tests.model.diagnosis.test_through import turned
 _LIBRARY = but("cogging", "spring", "torque_offset")
 
 
-def searched(waves: dict[float, float], most: int) -> Found:
-    prepared = prepare(Logs((turned(1, waves, 0.0), turned(2, waves, 0.0))), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+def searched(waves: dict[float, float], most: int, mean: float = 0.65) -> Found:
+    """`mean` [rad/s] over ten seconds."""
+    logs = Logs((turned(1, waves, 0.0, mean), turned(2, waves, 0.0, mean)))
+    prepared = prepare(logs, DiagnosisSettings(replicas=0, cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     model = Exact.start(columns, fit)
     every = families(columns.laws, whole_motion(prepared.data), model.arm, _LIBRARY)
@@ -35,6 +39,12 @@ def test_an_order_stays_whole_while_its_neighbours_are_missing() -> None:
 def test_every_wave_of_a_turn_is_found() -> None:
     """The first wave too: a joint without limits that has come round has no spring."""
     assert sorted(orders(searched({1.0: 0.01, 7.0: 0.04, 12.0: 0.02}, 3))) == [1.0, 7.0, 12.0]
+
+
+@pytest.mark.parametrize("mean", [0.575, 0.597])
+def test_stops_at_330_degrees_leave_every_wave_its_whole_order(mean: float) -> None:
+    """Seven waves to a turn and what is four times that, and twelve of another kind: .915 and .95 of a turn tell them apart."""
+    assert sorted(orders(searched({7.0: 0.05, 12.0: 0.014, 28.0: 0.03}, 3, mean))) == [7.0, 12.0, 28.0]
 
 
 def test_behind_a_gear_an_order_is_what_it_is() -> None:

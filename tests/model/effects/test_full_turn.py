@@ -28,13 +28,18 @@ def effect(name: str) -> Effect:
 
 
 @pytest.mark.parametrize(("turns", "closed"), [(0.95, False), (0.985, True), (1.5, True)])
-def test_a_closed_circle_has_whole_orders_and_no_curved_spring(turns: float, closed: bool) -> None:
-    motion = turning(2.0 * np.pi * turns)
-    first: Any = next(iter(effect("cogging").shapes(motion, FREE)))
-    spring: Any = next(iter(effect("spring").shapes(motion, FREE)))
-    assert first.whole is closed
+def test_what_closes_its_circle_has_no_curved_spring(turns: float, closed: bool) -> None:
+    spring: Any = next(iter(effect("spring").shapes(turning(2.0 * np.pi * turns), FREE)))
     assert (spring.highest == 1) is closed
-    assert effect("cogging").again(motion) is closed
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(300.0, False), (330.0, True), (340.0, True), (540.0, True)])
+def test_stops_that_leave_330_degrees_leave_whole_orders(degrees: float, told: bool) -> None:
+    """Neighbours of them differ by nearly one wave in the range travelled, and each drive's own can be told from another's."""
+    motion = turning(np.deg2rad(degrees))
+    first: Any = next(iter(effect("cogging").shapes(motion, FREE)))
+    assert first.whole is told
+    assert effect("cogging").again(motion) is told
 
 
 @pytest.mark.parametrize("period", [0.008, 0.03, 0.1])
