@@ -117,8 +117,9 @@ def _said(result: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str
     if isinstance(result.get("verdict"), str):
         yield f"{place}verdict", result["verdict"]
     for kind in ("findings", "standing"):
-        if isinstance(result.get(kind), list):
-            yield f"{place}{kind}", ", ".join(sorted(_place(one) for one in result[kind])) or "none"
+        if isinstance(result.get(kind), list):  # what stands is named already where `extend` says it
+            places = (one if kind == "standing" and isinstance(one, str) else _place(one) for one in result[kind])
+            yield f"{place}{kind}", ", ".join(sorted(places)) or "none"
     for one in result.get("stages") or ():
         yield f"{place}{one['name']} ends in", str(one["exit"])
     for one in result.get("runs") or ():

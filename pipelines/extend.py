@@ -8,7 +8,8 @@ A cause is accepted where its gain on held-out torque is beyond its bootstrap in
 held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the measured one. What gives way
 takes its numbers from frequency responses, a load from how the base parameters moved since the reference logs. What is not accepted
 is named with the reason; there is no way around it. A model that an earlier extension left in the default folder, and this one
-does not make anew, is moved beside it with its whole output: extend-cogging-2.
+does not make anew, is moved beside it with its whole output, extend-cogging-2: the default folder holds the newest outcome, whoever
+looks there finds a model only where it was accepted, and no model that was accepted is lost.
 """
 
 from __future__ import annotations
@@ -181,15 +182,20 @@ def report(result: Extension) -> Report:
     return extension_report(result)
 
 
-def _other_model(result: Extension, folder: Path) -> str:
-    """The causes of the model that an earlier extension has left in `folder`, where this one does not make it anew: it has other
-    causes, or was not accepted. Nothing else says what that model was, and the next fit would have to find it again."""
+def _other_model(result: Extension, folder: Path) -> tuple[str, ...]:
+    """The causes in the model that an earlier extension has left in `folder`, where this one does not make it anew: its own model
+    has others, or there is none. Nothing else says what that model was, and the next fit would have to find it again.
+
+    What was asked for and refused is in neither of the two, and does not count.
+    """
     try:
-        earlier = json.loads((folder / "result.json").read_text(encoding="utf-8"))["causes"]
+        earlier = tuple(_place(one["cause"], one["joint"])
+                        for one in json.loads((folder / "result.json").read_text(encoding="utf-8"))["findings"])
     except (OSError, ValueError, KeyError, TypeError):
-        return ""
-    anew = result.model is not None and sorted(map(str, earlier)) == sorted(result.causes)
-    return "" if anew or not (folder / "model.json").is_file() else " ".join(one.replace(":", "-") for one in map(str, earlier))
+        return ()
+    now = (_place(one.cause, one.joint) for one in result.findings)
+    anew = result.model is not None and sorted(earlier) == sorted(now)
+    return () if anew or not (folder / "model.json").is_file() else earlier
 
 
 STAGE = Stage("extend", "Extend the model by named causes", Settings, compute, report, read, write,

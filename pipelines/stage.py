@@ -92,7 +92,8 @@ class Stage(Generic[S, R]):
     in_run: S | None = None  # settings within `run`, where they are others than by default
     durations: Callable[[R], dict[str, float]] = lambda result: {}  # [s] of parts of compute, for provenance.json alone
     remakes: Callable[[str], bool] = lambda name: False  # own files that are made again where they were changed (P10)
-    spare: Callable[[R, Path], str] = lambda result, folder: ""  # names the earlier output in `folder` that must stay: "cogging-2"
+    # what the earlier output in `folder` is of, where it must not be lost to this one: ("cogging:2",)
+    spare: Callable[[R, Path], tuple[str, ...]] = lambda result, folder: ()
     ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None  # told at the end; `finished`: not by a signal
 
 
@@ -178,8 +179,7 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
             _fill(staging, stage, result, report, object_, series, request, hashes)
             _unchanged(hashes)
             _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
-            moved = _spared(stage.spare(result, out), request, out)
-            replace_folder(staging, out)
+            moved = _replaced(staging, out, stage.spare(result, out), request)
     except EnvironmentFault as problem:
         problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
         raise
@@ -188,19 +188,17 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
     return Outcome(result, object_, report, out, stage.exit_code(result, request.check), (*moved, *renamed(checks, names)))
 
 
-def _spared(name: str, request: Request, out: Path) -> tuple[Check, ...]:
-    """C05: an earlier output that this one does not make anew is not lost: by default it is moved beside `out` as a whole. Where
-    the user has named the folder, it is replaced as asked, and that is said."""
-    if not name:
-        return ()
-    if request.out is not None:
-        return (Check.of("C05", "warn", f"the earlier model there, of {name}, was replaced", where=out,
-                         remedy="give every model an --out of its own to keep them all"),)
-    aside = free_name(out.with_name(f"{out.name}-{slug(name)}"))
-    with environment_faults(aside):
-        os.replace(out, aside)
-    return (Check.of("C05", "warn", f"an earlier model lay there, of {name}; its whole output was moved to {aside}", where=out,
-                     remedy="none needed; --out chooses the folder"),)
+def _replaced(staging: Path, out: Path, of: tuple[str, ...], request: Request) -> tuple[Check, ...]:
+    """`staging` takes the place of `out`. C05: an earlier output `of` something that this one does not make anew is not lost: by
+    default it is moved beside `out` as a whole. Where the user has named the folder, it is replaced as asked, and that is said."""
+    if not of or request.out is not None:
+        replace_folder(staging, out)
+        return (Check.of("C05", "warn", f"the earlier model there, with {', '.join(of)}, was replaced", where=out,
+                         remedy="give every model an --out of its own to keep them all"),) if of else ()
+    aside = free_name(out.with_name(slug(f"{out.name}-{'-'.join(of).replace(':', '-')}")))
+    replace_folder(staging, out, aside)
+    return (Check.of("C05", "warn", f"the earlier model there, with {', '.join(of)}, is kept: its whole output was moved to "
+                     f"{aside}", where=out, remedy="look there for it, or choose folders with --out"),)
 
 
 def _remade(changed: Iterable[str]) -> Iterable[Check]:

@@ -95,6 +95,14 @@ def test_findings_that_come_or_go(tmp_path: Path) -> None:
     assert outcome.exit_code == 1
 
 
+def test_an_extension_names_what_stands(tmp_path: Path) -> None:
+    """`extend` writes "stribeck:1" where `diagnose` writes an object: both are told alike."""
+    a, b = (written(tmp_path / name, 1, findings=[], standing=standing)
+            for name, standing in (("a", ["stribeck:1"]), ("b", [{"cause": "stribeck", "joint": 1}])))
+    answers = {one.what: (one.a, one.b, one.differs) for one in go(tmp_path, a, b).result.answers}
+    assert answers["standing"] == ("stribeck:1", "stribeck:1", False)
+
+
 def test_models_are_compared(tmp_path: Path, samples: Path) -> None:
     """Two model files: the shipped one with itself, then with one base parameter moved by 50 std."""
     model = json.loads((samples / "models/rrr.json").read_text())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -205,17 +206,38 @@ def test_an_output_that_is_not_made_anew_is_moved_or_named(logs: Path, monkeypat
     request = Request((logs,))
     first = run_stage(_stage(lambda inputs, settings: _Nothing()), request, _Nothing())
     kept = _contents(first.folder)
-    sparing = _stage(lambda inputs, settings: _Nothing(), spare=lambda result, folder: "cogging-2" if folder.exists() else "")
-    for name in ("convert-cogging-2", "convert-cogging-2-2"):
+    sparing = _stage(lambda inputs, settings: _Nothing(),
+                     spare=lambda result, folder: ("cogging:2", "spring:1") if folder.exists() else ())
+    for name in ("convert-cogging-2-spring-1", "convert-cogging-2-spring-1-2"):
         done = run_stage(sparing, request, _Nothing())
         aside = first.folder.with_name(name)
         assert (done.folder, (aside / "provenance.json").is_file()) == (first.folder, True)
         assert [(c.code, str(aside) in c.message) for c in done.checks if c.level != "ok"] == [("RRID-C05", True)]
-    assert _contents(first.folder.with_name("convert-cogging-2")) == kept
+    assert _contents(first.folder.with_name("convert-cogging-2-spring-1")) == kept
     for number in range(2):
         named = run_stage(sparing, _request(logs), _Nothing())
         assert ["was replaced" in c.message for c in named.checks if c.level != "ok"] == [True] * number
     assert sorted(path.name for path in logs.parent.iterdir()) == ["logs", "out", "runs"]
+
+
+def test_an_earlier_output_does_not_go_aside_for_one_that_cannot_come(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disk fails between the two moves: what lay there lies there again, and nothing beside it."""
+    monkeypatch.chdir(logs.parent)
+    first = run_stage(_stage(lambda inputs, settings: _Nothing()), Request((logs,)), _Nothing())
+    kept = _contents(first.folder)
+    move = os.replace
+
+    def fail(source: Path, target: Path) -> None:
+        if target == first.folder and ".rrrid-tmp-" in source.name:
+            raise OSError(errno.EIO, "the disk fails")
+        move(source, target)
+
+    monkeypatch.setattr("pipelines.log.atomic.os.replace", fail)
+    sparing = _stage(lambda inputs, settings: _Nothing(), spare=lambda result, folder: ("cogging:2",))
+    with pytest.raises(RrridError, match="RRID-P02"):
+        run_stage(sparing, Request((logs,)), _Nothing())
+    assert [path.name for path in first.folder.parent.iterdir()] == ["convert"]
+    assert _contents(first.folder) == kept
 
 
 def test_an_input_that_changes_meanwhile_is_refused(logs: Path) -> None:

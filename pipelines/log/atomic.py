@@ -111,13 +111,18 @@ def remove_folder(folder: Path) -> None:
         raise
 
 
-def replace_folder(staging: Path, target: Path) -> None:
-    """Put `staging` in the place of `target` in one step, and remove what stood there."""
+def replace_folder(staging: Path, target: Path, aside: Path | None = None) -> None:
+    """Put `staging` in the place of `target` in one step, and remove what stood there; or move it to `aside` before.
+
+    Killed between those two moves, what stood there is in `aside`, whole, and nothing in its place yet.
+    """
     with environment_faults(target):
         for path in staging.rglob("*"):
             _sync(path)
         _sync(staging)
-        if not target.exists():
+        if aside is not None:
+            _moved_aside(staging, target, aside)
+        elif not target.exists():
             os.replace(staging, target)
         elif _exchange(staging, target):
             shutil.rmtree(staging)
@@ -127,6 +132,16 @@ def replace_folder(staging: Path, target: Path) -> None:
             os.replace(staging, target)
             shutil.rmtree(old)
         _sync(target.parent)
+
+
+def _moved_aside(staging: Path, target: Path, aside: Path) -> None:
+    """`target` becomes `aside` and `staging` becomes `target`: both or neither."""
+    os.replace(target, aside)
+    try:
+        os.replace(staging, target)
+    except BaseException:
+        os.replace(aside, target)
+        raise
 
 
 def _prefix() -> str:

@@ -20,7 +20,6 @@ from pipelines.report.diagnosis_words import (
     named,
     spoken,
     three_digits,
-    tip_worth,
     told_value,
     torque_of,
     unit_or_dash,
@@ -29,6 +28,7 @@ from pipelines.report.diagnosis_words import (
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Section, Table
 from pipelines.report.style import format_decimals, format_number, to_one_place
+from pipelines.report.tip_words import span_words, tip_worth
 
 __all__ = ["finding_section", "gain_table", "numbers_section"]
 
@@ -125,7 +125,7 @@ def _numbers(one: Finding) -> Table:
 
 
 def gain_table(gain: Gain, caption: str, units: Units = _TURNING) -> Table:
-    """Joint by joint: torque and simulated position, without and with."""
+    """Joint by joint: torque and simulated position, without and with; the caption ends in how much of which logs was simulated."""
     torque, position = gain.validate_torque_rms, gain.simulated_position_rms
     joints = len(torque.before)
     errors = to_one_place([*map(float, torque.before), *map(float, torque.after)])
@@ -137,4 +137,5 @@ def gain_table(gain: Gain, caption: str, units: Units = _TURNING) -> Table:
         rows.append((j + 1, *errors[j::joints], f"{low} to {high}", *moved))
     unit, small = units.torque, units.thousandths
     return Table(("joint", f"torque error without [{unit}]", f"with [{unit}]", f"change, 95 % [{unit}]",
-                  f"simulated position error without [{small}]", f"with [{small}]"), tuple(rows), caption)
+                  f"simulated position error without [{small}]", f"with [{small}]"), tuple(rows),
+                 f"{caption}{f' Positions are simulated {span}.' if (span := span_words(gain)) else ''}")

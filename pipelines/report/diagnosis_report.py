@@ -17,7 +17,6 @@ from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
-    all_together,
     as_sentence,
     floor_words,
     held_out_floor,
@@ -26,7 +25,6 @@ from pipelines.report.diagnosis_words import (
     named,
     per_joint,
     three_digits,
-    tip_change,
     title_of,
     together,
     told_values,
@@ -40,6 +38,7 @@ from pipelines.report.model_words import laws_words, threshold_words
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number
+from pipelines.report.tip_words import all_together, tip_change
 
 __all__ = ["diagnosis_report"]
 

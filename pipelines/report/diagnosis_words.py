@@ -5,21 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms, TipError, Value
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, ResidualRms, Value
 from pipelines.model.diagnosis.words import other_joint
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
-__all__ = ["all_together", "as_sentence", "cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words",
-           "in_order", "meaning_of", "named", "per_joint", "spoken", "three_digits", "tip_change", "tip_worth", "title_of",
-           "together", "told_value", "told_values", "torque_errors", "torque_of", "unit_or_dash", "what_stays",
+__all__ = ["as_sentence", "cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words",
+           "in_order", "meaning_of", "named", "per_joint", "spoken", "three_digits", "title_of", "together",
+           "told_value", "told_values", "torque_errors", "torque_of", "unit_or_dash", "what_stays",
            "without_keys"]
 
 _PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
@@ -37,10 +36,6 @@ _FLOORS = {
 _FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference logs", "repetition": "between repetitions",
                 "blocks": "noise of the residual"}
 
-_SIMULATED = {"closed-loop": "simulated in closed loop, with the controller of the logs",
-              "windowed": "simulated over short windows from smoothed states, for the logs do not know their controller",
-              "none": "not simulated"}
-_NO_TIP = 1e-9  # [m] no tip: nothing that is simulated and measured comes so near
 
 _TURNING = Units()
 _STAYS, _STAYS_ABOVE_NOISE = 1.6, 10.0  # times the floor, and the noise: what stands higher, held out, is not explained
@@ -90,27 +85,6 @@ def torque_of(one: Finding, units: Units) -> str:
     return f"{format_number(one.torque_rms, 2)} {units.at(one.joint).torque}"
 
 
-def tip_change(gain: Gain) -> str:
-    """"the simulated tip is 1.17 mm off the measured one instead of 1.22 mm"; empty where no digit moves."""
-    before, after = _tip(gain)
-    tip = "the tip, simulated over short windows," if gain.simulation == "windowed" else "the simulated tip"
-    return "" if before == after else f"{tip} is {after} mm off the measured one instead of {before} mm"
-
-
-def all_together(findings: Sequence[Finding]) -> Gain:
-    """The gain of the first, with the simulated tip before any of them and after all; as it is where they do not follow each other.
-    """
-    first, tips = findings[0].gain, [one.gain.tip_error_rms for one in findings]
-    if len(findings) == 1:
-        return first
-    known = [tip for tip in tips if tip is not None]
-    before = {tip.before for tip in known} - {tip.after for tip in known}
-    after = {tip.after for tip in known} - {tip.before for tip in known}
-    if len(known) < len(tips) or len(before) != 1 or len(after) != 1 or len({one.gain.simulation for one in findings}) > 1:
-        return first
-    return replace(first, tip_error_rms=TipError(before.pop(), after.pop()))
-
-
 def what_stays(found: Diagnosis) -> str:
     """" Joint 1 stays at 2.3 times what an arm in order leaves there, without a name."; empty where no joint stands so high."""
     floor, name, _ = held_out_floor(found)
@@ -122,23 +96,6 @@ def what_stays(found: Diagnosis) -> str:
     what = "its noise" if noise else f"what {name}" if name == _LEFT_IN_ORDER else "its floor"
     each = "; ".join(f"joint {j + 1} stays at {format_number(float(times[j]), 2)} times {what}" for j in high)
     return f" {each.capitalize()}, held out, without a name."
-
-
-def tip_worth(gain: Gain) -> str:
-    """The same as a sentence for the section of a finding, with how the tip was simulated, whether it moves or not."""
-    before, after = _tip(gain)
-    if not before:
-        return ""
-    off = f"{before} mm off without it and {after} mm with it" if before != after else f"{before} mm off without it as with it"
-    return f" The simulated tip is {off}, {_SIMULATED[gain.simulation]}."
-
-
-def _tip(gain: Gain) -> tuple[str, str]:
-    """[mm] before and after, as printed; empty where nothing was simulated or no arm is on the motor, so that no tip can be off."""
-    tip = gain.tip_error_rms
-    if tip is None or max(tip.before, tip.after) < _NO_TIP:
-        return "", ""
-    return format_number(1e3 * tip.before, 3), format_number(1e3 * tip.after, 3)
 
 
 def as_sentence(text: str) -> str:

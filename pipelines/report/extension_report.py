@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_words import held_out_words, tip_change, title_of, together, torque_errors, without_keys
+from pipelines.report.diagnosis_words import held_out_words, title_of, together, torque_errors, without_keys
 from pipelines.report.joint_units import Units, units_in
 from pipelines.report.model_words import laws_words
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
+from pipelines.report.tip_words import tip_change
 
 __all__ = ["extension_report"]
 

@@ -18,6 +18,7 @@ from pipelines.report.diagnosis_words import together
 from pipelines.report.report import Figure, Section, Table, Tone
 from pipelines.report.run_result import Group
 from pipelines.report.style import format_number, to_one_place
+from pipelines.report.tip_words import span_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -38,6 +39,7 @@ class Line:
     before: tuple[float, ...] | None  # without it, on the same equations; None: there is nothing before it
     sure: bool | None  # whether the gain is beyond its bootstrap interval; None: nobody has drawn one
     tip: tuple[float, float] | None = None  # [m] simulated tip error before and after
+    over: str = ""  # how much of which logs that was simulated over, in words
 
     @property
     def gain(self) -> float | None:
@@ -119,7 +121,7 @@ def _with(step: str, stage: str, gain: Gain) -> Line:
     torque, tip = gain.validate_torque_rms, gain.tip_error_rms
     sure = bool(np.any(np.asarray(torque.ci95)[:, 1] < 0.0))
     return Line(step, stage, tuple(map(float, torque.after)), tuple(map(float, torque.before)), sure,
-                None if tip is None else (tip.before, tip.after))
+                None if tip is None else (tip.before, tip.after), "" if tip is None else span_words(gain))
 
 
 def _whole(gain: Gain) -> bool:
@@ -144,7 +146,7 @@ def ledger_section(groups: Sequence[tuple[str, tuple[Line, ...]]]) -> Section | 
     heads = (*(("logs",) if several else ()), "step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain [%]", "beyond chance",
              "simulated tip [mm]")
     text = ("Torque error on what nothing was fitted to, root mean square, with each step of the model. A gain is that of all "
-            "joints together over the line it builds on.", _compared(told))
+            "joints together over the line it builds on.", _compared(told), *_simulated(told))
     return Section("Ledger: what every step brings on held-out logs", text, (Table(heads, tuple(rows), tones=tuple(tones)),),
                    tuple(_picture(name, lines, several) for name, lines in told))
 
@@ -156,6 +158,14 @@ def _compared(told: Sequence[tuple[str, tuple[Line, ...]]]) -> str:
         return f"All of them are {stages[0]}'s."
     return (f"The lines are {', '.join(stages[:-1])}'s and {stages[-1]}'s, in this order. Each stage filters and thins out the "
             "torque in its own way: lines of one stage can be compared with each other, those of two only roughly.")
+
+
+def _simulated(told: Sequence[tuple[str, tuple[Line, ...]]]) -> Iterator[str]:
+    """What the last column is taken over."""
+    for name, lines in told:
+        over = "; and ".join(dict.fromkeys(line.over for line in lines if line.over))
+        if over:
+            yield f"The tip{f' of {name}' if len(told) > 1 else ''} is simulated {over}."
 
 
 def _rounded(x: float | None) -> float | None:

@@ -60,7 +60,8 @@ def extend(
 ) -> None:
     """Extend the model by named causes, refit everything, and judge it on held-out logs.
 
-    Takes some 10 s for three joints and two minutes of motion; no twin is simulated.
+    Takes some 10 s for three joints and two minutes of motion; no twin is simulated. Without --out an earlier model that this one
+    does not make anew, refused or with another cause, is kept beside the output folder, and that is said; --out DIR is replaced.
     """
     from pipelines.extend import STAGE
 

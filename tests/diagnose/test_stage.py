@@ -20,7 +20,7 @@ from tests.diagnose.sessions import but, session, written
 FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
 TOP = {"verdict", "findings", "standing", "rejected", "detectable", "not_testable", "residual_rms"}
 FINDING = {"cause", "joint", "parameters", "explained", "visibility", "rivals", "experiment", "gain"}
-GAIN = {"validate_torque_rms", "simulated_position_rms", "simulation", "tip_error_rms"}
+GAIN = {"validate_torque_rms", "simulated_position_rms", "simulation", "simulated_span", "tip_error_rms"}
 
 
 def asked(folder: Path, out: Path, **settings: object) -> Outcome[diagnose.Result]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.named_cause import wanted_cause
 from pipelines.model.simulation import Experiment, simulate
 from pipelines.stage import Outcome, Request, run_stage
+from pipelines.stored.redraw import redraw
 from tests.diagnose.sessions import session, written
 
 
@@ -48,7 +50,9 @@ def test_the_gain_is_that_of_diagnose(rippled: tuple[Path, Outcome[extend.Extens
     """The same keys; held-out torque beyond its bootstrap interval, and the simulated arm nearer."""
     stored = json.loads((rippled[1].folder / "result.json").read_text())
     gain = stored["gain"]
-    assert set(gain) == {"validate_torque_rms", "simulated_position_rms", "simulation", "tip_error_rms"}
+    assert set(gain) == {"validate_torque_rms", "simulated_position_rms", "simulation", "simulated_span", "tip_error_rms"}
+    assert gain["simulated_span"] == [{"log": "excitation-2", "seconds": pytest.approx(3.0, abs=2e-3)}]  # all of it
+    assert "over the first 3 s of excitation-2" in rippled[1].report.verdict
     assert gain["validate_torque_rms"]["ci95"][1][1] < 0.0
     assert gain["simulated_position_rms"]["after"][1] < 0.5 * gain["simulated_position_rms"]["before"][1]
 
@@ -81,6 +85,25 @@ def test_nothing_is_written_where_nothing_is_accepted(tmp_path: Path) -> None:
     assert (outcome.result.findings, outcome.result.model, outcome.exit_code) == ((), None, 1)
     assert not (outcome.folder / "model.json").exists()
     assert "no model was written" in outcome.report.verdict
+
+
+def test_a_refused_extension_keeps_the_accepted_model(rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path,
+                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the default folder: the newest outcome lies there and has no model; the earlier one lies beside it as it was, its report
+    can be drawn again, and nobody who asks the default folder for a model gets one."""
+    folder, earlier = rippled
+    monkeypatch.chdir(tmp_path)
+    place = Path("runs") / session()[0].robot_name / "logs/extend"
+    shutil.copytree(earlier.folder, place)
+    refused = run_stage(extend.STAGE, Request((folder,), no_report=True), extend.Settings(causes=("quadratic_drag:1",)))
+    aside = place.with_name("extend-cogging-2")
+    assert (refused.folder, refused.result.accepted, (place / "model.json").exists()) == (place, False, False)
+    assert [str(aside) in c.message for c in refused.checks if c.code == "RRID-C05"] == [True]
+    assert read_model(aside / "model.json") == read_model(earlier.folder / "model.json")
+    assert json.loads((aside / "result.json").read_text()) == json.loads((earlier.folder / "result.json").read_text())
+    assert redraw(aside)[1] == aside
+    with pytest.raises(UsageError, match="RRID-C04"):
+        read_model(str(place / "model.json"))
 
 
 def test_a_start_is_where_the_search_begins() -> None:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms, TipError, TorqueGain, Value
+from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
 from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
-from pipelines.report.diagnosis_words import all_together, tip_change, tip_worth, together, what_stays
+from pipelines.report.diagnosis_words import together, what_stays
 
 
 def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[str, float] | None = None) -> Finding:
@@ -25,35 +25,6 @@ def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[st
 
 
 NOMINAL = ResidualRms(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.02]), np.full(3, 0.005))
-
-
-@pytest.mark.parametrize(("before", "after", "said"), [
-    (1.2238e-3, 1.1691e-3, "the simulated tip is 1.17 mm off the measured one instead of 1.22 mm"),
-    (1.2238e-3, 1.2237e-3, ""), (0.0, 0.0, "")])
-def test_a_cause_is_not_blamed_for_all_that_the_tip_is_off(before: float, after: float, said: str) -> None:
-    """What it takes away is told; nothing where no printed digit moves, or where a motor carries no arm."""
-    gain = replace(finding().gain, tip_error_rms=TipError(before, after))
-    assert tip_change(gain) == said
-    assert ("tip" in tip_worth(gain)) == (before > 0.0)
-    assert ("as with it" in tip_worth(gain)) == (before > 0.0 and not said)
-
-
-def following(*tips: float) -> list[Finding]:
-    """Findings each of which takes the tip from one error to the next [m]."""
-    return [replace(one, gain=replace(one.gain, tip_error_rms=TipError(before, after)))
-            for one, before, after in zip([finding()] * (len(tips) - 1), tips, tips[1:], strict=False)]
-
-
-def test_the_tip_is_told_of_all_findings_together() -> None:
-    """Whatever their order; where they do not follow each other the first alone is told."""
-    some = following(1e-3, 0.9e-3, 0.2e-3)
-    for order in (some, some[::-1]):
-        tip = all_together(order).tip_error_rms
-        assert tip is not None
-        assert (tip.before, tip.after) == (1e-3, 0.2e-3)
-    apart = [*following(1e-3, 0.9e-3), *following(0.5e-3, 0.4e-3)]
-    assert all_together(apart) is apart[0].gain
-    assert all_together(some[:1]) is some[0].gain
 
 
 @pytest.mark.parametrize(("origin", "own", "said"), [

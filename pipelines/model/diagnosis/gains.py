@@ -24,7 +24,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.refit import Refined
-from pipelines.model.diagnosis.result import BeforeAfter, Gain, TipError, TorqueGain
+from pipelines.model.diagnosis.result import BeforeAfter, Gain, SimulatedSpan, TipError, TorqueGain
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
@@ -67,6 +67,7 @@ class Simulation:
     power: Array  # [rad^2] (blocks,) summed over the joints and the samples of each block of time
     samples: Array  # (blocks,)
     first: Strayed | None = None  # in the first of the logs; None where no controller is known
+    span: tuple[SimulatedSpan, ...] = ()  # of each log that was simulated
 
     @classmethod
     def none(cls, joints: int) -> Simulation:
@@ -77,7 +78,7 @@ def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
     """All of it, as a finding has it; position and tip are None where one of the two could not be simulated."""
     known = "none" not in (before.how, after.how)
     return Gain(torque, BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how if known else "none",
-                TipError(before.tip_rms, after.tip_rms) if known else None)
+                TipError(before.tip_rms, after.tip_rms) if known else None, after.span if known else ())
 
 
 def torque_gain(before: Refined, after: Refined, judge: Data | None, blocks: int) -> TorqueGain:
@@ -195,28 +196,29 @@ def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simula
 
 
 def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
-    square, away = [], []
+    square, away, span = [], [], []
     pairs = _closed(arm, motions, _SOFT if soft else _LONGEST) if closed else _in_windows(arm, motions, _ROUGH if soft else _EXACT)
-    for q, seen in pairs:
+    for (q, seen, between), (log, _) in zip(pairs, motions, strict=True):
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
         away.append(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known])), axis=1))
+        span.append(SimulatedSpan(log.name, between * int(known.sum())))
     each = np.concatenate(square)
     block = np.arange(len(each)) * _BLOCKS // max(len(each), 1)
     power = np.asarray(np.bincount(block, each.sum(axis=1), minlength=_BLOCKS), dtype=np.float64)
     samples = np.asarray(np.bincount(block, minlength=_BLOCKS), dtype=np.float64)
-    (log, _), (q, seen) = motions[0], pairs[0]
+    (log, _), (q, seen, _) = motions[0], pairs[0]
     first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
     return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
-                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first)
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first, tuple(span))
 
 
-def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array]]:
-    """Simulated and measured positions of each log (samples, joints) [rad]."""
+def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array, float]]:
+    """Simulated and measured positions of each log (samples, joints) [rad], and the time between samples [s]."""
     first = [_first(log, seconds) for log, _ in motions]
     step = choose_step(Plant.of(arm), first[0])  # one controller and arm: what suffices for a log suffices for the next
     done = simulate_together(arm, first, steps={one.sample_time: step for one in first})
-    return [(one.q[0], log.q[:one.q.shape[1]]) for one, (log, _) in zip(done, motions, strict=True)]
+    return [(one.q[0], log.q[:one.q.shape[1]], log.sample_time) for one, (log, _) in zip(done, motions, strict=True)]
 
 
 def _first(log: ExperimentLog, seconds: float) -> Experiment:
@@ -224,28 +226,30 @@ def _first(log: ExperimentLog, seconds: float) -> Experiment:
     return experiment.part(0, min(experiment.n_samples, round(seconds / log.sample_time)))
 
 
-def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[tuple[Array, Array]]:
+def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[tuple[Array, Array, float]]:
     """The same, driven by the logged torque; the steps that suffice for a log suffice for the next."""
     pairs, steps = [], dict[float, int]()
     for log, found in motions:
-        q, seen, steps[log.sample_time] = _windowed(arm, log, found, exact, steps.get(log.sample_time))
-        pairs.append((q, seen))
+        q, seen, between, steps[log.sample_time] = _windowed(arm, log, found, exact, steps.get(log.sample_time))
+        pairs.append((q, seen, between))
     return pairs
 
 
-def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float, steps: int | None) -> tuple[Array, Array, int]:
+def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float, steps: int | None,
+              ) -> tuple[Array, Array, float, int]:
     usable = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
     tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
     motion, tau, usable, every = _coarser(found.motion, tau, usable, log.sample_time)
-    length = max(3, round(_WINDOW / (every * log.sample_time)))
-    driven = partial(simulate_windows, Plant.of(arm), motion, tau, every * log.sample_time, length, usable, exact)
+    between = every * log.sample_time
+    length = max(3, round(_WINDOW / between))
+    driven = partial(simulate_windows, Plant.of(arm), motion, tau, between, length, usable, exact)
     windows = driven(steps)
     if steps is not None and not _whole(windows, length):  # livelier than the log they were chosen for
         windows = driven(None)
     if not _whole(windows, length):  # left out, it would count as no error at all
         raise InputRejected("D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia")
-    return windows.q, motion.q, windows.steps
+    return windows.q, motion.q, between, windows.steps
 
 
 def _whole(windows: Windows, length: int) -> bool:

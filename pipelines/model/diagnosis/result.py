@@ -15,7 +15,8 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
 
 __all__ = ["BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof", "Rejected",
-           "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial", "Value", "Verdict"]
+           "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial", "Value",
+           "Verdict"]
 
 Verdict = Literal["cause", "nothing-wrong", "unknown"]
 
@@ -64,6 +65,14 @@ class TipError:
 
 
 @dataclass(frozen=True)
+class SimulatedSpan:
+    """How much of a log was simulated: in closed loop from where it begins on, else in windows all over it."""
+
+    log: str  # its name
+    seconds: float  # [s] over which the simulated arm was compared with the measured one
+
+
+@dataclass(frozen=True)
 class Gain:
     """How much better the model is with a finding than with those before it, on what was held out."""
 
@@ -71,6 +80,7 @@ class Gain:
     simulated_position_rms: BeforeAfter | None  # [rad]; None where nothing could be simulated
     simulation: Literal["closed-loop", "windowed", "none"]
     tip_error_rms: TipError | None
+    simulated_span: tuple[SimulatedSpan, ...] = ()  # what the simulated figures are taken over; empty where there are none
 
 
 @dataclass(frozen=True)

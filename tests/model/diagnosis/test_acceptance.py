@@ -88,6 +88,41 @@ def test_an_arm_beside_those_that_are_simulated_already_is_simulated_as_they_wer
     assert [one.how for one in simulation_errors([arm, arm], closed, {0: first})] == ["windowed", "windowed"]
 
 
+@pytest.fixture(scope="module")
+def long() -> tuple[Any, Any]:
+    """Six seconds of one log, and an arm fitted to them."""
+    prepared = prepare(Logs((session(seconds=6.0, logs=1)[0],)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    return prepared.motions[0], Exact.start(columns, fit).arm
+
+
+def test_the_simulated_span_is_where_the_measured_arm_counts(long: tuple[Any, Any]) -> None:
+    """In closed loop: behind the seconds that are told a measured position changes nothing, before their end it does."""
+    (log, found), arm = long
+    first = simulation_errors([arm], ((log, found),))[0]
+    span = first.span[0]
+    assert (first.how, span.log) == ("closed-loop", log.name)
+    assert 1.0 < span.seconds < 5.9
+    end = round(span.seconds / log.sample_time)
+    for sample, same in ((end, True), (end - 1, False)):
+        q = log.q.copy()
+        q[sample] += 0.1
+        moved = replace(log, signals={**log.signals, "q": replace(log.signals["q"], values=q)})
+        assert (simulation_errors([arm], ((moved, found),))[0].tip_rms == first.tip_rms) == same
+
+
+def test_the_simulated_span_of_windows_is_all_that_they_cover(long: tuple[Any, Any]) -> None:
+    """Without a controller nearly all of the log is simulated, 0.1 s at a time, and half of it where half can be used."""
+    (log, found), arm = long
+    bare = replace(log, controller=None)
+    good = found.good.fit & (np.arange(len(found.good.fit)) < len(found.good.fit) / 2)
+    half: Any = replace(found, good=SimpleNamespace(kept=found.good.kept, fit=good))
+    whole, part = (simulation_errors([arm], ((bare, motion),))[0] for motion in (found, half))
+    assert (whole.how, part.how) == ("windowed", "windowed")
+    assert 5.0 < whole.span[0].seconds <= 6.01
+    assert part.span[0].seconds == pytest.approx(0.5 * whole.span[0].seconds, abs=0.3)
+
+
 def test_a_fast_log_drives_its_windows_by_the_mean_torque_of_a_millisecond() -> None:
     """Five samples of 0.2 ms make one; none is left of a millisecond of which a sample is missing, or of no use."""
     t = np.delete(2e-4 * np.arange(61), 23)
