@@ -7,13 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Final
 
 from pipelines.log.files import Opened
 
 __all__ = ["Session", "apart", "sessions"]
 
 Key = tuple[str, str, str]
+
+_PAUSE: Final = timedelta(hours=3)
+_SESSION: Final = timedelta(hours=12)
+_DATE: Final = len("2026-05-18")
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,7 @@ def sessions(logs: Iterable[Opened], named: Collection[Path] = ()) -> dict[Key, 
     with every day of its robot.
     """
     groups: dict[Key, list[Opened]] = {}
-    by_day = [((o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]), o) for o in logs]
+    by_day = _across_midnight([((o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]), o) for o in logs])
     meant = [(key, o) for key, o in by_day if o.path in named]
     plans = [(key, o) for key, o in by_day if o.path not in named and o.log.origin == "planned"]
     rest = [(key, o) for key, o in by_day if o.path not in named and o.log.origin != "planned"]
@@ -72,9 +78,35 @@ def sessions(logs: Iterable[Opened], named: Collection[Path] = ()) -> dict[Key, 
     return groups
 
 
+def _across_midnight(by_day: list[tuple[Key, Opened]]) -> list[tuple[Key, Opened]]:
+    """The same, with the logs after midnight (UTC: an afternoon, elsewhere) to the day before where it is one session: no pause
+    of more than three hours, and twelve in all. Logs of role "reference" and hours that are not told decide nothing."""
+    times: dict[Key, list[datetime]] = {}
+    for key, opened in by_day:
+        if (began := _time(opened.log.recorded)) is not None and opened.log.role != "reference":
+            times.setdefault(key, []).append(began)
+    same: dict[Key, Key] = {}
+    for key, after in sorted(times.items()):
+        before = (*key[:2], (min(after) - timedelta(days=1)).date().isoformat())
+        if before in times and before not in same and min(after) - max(times[before]) <= _PAUSE and (
+                max(after) - min(times[before]) <= _SESSION):
+            same[key] = before
+    return [(same.get(key, key), opened) for key, opened in by_day]
+
+
+def _time(recorded: str | None) -> datetime | None:
+    """When a log began; None where it tells a day alone, or nothing that is a time."""
+    try:
+        told = datetime.fromisoformat(recorded or "")
+    except ValueError:
+        return None
+    return told.replace(tzinfo=told.tzinfo or UTC) if len(recorded or "") > _DATE else None
+
+
 def _beside(groups: dict[Key, list[Opened]], timeless: Iterable[tuple[Key, Opened]]) -> None:
     """Put each log to every day of its robot; where there is none, to one without a date."""
     found = tuple(groups)
     for key, opened in timeless:
-        for other in [other for other in found if other[:2] == key[:2]] or [(*key[:2], "")]:
+        of_robot = [other for other in found if other[:2] == key[:2]]
+        for other in of_robot or [(key[0], key[1], "")]:
             groups.setdefault(other, []).append(opened)
