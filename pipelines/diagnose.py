@@ -177,4 +177,4 @@ def report(result: Result) -> Report:
 
 STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, write, _exit_code,
               lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result), hands_on="material",
-              beside=beside)
+              beside=beside, sessions="one")

@@ -264,4 +264,4 @@ def _restored(result: Result, folder: Path) -> Result:
 STAGE = Stage("estimate-bps", "Estimate the base parameter set", Settings, compute, report, read, write,
               lambda result, check: int(check and any(found.gate for found in _checks(result))), _checks,
               lambda result, inputs: replace(inputs, material=result.arm), hands_on="material", restored=_restored,
-              uses=Uses(_reads, before=True))
+              uses=Uses(_reads, before=True), sessions="one")

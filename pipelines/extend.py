@@ -200,4 +200,4 @@ def _other_model(result: Extension, folder: Path) -> tuple[str, ...]:
 
 STAGE = Stage("extend", "Extend the model by named causes", Settings, compute, report, read, write,
               lambda result, check: int(check and not result.accepted), lambda result: result.doctor, uses=Uses(before=True),
-              spare=_other_model)
+              spare=_other_model, sessions="one")

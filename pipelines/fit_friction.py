@@ -217,4 +217,4 @@ STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, co
               lambda result: result.checks, _onward,
               # estimate-bps fits Coulomb and viscous friction itself: half a minute of choosing laws would not be handed on
               in_run=Settings(together=False), hands_on="material", uses=Uses(_reads),
-              restored=lambda result, folder: replace(result, model=read_model(folder / "model.json")))
+              restored=lambda result, folder: replace(result, model=read_model(folder / "model.json")), sessions="one")

@@ -151,4 +151,4 @@ def report(result: Result) -> Report:
 
 STAGE = Stage("frf", "Measure frequency responses and what gives way", Settings, compute, report, read, None,
               lambda result, check: int(check and any(found.gate for found in result.doctor)), lambda result: result.doctor,
-              uses=Uses(lambda log, settings: log.experiment == "frf", before=True))
+              uses=Uses(lambda log, settings: log.experiment == "frf", before=True), sessions="one")

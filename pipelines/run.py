@@ -23,7 +23,7 @@ from pipelines.log.files import expanded
 from pipelines.log.places import renamed, short_names, tilde
 from pipelines.log.results import decode, encode
 from pipelines.log.robot import format_robot
-from pipelines.log.sessions import sessions
+from pipelines.log.sessions import apart
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.recall.chain import Chain
 from pipelines.recall.key import Key, digest_of_json
@@ -222,15 +222,11 @@ def _without(stage: Stage[Any, Any], problem: Mapping[str, Any]) -> tuple[Report
 
 def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
     """The inputs, one robot and one day of recording at a time. Files that no log came out of go with the first."""
-    groups = sessions(inputs.logs)
+    groups = apart(inputs.logs, inputs.named)
     if len(groups) < 2:
         return [("", inputs)]
-    parts = []
-    for number, ((robot, _, day), logs) in enumerate(groups.items()):
-        part = dataclasses.replace(inputs, logs=tuple(logs), rejected=inputs.rejected if number == 0 else (), robot_name=robot)
-        parts.append((" ".join(filter(None, (robot, day))), part))
-    names = [name for name, _ in parts]
-    return [(name if names.count(name) == 1 else f"{name} ({i + 1})", part) for i, (name, part) in enumerate(parts)]
+    return [(one.name, dataclasses.replace(inputs, logs=one.logs, rejected=inputs.rejected if number == 0 else (),
+                                           robot_name=one.robot)) for number, one in enumerate(groups)]
 
 
 def report(result: Result) -> Report:
@@ -265,4 +261,4 @@ def _remakes(name: str) -> bool:
 
 
 STAGE = Stage("run", "Run the whole workflow on a folder of logs", Settings, compute, report, read, write, _exit_code, _checks,
-              remakes=_remakes, ended=lambda inputs, finished: inputs.material.store.release(finished))
+              remakes=_remakes, ended=lambda inputs, finished: inputs.material.store.release(finished), sessions="apart")

@@ -26,9 +26,11 @@ from pipelines.log.atomic import environment_faults, remove_folder, replace_fold
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, expanded, hash_file
 from pipelines.log.inputs import Inputs, Rejected, Request, read_by_role, read_logs
+from pipelines.log.mixed import check_alike, of_one_session
 from pipelines.log.places import (
     free_name,
     given_names,
+    holds_apart,
     keep_apart,
     refuse_foreign,
     refuse_unwritable,
@@ -95,6 +97,7 @@ class Stage(Generic[S, R]):
     # what the earlier output in `folder` is of, where it must not be lost to this one: ("cogging:2",)
     spare: Callable[[R, Path], tuple[str, ...]] = lambda result, folder: ()
     ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None  # told at the end; `finished`: not by a signal
+    sessions: Literal["", "apart", "one"] = ""  # robots and days: each log by itself, told "apart" by the stage, or "one" at a time
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,8 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     """Read, compute, report and write `stage`; the output folder is the old one or the complete new one.
 
     Raises:
-        RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed.
+        RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed. SeveralSessions: the
+            logs are of several robots or days, and the stage takes one: `request.session` names it.
     """
     request = dataclasses.replace(request, paths=expanded(request.paths))
     given, inputs = given_names(request.paths), ", ".join(map(str, request.paths))
@@ -143,9 +147,14 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     if request.out is not None:
         keep_apart(request.out, (), request.paths)
         refuse_unwritable(request.out)
-        refuse_foreign(request.out, request.force, stage.remakes)
+        if not holds_apart(request.out, stage.name):  # one session lies beside another there; its own folder is asked later
+            refuse_foreign(request.out, request.force, stage.remakes)
     described = _hashes(robot_sources(request.robot), {}) if request.robot is not None else {}
     inputs = stage.read(request, settings)
+    if stage.sessions == "one":
+        inputs = of_one_session(inputs, lambda log: stage.uses.logs(log, settings))
+    if stage.sessions:
+        inputs = dataclasses.replace(inputs, checks=(*inputs.checks, *check_alike(inputs)))
     try:
         outcome = _outcome(stage, request, settings, inputs, described, started)
     except BaseException as problem:
@@ -252,7 +261,8 @@ def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request,
         "settings": encode(settings)[0] if dataclasses.is_dataclass(settings) else {},
         "seed": getattr(settings, "seed", None),
         "options": {"strict": request.strict, "assume_units": request.assume_units, "robot": request.robot,
-                    "format": request.format, "joints": list(request.joints)},
+                    "format": request.format, "joints": list(request.joints)} | (
+                        {"session": request.session} if request.session else {}),
         "inputs": {str(path): value for path, value in hashes.items()}, "outputs": outputs,
         "python": platform.python_version(), "libraries": _libraries(),
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(started)), "duration": time.time() - started,

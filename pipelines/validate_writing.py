@@ -288,4 +288,4 @@ def _reads(log: ExperimentLog, settings: Settings) -> bool:
 
 
 STAGE = Stage("validate-writing", "Validate on the writing task", Settings, compute, report, read, write, _exit_code,
-              lambda result: result.doctor, durations=_durations, uses=Uses(_reads, before=True))
+              lambda result: result.doctor, durations=_durations, uses=Uses(_reads, before=True), sessions="one")

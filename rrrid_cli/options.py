@@ -57,6 +57,7 @@ class Common:
     verbose: bool
     debug: bool
     joints: tuple[int, ...] = ()
+    session: str = ""
 
 
 def _joints(text: str | None) -> tuple[int, ...]:
@@ -171,6 +172,9 @@ _ROLES: tuple[tuple[str, Any, Any], ...] = tuple((role, Annotated[list[str], _fl
     ("identify", "Logs to fit, whatever they say of themselves. Repeatable."), ("validate", "Logs that judge. Repeatable."),
     ("reference", "Logs of the arm as it was before. Repeatable.")))
 
+_SESSION = ("session", Annotated[str, _flag("Of several robots or days only this: 'ROBOT', or 'ROBOT 2026-05-18'. "
+                                            "[each by itself]", "--session")], "")
+
 
 def _but(kind: Any, **said: Any) -> Any:
     """An option of which help says other things."""
@@ -200,7 +204,7 @@ def _with_common(command: Callable[..., None], idle: tuple[str, ...], out: str) 
         words["out"] = {"help": f"{_OUT} [{out}]"}
     own = inspect.signature(command, eval_str=True)
     by_role = _ROLES if "roles" in own.parameters else ()
-    options = (*by_role, *_SHARED, *((_JOINTS,) if "logs" in own.parameters else ()))
+    options = (*by_role, *((_SESSION,) if by_role else ()), *_SHARED, *((_JOINTS,) if "logs" in own.parameters else ()))
     shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=_but(kind, **words.get(name, {})), default=default)
               for name, kind, default in options]
     kept = [p for p in own.parameters.values() if p.name not in ("common", "roles")]

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean
+from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean, did_you_mean
 from pipelines.log.files import Opened, find_logs, open_log
 from pipelines.log.places import written_by
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
+from pipelines.log.sessions import apart
 
 __all__ = ["Inputs", "Rejected", "Request", "read_by_role", "read_logs"]
 
@@ -38,6 +39,7 @@ class Request:
     tell: Callable[[str], None] = field(default=lambda words: None, compare=False)  # progress, in words
     joints: tuple[int, ...] = ()  # 1-based: the joints to take of every log, in this order; none: all
     roles: Mapping[str, Sequence[str]] = field(default_factory=dict)  # role -> paths of logs that have it, whatever they say
+    session: str = ""  # the name of the only one to take, of several robots and days
 
     @property
     def named(self) -> tuple[Path, ...]:
@@ -67,6 +69,7 @@ class Inputs:
     material: Any = None
     label: str = ""  # folder name for the default --out
     robot_name: str = ""
+    named: frozenset[Path] = frozenset()  # files that the user named for a role: whatever day they are of, they were meant
 
 
 def read_logs(request: Request, settings: object, *, keep_rejected: bool = False) -> Inputs:
@@ -75,6 +78,7 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     Raises:
         InputRejected: some of them are rejected, unless `keep_rejected` (the doctor looks at those too). The error is
             the first one's, and names the others.
+        UsageError: C01, no such session; C02, no logs; C04, no such file.
     """
     if request.roles:
         return read_by_role(dataclasses.replace(request, roles={}), settings, request.roles, keep_rejected=keep_rejected)
@@ -95,9 +99,32 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     if rejected and not keep_rejected:
         raise _all_of(rejected)
     names = sorted({opened_log.log.robot_name for opened_log in opened})
-    return Inputs(tuple(opened), tuple(rejected), checks, paths, {o.path: o.sha256 for o in opened}, robot=robot,
-                  label=_label(request.paths),
-                  robot_name=names[0] if len(names) == 1 else "several" if names else "unknown")
+    inputs = Inputs(tuple(opened), tuple(rejected), checks, paths, {o.path: o.sha256 for o in opened}, robot=robot,
+                    label=_label(request.paths),
+                    robot_name=names[0] if len(names) == 1 else "several" if names else "unknown")
+    return _of_session(inputs, request.session)
+
+
+def _of_session(inputs: Inputs, wanted: str) -> Inputs:
+    """The inputs with the logs of the session called `wanted` alone; all where it is "".
+
+    Raises:
+        UsageError: C01, there is no such session.
+    """
+    if not wanted:
+        return inputs
+    found = apart(inputs.logs, inputs.named)
+    one = next((session for session in found if session.name == wanted), None)
+    if one is None:
+        names = [session.name for session in found]
+        raise UsageError("C01", f"no session '{wanted}'{did_you_mean(wanted, names)}", where="--session",
+                         remedy=f"there are: {', '.join(names)}")
+    kept = {opened.path for opened in one.logs}
+    others = {opened.path for opened in inputs.logs} - kept
+    return dataclasses.replace(
+        inputs, logs=tuple(opened for opened in inputs.logs if opened.path in kept), robot_name=one.robot,
+        sources=tuple(path for path in inputs.sources if path not in others),
+        label=f"{inputs.label}-{one.own}" if one.own else inputs.label)
 
 
 def read_by_role(request: Request, settings: object, named: Mapping[str, Sequence[str]], *, keep_rejected: bool = False) -> Inputs:
@@ -105,13 +132,13 @@ def read_by_role(request: Request, settings: object, named: Mapping[str, Sequenc
     have this role are left out.
 
     Raises:
-        UsageError: C02, no input at all, or a log named for two roles; C04, no such file.
+        UsageError: C01, no such session; C02, no input at all, or a log named for two roles; C04, no such file.
     """
     paths = {role: tuple(Path(path).expanduser().absolute() for path in given) for role, given in named.items() if given}
     every = tuple(dict.fromkeys((*request.paths, *(path for given in paths.values() for path in given))))
     if not every:
         raise _no_logs()
-    inputs = read_logs(dataclasses.replace(request, paths=every), settings, keep_rejected=keep_rejected)
+    inputs = read_logs(dataclasses.replace(request, paths=every, session=""), settings, keep_rejected=keep_rejected)
     roles: dict[Path, str] = {}
     for role, given in paths.items():
         for file in find_logs(given)[0]:
@@ -123,7 +150,8 @@ def read_by_role(request: Request, settings: object, named: Mapping[str, Sequenc
     logs = tuple(opened if opened.log.role == role else dataclasses.replace(opened, log=dataclasses.replace(opened.log, role=role))
                  for opened, role in kept)
     beside = tuple(path for given in paths.values() for path in given)
-    return dataclasses.replace(inputs, logs=logs, folders=(*inputs.folders, *beside))
+    inputs = dataclasses.replace(inputs, logs=logs, folders=(*inputs.folders, *beside), named=frozenset(roles))
+    return _of_session(inputs, request.session)
 
 
 def _no_logs() -> UsageError:

@@ -1,0 +1,120 @@
+"""Refuse to take the logs of several robots or days for one, and say where nothing but the folder tells two apart.
+
+    of_one_session(inputs, reads)   the logs of one; SeveralSessions, with the name of each, where a stage would mix them
+    check_alike(inputs)             S21: logs of one name in two folders, which nothing in them tells apart
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from pipelines.errors import Check, UsageError, clean
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.files import Opened
+from pipelines.log.inputs import Inputs
+from pipelines.log.sessions import Session, apart
+
+__all__ = ["SeveralSessions", "check_alike", "of_one_session"]
+
+_LISTED: Final = 4  # logs of a session that lies among others
+_SESSIONS: Final = 6  # named in one error
+
+
+class SeveralSessions(UsageError):
+    """Logs of several robots or days, for a stage that wants those of one; `names` are those of the sessions."""
+
+    names: tuple[str, ...] = ()
+
+
+def of_one_session(inputs: Inputs, reads: Callable[[ExperimentLog], bool]) -> Inputs:
+    """The inputs with the logs of one robot and one day, and what was named for a role: all where the stage reads none of others.
+
+    Args:
+        reads: whether the stage looks at a log; what it does not look at it cannot mix.
+
+    Raises:
+        SeveralSessions: C02, they are of several, which can be taken one at a time.
+        UsageError: C02, of several robots, and some were named for a role: those of one can mean nothing to the other.
+    """
+    parts = [(session, [o for o in session.logs if o.log.origin != "planned" and reads(o.log)])
+             for session in apart(inputs.logs, inputs.named)]
+    every = {opened.path for _, used in parts for opened in used}
+    if len(parts) < 2 or not every:
+        return inputs
+    if (whole := next((session for session, used in parts if len(used) == len(every)), None)) is not None:
+        kept = {opened.path for opened in whole.logs}
+        return replace(inputs, logs=tuple(opened for opened in inputs.logs if opened.path in kept), robot_name=whole.robot)
+    raise _several(inputs, [(session, used) for session, used in parts if not _within_another(used, parts)])
+
+
+def _within_another(used: list[Opened], parts: Iterable[tuple[Session, list[Opened]]]) -> bool:
+    """Whether a session has no log of its own: none at all, or what was before alone, which stands with the later ones too."""
+    mine = {opened.path for opened in used}
+    return any(mine < {opened.path for opened in others} for _, others in parts)
+
+
+def _several(inputs: Inputs, parts: Collection[tuple[Session, list[Opened]]]) -> UsageError:
+    robots = len({(session.robot, session.description) for session, _ in parts})
+    days = len(parts) > robots
+    of = " and ".join(kind for kind, there in (("robots", robots > 1), ("days", days)) if there)
+    message = f"logs of several {of}: {_listed(parts)}"
+    if robots > 1 and inputs.named:
+        return UsageError("C02", message, where=inputs.label,
+                          remedy="name logs of one robot alone for --identify, --validate and --reference; if it is one robot, "
+                          "described twice, give --robot FILE")
+    names = tuple(session.name for session, _ in parts)
+    own = "; days that belong together: name their logs with --identify and --validate" if days else ""
+    problem = SeveralSessions("C02", message, where=inputs.label,
+                              remedy=f"take one at a time: --session '{names[0]}'; or 'rrrid run', which reports each{own}")
+    problem.names = names
+    return problem
+
+
+def _listed(parts: Collection[tuple[Session, list[Opened]]]) -> str:
+    """The sessions, and the logs of each: by their folder, where that holds no others."""
+    homes: dict[Path, set[str]] = defaultdict(set)
+    for session, used in parts:
+        for opened in used:
+            homes[opened.path.parent].add(session.name)
+    told = [f"{clean(session.name, 60)} ({_members(used, homes)})" for session, used in parts]
+    return "; ".join(told[:_SESSIONS]) + (f"; and {len(told) - _SESSIONS} more" if len(told) > _SESSIONS else "")
+
+
+def _members(used: list[Opened], homes: dict[Path, set[str]]) -> str:
+    folders = list(dict.fromkeys(opened.path.parent for opened in used))
+    count = f"{len(used)} log{'s' if len(used) > 1 else ''}"
+    if all(len(homes[folder]) == 1 for folder in folders) and len(folders) < _LISTED:
+        return f"{count} in {', '.join(clean(folder.name, 40) for folder in folders)}"
+    names = [clean(opened.path.name, 40) for opened in used]
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return f"{', '.join(names[:_LISTED])}{more}"
+
+
+def check_alike(inputs: Inputs) -> tuple[Check, ...]:
+    """S21: a log's name is unique within a folder of logs. Where two folders below it have logs of one name, and neither robot nor
+    day tells them apart, they may well be of two machines: they are taken for one, and that is said."""
+    found = []
+    for session in apart(inputs.logs, inputs.named):
+        folders = _doubled(opened for opened in session.logs if opened.path not in inputs.named)
+        if len(folders) > 1:
+            named = ", ".join(clean(folder.name, 40) for folder in folders[:_LISTED])
+            more = f" and {len(folders) - _LISTED} more" if len(folders) > _LISTED else ""
+            found.append(Check.of(
+                "S21", "warn", f"the folders {named}{more} hold logs of the same names, robot and day, and were taken for one "
+                "session", where=clean(session.name, 60),
+                remedy="if they are of two machines or sessions, give each folder by itself, or let their logs say so: robot_name, "
+                "recorded"))
+    return tuple(found)
+
+
+def _doubled(logs: Iterable[Opened]) -> list[Path]:
+    """The folders whose logs have a name that one of another folder has as well, for the same role."""
+    named: dict[tuple[str, str], dict[Path, str]] = defaultdict(dict)
+    for opened in logs:
+        if opened.log.origin != "planned":
+            named[opened.log.name, opened.log.role][opened.path.parent] = opened.sha256
+    return list(dict.fromkeys(folder for homes in named.values() if len(set(homes.values())) > 1 for folder in homes))
