@@ -54,7 +54,8 @@ def sessions(logs: Iterable[Opened], named: Collection[Path] = ()) -> dict[Key, 
     """Logs by the robot's name, its description, and the day.
 
     What a robot was like before (role "reference") goes with every later day, or with the only one; a plan, and what is in `named`,
-    with every day of its robot.
+    with every day of its robot. A day of which all logs judge (role "validate") goes with the day before it that has others, or
+    with the first one after; logs that do not tell their day go with the only day of their robot.
     """
     groups: dict[Key, list[Opened]] = {}
     by_day = _across_midnight([((o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]), o) for o in logs])
@@ -67,6 +68,8 @@ def sessions(logs: Iterable[Opened], named: Collection[Path] = ()) -> dict[Key, 
     if not groups:
         _beside(groups, meant)
         meant = []
+    _undated(groups)
+    _judged_later(groups)
     found = tuple(groups)
     for key, opened in rest:
         if opened.log.role == "reference":
@@ -76,6 +79,24 @@ def sessions(logs: Iterable[Opened], named: Collection[Path] = ()) -> dict[Key, 
                 groups.setdefault(other, []).append(opened)
     _beside(groups, (*meant, *plans))
     return groups
+
+
+def _undated(groups: dict[Key, list[Opened]]) -> None:
+    """Put logs that do not tell their day to the only day of their robot, where there is one: they speak of no other."""
+    for key in [key for key in groups if not key[2]]:
+        days = [other for other in groups if other[:2] == key[:2] and other != key]
+        if len(days) == 1:
+            groups[days[0]] += groups.pop(key)
+
+
+def _judged_later(groups: dict[Key, list[Opened]]) -> None:
+    """Put days whose logs all judge to the day whose model they judge: by themselves they say nothing."""
+    judging = [key for key, logs in groups.items() if all(opened.log.role == "validate" for opened in logs)]
+    for key in judging:
+        days = sorted(other for other in groups if other[:2] == key[:2] and other not in judging)
+        if days:
+            before = [other for other in days if other[2] <= key[2]]
+            groups[before[-1] if before else days[0]] += groups.pop(key)
 
 
 def _across_midnight(by_day: list[tuple[Key, Opened]]) -> list[tuple[Key, Opened]]:

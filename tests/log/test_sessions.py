@@ -42,6 +42,23 @@ def test_what_the_user_named_for_a_role_goes_with_every_day() -> None:
     assert list(together(first, second, named=(third,)).values()) == [{"a", "c"}, {"b", "c"}]
 
 
+def test_a_day_that_only_judges_goes_with_the_day_it_judges() -> None:
+    """Fitted on Monday and judged on Tuesday: by itself Tuesday says nothing. Whoever fits on both days has two sessions."""
+    monday, tuesday = opened("a", recorded=DAY), opened("b", recorded=NEXT, role="validate")
+    assert list(together(monday, tuesday).values()) == [{"a", "b"}]
+    assert list(together(tuesday, opened("c", recorded=LATER)).values()) == [{"b", "c"}]
+    both = together(monday, tuesday, opened("c", recorded=LATER), opened("d", recorded=LATER, role="validate"))
+    assert list(both.values()) == [{"a", "b"}, {"c", "d"}]
+    assert list(together(tuesday, opened("d", recorded=LATER, role="validate")).values()) == [{"b"}, {"d"}]
+
+
+def test_a_log_that_tells_no_day_is_of_no_other() -> None:
+    """Beside one day it is of that; beside two nobody knows of which."""
+    undated, first, second = opened("a", recorded=None), opened("b", recorded=DAY), opened("c", recorded=NEXT)
+    assert list(together(undated, first).values()) == [{"a", "b"}]
+    assert list(together(undated, first, second).values()) == [{"a"}, {"b"}, {"c"}]
+
+
 def test_a_named_log_of_another_robot_stays_apart() -> None:
     assert len(together(opened("a"), named=(opened("b", robot_name="arm-b"),))) == 2
 
