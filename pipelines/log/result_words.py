@@ -41,6 +41,7 @@ WORDS: Final[dict[str, str]] = {
     "smallest": "that size, with its unit", "not_testable": "causes of which these logs cannot tell, and what to record",
     "residual_rms": "[N m] torque error of the nominal model, before any extension",
     "after_rms": "[N m] torque error of the extended model",
+    "unmoved_rms": "[N m] the nominal model's, less what a finding, a load say, put into base parameters; null: none did",
     "ResidualRms.identify": "[N m] over the logs that were fitted, joint by joint",
     "ResidualRms.validate": "[N m] over what was held out, joint by joint",
     "ResidualRms.floor": "[N m] floor: what is left of it is no fault, joint by joint",

@@ -15,6 +15,7 @@ from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
+from pipelines.report.diagnosis_moved import of_moved, unmoved_words
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
     all_together,
@@ -51,14 +52,16 @@ _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    units, nominal = units_in(result), replace(result.residual_rms, floor=held_out_floor(result)[0])
+    units, (floor, name, floor_from) = units_in(result), held_out_floor(result)
+    nominal, now = replace(result.residual_rms, floor=floor), result.unmoved_rms or result.residual_rms
     found = [section for number, one in enumerate(result.findings, 1)
              for section in (finding_section(number, one, nominal, units=units, beside=result.findings),
                              numbers_section(number, one, units))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
-                  errors_table(result.residual_rms, result.after_rms, result.rated, *held_out_floor(result), units),
+                  errors_table(now, result.after_rms, result.rated, floor, name,
+                               f"{unmoved_words(result, units)}{floor_from}", units),
                   tuple(sections), _advice(result), (laws_words(result.laws_of, _IN_RUN), threshold_words(result)))
 
 
@@ -163,7 +166,7 @@ def _others(result: Result) -> list[Section]:
             ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
             f"believed. {_OUT_OF_REACH} So is that of a cause that takes next to nothing: none was worked out."
-            f"{_alike(len(result.residual_rms.identify))}", tones),)))
+            f"{_alike(len(result.residual_rms.identify))}{of_moved(shown, result)}", tones),)))
     return sections
 
 

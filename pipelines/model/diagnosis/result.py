@@ -172,7 +172,8 @@ class Trial:
     step: int  # from 1: the search for the first, second … finding
     cause: str
     joint: int | None
-    gain: float  # share of the squared weighted residual that it takes away, held out
+    gain: float  # share of the squared weighted residual that it takes away, held out; of base parameters that have moved, of
+    # what one set of them for before and after leaves more
     threshold: float  # that it had to exceed
     visibility: float
     exact_gain: float  # the same after the exact refit; NaN where it was not refitted
@@ -262,3 +263,4 @@ class Diagnosis:
     nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding, with what stands
     extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects
     calibration: Calibration | None = field(default=None, metadata=NOT_STORED, repr=False)  # thresholds
+    unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
