@@ -150,8 +150,7 @@ def _others(result: Result) -> list[Section]:
     """Rejected hypotheses and the ledger."""
     sections = []
     if result.rejected:
-        why = tuple((title_of(one.cause), one.joint, without_keys(one.reason)) for one in result.rejected)
-        sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("cause", "joint", "why"), why),)))
+        sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("causes", "why"), _folded(result.rejected)),)))
     shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
@@ -188,6 +187,13 @@ def _refused(rejected: Sequence[Rejected]) -> str:
     which = "Each of these" if not more else f"{weaker} of these are {WEAKER}: each" if weaker > 1 else f"One is {WEAKER}: it"
     return (f"{which} takes more than its threshold off the residual in some search, but others take more and were tried "
             f"instead.{rest}")
+
+
+def _folded(rejected: Sequence[Rejected]) -> tuple[tuple[str, str], ...]:
+    """A line for each reason with all causes it holds for, those that are only weaker last: every one stands in result.json."""
+    reasons = sorted(dict.fromkeys(one.reason for one in rejected), key=lambda reason: reason == WEAKER)
+    return tuple(("; ".join(words for _, words in together(one for one in rejected if one.reason == reason)), without_keys(reason))
+                 for reason in reasons)
 
 
 def _alike(joints: int) -> str:
