@@ -73,6 +73,7 @@ WORDS: Final[dict[str, str]] = {
     "previews": "signals in few points, for the figures", "preview": "signals in few points, for the figures",
     "flagged_tau": "the same of torque", "LogSummary.origin": "measured, simulated or planned",
     # import and convert
+    "robot_from": "why this robot was taken; empty where it was named",
     "recipe": "the recipe that was followed", "tables": "tables without a clock", "columns": "the columns that were taken",
     "rows": "number of rows", "units": "unit of each column",
     # friction

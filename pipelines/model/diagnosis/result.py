@@ -14,9 +14,11 @@ from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
 
-__all__ = ["BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof", "Rejected",
-           "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial", "Value", "Verdict"]
+__all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof",
+           "Rejected", "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial",
+           "Value", "Verdict"]
 
+RIVALS = 0.8  # similarity from which two causes explain the same
 Verdict = Literal["cause", "nothing-wrong", "unknown"]
 
 
