@@ -39,6 +39,8 @@ WORDS: Final[dict[str, str]] = {
     "rejected": "hypotheses that came close and are not believed", "reason": "why, in words; empty where there is nothing to say",
     "detectable": "the smallest of each cause that would have been found on these logs, with 95 %",
     "smallest": "that size, with its unit", "not_testable": "causes of which these logs cannot tell, and what to record",
+    "or_less": "whether the cause is larger where this number is smaller, as the limit of a clipped drive",
+    "without_limit": "causes that no other list has, and what was seen of them",
     "residual_rms": "[N m] torque error of the nominal model, before any extension",
     "after_rms": "[N m] torque error of the extended model",
     "unmoved_rms": "[N m] the nominal model's, less what a finding, a load say, put into base parameters; null: none did",

@@ -16,7 +16,7 @@ from pipelines.model.diagnosis.calibration import Calibration
 
 __all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof",
            "Rejected", "ResidualRms", "Rival", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial",
-           "Value", "Verdict"]
+           "Value", "Verdict", "WithoutLimit"]
 
 RIVALS = 0.8  # similarity from which two causes explain the same
 Verdict = Literal["cause", "nothing-wrong", "unknown"]
@@ -146,6 +146,7 @@ class Detectable:
     at: dict[str, Value] = field(default_factory=dict)  # non-linear numbers for which it is: order, speed
     way: Literal["injected", "analytic"] = "analytic"  # hidden in these logs and found, or worked out
     visibility: float = float("nan")  # part of its columns that the refitted model cannot absorb
+    or_less: bool = False  # of less of the parameter there is more of the cause: of a limit, the largest that would have been found
 
 
 @dataclass(frozen=True)
@@ -156,6 +157,14 @@ class NotTestable:
     joint: int | None
     reason: str  # "absorbed by p3, p5, p9, p13; needs a reference log"
     record: str  # what to record instead
+
+
+@dataclass(frozen=True)
+class WithoutLimit:
+    """A cause that was looked for, or is none, and of which no size is to tell."""
+
+    cause: str
+    reason: str  # what was seen of it
 
 
 @dataclass(frozen=True)
@@ -266,3 +275,4 @@ class Diagnosis:
     extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects
     calibration: Calibration | None = field(default=None, metadata=NOT_STORED, repr=False)  # thresholds
     unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
+    without_limit: tuple[WithoutLimit, ...] = ()  # causes of the library that no other list has
