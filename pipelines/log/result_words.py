@@ -39,11 +39,8 @@ WORDS: Final[dict[str, str]] = {
     "rejected": "hypotheses that came close and are not believed", "reason": "why, in words; empty where there is nothing to say",
     "detectable": "the smallest of each cause that would have been found on these logs, with 95 %",
     "smallest": "that size, with its unit", "not_testable": "causes of which these logs cannot tell, and what to record",
-    "or_less": "whether the cause is larger where this number is smaller, as the limit of a clipped drive",
-    "without_limit": "causes that no other list has, and what was seen of them",
     "residual_rms": "[N m] torque error of the nominal model, before any extension",
     "after_rms": "[N m] torque error of the extended model",
-    "unmoved_rms": "[N m] the nominal model's, less what a finding, a load say, put into base parameters; null: none did",
     "ResidualRms.identify": "[N m] over the logs that were fitted, joint by joint",
     "ResidualRms.validate": "[N m] over what was held out, joint by joint",
     "ResidualRms.floor": "[N m] floor: what is left of it is no fault, joint by joint",
@@ -75,7 +72,6 @@ WORDS: Final[dict[str, str]] = {
     "previews": "signals in few points, for the figures", "preview": "signals in few points, for the figures",
     "flagged_tau": "the same of torque", "LogSummary.origin": "measured, simulated or planned",
     # import and convert
-    "robot_from": "why this robot was taken; empty where it was named",
     "recipe": "the recipe that was followed", "tables": "tables without a clock", "columns": "the columns that were taken",
     "rows": "number of rows", "units": "unit of each column",
     # friction
