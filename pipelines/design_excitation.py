@@ -24,7 +24,7 @@ from pipelines.log.recording.controller_side import controller_table, write_cont
 from pipelines.log.recording.recipe import Recipe
 from pipelines.log.results import json_text, stored_result
 from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot, robot_sources
+from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.allowed import refuse_strange
@@ -102,6 +102,7 @@ class Material:
     recipe: Recipe | None
     modes: tuple[Mapping[str, Any], ...]  # results of frf
     tell: Any = field(compare=False)
+    why: str = ""  # this robot, where none was named
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -110,7 +111,9 @@ def read(request: Request, settings: Settings) -> Inputs:
     Raises:
         UsageError: C04, no such file; C02, a model of another robot.
     """
-    named = settings.robot or request.robot or ("robot.toml" if Path("robot.toml").is_file() else "rrr")
+    named, why = (given, "") if (given := settings.robot or request.robot) else robot_at_hand()
+    if why:
+        request.tell(f"taking a robot that nobody named: {why}")
     robot = load_robot(named)
     sources = [path for path in robot_sources(named) if path.is_file()]
     arm = _arm(settings.model, robot)
@@ -134,7 +137,8 @@ def read(request: Request, settings: Settings) -> Inputs:
         sources.append(Path(settings.model).absolute())
     sources = [*logs.sources, *(path.absolute() for path in sources)]
     return Inputs(logs.logs, logs.rejected, logs.checks, tuple(sources), logs.hashes, robot=robot,
-                  material=Material(robot, arm, bounds, recipe, modes, request.tell), label=settings.purpose, robot_name=robot.name)
+                  material=Material(robot, arm, bounds, recipe, modes, request.tell, why),
+                  label=settings.purpose, robot_name=robot.name)
 
 
 def _arm(model: str | None, robot: RobotDescription) -> Arm | None:
@@ -191,13 +195,13 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         bounds = None if given.bounds is None else parse_bounds(given.bounds, columns, str(settings.bounds))
     task = plan_task(given.robot, given.arm, wishes, told, bounds)
     if settings.purpose != "excitation":
-        return _plans(task, settings, given)
+        return replace(_plans(task, settings, given), robot_from=given.why)
     after, apart = tuple(log.name for log in logs), None
     share = 1.0 if pair is None else 0.5
     found = design(task, Effort(share * settings.seconds, settings.evaluations, given.tell), settings.seed)
     if pair is not None and not found.stopped:
         found, apart = told_apart(task, found, pair, share * settings.seconds, settings.evaluations, settings.seed, given.tell)
-    return replace(_result(task, found, settings, given, after, mode), apart=apart)
+    return replace(_result(task, found, settings, given, after, mode), apart=apart, robot_from=given.why)
 
 
 def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:

@@ -20,7 +20,7 @@ from pipelines.log.model_file import ModelFile, read_model
 from pipelines.log.recording.controller_side import controller_table, write_controller_table
 from pipelines.log.recording.recipe import Recipe
 from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot, robot_sources
+from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.in_folder import fitted_in_folder
@@ -129,7 +129,7 @@ def _robot(request: Request, inputs: Inputs) -> tuple[RobotDescription, list[Pat
     """That of the logs, else the one given, else robot.toml here, else the shipped one; with the files it was read from."""
     if request.robot is None and inputs.logs:
         return inputs.logs[0].log.robot, []
-    named = request.robot or ("robot.toml" if Path("robot.toml").is_file() else "rrr")
+    named = request.robot or robot_at_hand()[0]
     return load_robot(named), [path.absolute() for path in robot_sources(named) if path.is_file()]
 
 

@@ -50,7 +50,7 @@ def _day(name: str) -> str:
 def _part(result: Mapping[str, Any], name: str, robot: str, recorded: str, turning: Sequence[bool] = ()) -> Part:
     findings = tuple({key: one.get(key) for key in ("cause", "joint", "parameters")} for one in result.get("findings") or ())
     least = {place_of(one): (str(one["parameter"]), float(one["smallest"]["value"])) for one in result.get("detectable") or ()
-             if (one.get("smallest") or {}).get("value") is not None}
+             if (one.get("smallest") or {}).get("value") is not None and not one.get("or_less")}
     return Part(name, robot, recorded, fitted(result), residuals(result, turning), findings, result.get("findings") is not None,
                 str(result.get("verdict") or ""), tuple(map(place_of, result.get("standing") or ())), least)
 

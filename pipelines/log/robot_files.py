@@ -13,9 +13,10 @@ from pipelines.log.robot import Joint, RobotDescription, parse_robot
 from pipelines.log.shipped import shipped
 from pipelines.log.text import read_small_text
 
-__all__ = ["load_robot", "robot_sources"]
+__all__ = ["load_robot", "robot_at_hand", "robot_sources"]
 
 _URDF = (".urdf", ".xacro")
+_HERE, _SHIPPED = "robot.toml", "rrr"  # where none is named
 
 
 def load_robot(source: str | Path) -> RobotDescription:
@@ -38,6 +39,13 @@ def robot_sources(source: str | Path) -> tuple[Path, ...]:
         return (path,)
     urdf = _urdf_named(_table_of(read_small_text(path)))
     return (path,) if urdf is None else (path, path.parent / urdf)
+
+
+def robot_at_hand() -> tuple[str, str]:
+    """A robot where none was named, for `load_robot`, and why it is that one."""
+    if Path(_HERE).is_file():
+        return _HERE, f"none was named: {_HERE} here"
+    return _SHIPPED, f"none was named, and no {_HERE} is here: the shipped {_SHIPPED}"
 
 
 def _file_of(source: str | Path) -> Path:

@@ -34,6 +34,10 @@ def limits_sections(result: Diagnosis) -> list[Section]:
                        for one in result.not_testable)
         sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
                                 (Table(("cause", "joint", "why", "what to record"), hidden),)))
+    if result.without_limit:
+        rest = tuple((title_of(one.cause), without_keys(one.reason)) for one in result.without_limit)
+        sections.append(Section("Without a size to tell", ("Of these no smallest size that would have been found is known.",),
+                                (Table(("cause", "what is known of it"), rest),)))
     return sections
 
 
@@ -46,8 +50,9 @@ def _shape(at: Mapping[str, Value]) -> str:
 def _smallest(one: Detectable) -> tuple[str, ...]:
     """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
     value = one.smallest.value
-    expected = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
+    ends = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
+    expected = [] if one.or_less else ends
     if isinstance(value, float) and expected and value >= min(expected):
         return "cannot be seen", "", "", ""
     told = format_number(value, 2) if isinstance(value, float) else told_value(one.smallest)
-    return told, unit_or_dash(one.smallest.unit), _shape(one.at), _WAY[one.way]
+    return told, unit_or_dash(one.smallest.unit), "this or less" if one.or_less else _shape(one.at), _WAY[one.way]

@@ -15,6 +15,7 @@ from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
+from pipelines.report.diagnosis_moved import of_moved, unmoved_words
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
     as_sentence,
@@ -50,14 +51,16 @@ _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    units, nominal = units_in(result), replace(result.residual_rms, floor=held_out_floor(result)[0])
+    units, (floor, name, floor_from) = units_in(result), held_out_floor(result)
+    nominal, now = replace(result.residual_rms, floor=floor), result.unmoved_rms or result.residual_rms
     found = [section for number, one in enumerate(result.findings, 1)
              for section in (finding_section(number, one, nominal, units=units, beside=result.findings),
                              numbers_section(number, one, units))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
-                  errors_table(result.residual_rms, result.after_rms, result.rated, *held_out_floor(result), units),
+                  errors_table(now, result.after_rms, result.rated, floor, name,
+                               f"{unmoved_words(result, units)}{floor_from}", units),
                   tuple(sections), _advice(result), (laws_words(result.laws_of, _IN_RUN), threshold_words(result)))
 
 
@@ -146,8 +149,7 @@ def _others(result: Result) -> list[Section]:
     """Rejected hypotheses and the ledger."""
     sections = []
     if result.rejected:
-        why = tuple((title_of(one.cause), one.joint, without_keys(one.reason)) for one in result.rejected)
-        sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("cause", "joint", "why"), why),)))
+        sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("causes", "why"), _folded(result.rejected)),)))
     shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
@@ -162,7 +164,7 @@ def _others(result: Result) -> list[Section]:
             ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
             f"believed. {_OUT_OF_REACH} So is that of a cause that takes next to nothing: none was worked out."
-            f"{_alike(len(result.residual_rms.identify))}", tones),)))
+            f"{_alike(len(result.residual_rms.identify))}{of_moved(shown, result)}", tones),)))
     return sections
 
 
@@ -184,6 +186,13 @@ def _refused(rejected: Sequence[Rejected]) -> str:
     which = "Each of these" if not more else f"{weaker} of these are {WEAKER}: each" if weaker > 1 else f"One is {WEAKER}: it"
     return (f"{which} takes more than its threshold off the residual in some search, but others take more and were tried "
             f"instead.{rest}")
+
+
+def _folded(rejected: Sequence[Rejected]) -> tuple[tuple[str, str], ...]:
+    """A line for each reason with all causes it holds for, those that are only weaker last: every one stands in result.json."""
+    reasons = sorted(dict.fromkeys(one.reason for one in rejected), key=lambda reason: reason == WEAKER)
+    return tuple(("; ".join(words for _, words in together(one for one in rejected if one.reason == reason)), without_keys(reason))
+                 for reason in reasons)
 
 
 def _alike(joints: int) -> str:

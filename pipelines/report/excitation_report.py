@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.model.excitation.rehearse import Rehearsal
 from pipelines.model.excitation.result import DrawnPlan, Result
-from pipelines.report.diagnosis_words import without_keys
+from pipelines.report.excitation_apart import alike_words, apart_section, are_rivals
 from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
 from pipelines.report.joint_units import unit_of
 from pipelines.report.report import Figure, Report, Section, Table, Tone
@@ -29,28 +29,17 @@ def excitation_report(result: Result) -> Report:
     """The motion, its limits, what it tells; of other experiments their plans."""
     if result.purpose != "excitation":
         return _plans_report(result)
-    sections = (_safety(result), _motion(result), _limits(result), _told(result), _apart(result), _certificate(result),
+    sections = (_safety(result), _motion(result), _limits(result), _told(result), apart_section(result.apart), _certificate(result),
                 _comparison(result))
-    return Report("Excitation", _verdict(result), _tone(result), _key_figures(result), tuple(s for s in sections if s is not None))
-
-
-def _apart(result: Result) -> Section | None:
-    """How well two causes can be told apart in it."""
-    found = result.apart
-    if found is None:
-        return None
-    rows = tuple((name, one.similarity, *one.visibility, one.condition_number)
-                 for name, one in (("design for the parameters alone", found.before), ("this design", found.after)))
-    a, b = map(without_keys, found.causes)
-    words = ("Similarity: how much of one cause the other can imitate, when base parameters and friction are fitted beside both; "
-             "from 0.8 on diagnose calls them rivals. Visible: what base parameters and friction cannot take up.")
-    return Section(f"Telling {a} from {b}", (words,), (Table(
-        ("motion", "similarity", f"{a}, visible", f"{b}, visible", "condition number"), rows),))
+    return Report("Excitation", _verdict(result), _tone(result), _key_figures(result), tuple(s for s in sections if s is not None),
+                  basis=(_robot(result),))
 
 
 def _tone(result: Result) -> Tone:
     found = result.rehearsal
     if not result.reached or result.interrupted or result.rehearsal_failed or (found is not None and _trouble(result, found)):
+        return "attention"
+    if are_rivals(result.apart):
         return "attention"
     return "good" if result.torque_checked else "attention"
 
@@ -70,9 +59,7 @@ def _verdict(result: Result) -> str:
                     "mean square of their relative standard deviations)")
     text = " ".join(said)
     if result.apart is not None:
-        before, after = (format_number(one.similarity, 2) for one in (result.apart.before, result.apart.after))
-        text += (f"; {' and '.join(map(without_keys, result.apart.causes))} look alike by {after} (1: the same), in a design for "
-                 f"the parameters alone by {before}; from 0.8 on diagnose calls them rivals")
+        text += f"; {alike_words(result.apart)}"
     if not result.reached and result.ceiling is not None:
         dear = result.dearest
         text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"
@@ -83,6 +70,11 @@ def _verdict(result: Result) -> str:
     if result.interrupted:
         text += "; the search was interrupted, this is its best by then"
     return text + "."
+
+
+def _robot(result: Result) -> str:
+    """For which robot, and why that one where none was named."""
+    return f"For the robot {result.robot}{f' ({result.robot_from})' if result.robot_from else ''}."
 
 
 def _key_figures(result: Result) -> Table:
@@ -112,7 +104,7 @@ def _aim(result: Result) -> str:
 
 
 def _safety(result: Result) -> Section:
-    text, tables = [], []
+    text, tables = [_robot(result)], []
     found = result.rehearsal
     if found is None:
         text.append(f"The rehearsal in simulation failed: {result.rehearsal_failed}." if result.rehearsal_failed else
@@ -259,13 +251,14 @@ def _plans_report(result: Result) -> Report:
     if moving:
         sections.append(Section("Motions", (), (), tuple(_plan_figure(p, result) for p in moving)))
     safe = not result.rehearsal_failed and all(found.safe for _, found in result.rehearsals)
-    return Report("Planned experiments", verdict, "neutral" if safe else "attention", None, tuple(sections))
+    return Report("Planned experiments", verdict, "neutral" if safe else "attention", None, tuple(sections),
+                  basis=(_robot(result),))
 
 
 def _plans_safety(result: Result) -> Section:
     """Of each plan the joint that is nearest to trouble in its rehearsal."""
     if not result.rehearsals:
-        return Section("Before the robot moves", (f"The rehearsal in simulation failed: {result.rehearsal_failed}."
+        return Section("Before the robot moves", (_robot(result), f"The rehearsal in simulation failed: {result.rehearsal_failed}."
                                                   if result.rehearsal_failed else "They were not rehearsed in simulation.",), (),
                        warning=_UNCHECKED)
     rows = []
@@ -274,8 +267,8 @@ def _plans_safety(result: Result) -> Section:
         fast = [x / limit for x, limit in zip(found.speed_peak, found.speed_limit, strict=True)]
         rows.append((name, found.seconds, max(found.position_rms), max(found.position_max), 100 * max(full), 100 * max(fast),
                      100 * max(found.saturated)))
-    text = ["Each was rehearsed in simulation under PD control of 8 Hz a joint, without feed-forward; of all joints the worst is "
-            "listed. Another controller will follow otherwise."]
+    text = [_robot(result), "Each was rehearsed in simulation under PD control of 8 Hz a joint, without feed-forward; of all "
+            "joints the worst is listed. Another controller will follow otherwise."]
     if result.purpose == "frf":
         text.append("The excitation moves the arm away from its slow turn, as it is to.")
     if result.rehearsal_failed:

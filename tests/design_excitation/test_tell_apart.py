@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from pipelines.errors import UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.rigid.choose import rigid_body
+from pipelines.report.excitation_report import excitation_report
 from pipelines.stage import Outcome, Request, run_stage
 
 Result = design_excitation.Result
@@ -59,6 +61,29 @@ def test_the_two_look_less_alike(both: dict[str, Outcome[Result]]) -> None:
     assert found.after.similarity < 0.95 * found.before.similarity
     assert both["plain"].result.apart is None
     assert "spring at joint 2 and torque offset at joint 2 look alike by" in both["apart"].report.verdict
+
+
+@pytest.mark.parametrize(("similarity", "shown", "tone"), [
+    (0.81, "0.81", "attention"), (0.8004, "0.8004", "attention"), (0.797, "0.797", "good"), (0.004, "0.004", "good")])
+def test_a_design_that_leaves_rivals_is_not_called_good(both: dict[str, Outcome[Result]], similarity: float, shown: str,
+                                                        tone: str) -> None:
+    """What diagnose would still call rivals was not told apart; rounding puts no figure on the other side of 0.8."""
+    result = both["apart"].result
+    assert result.apart is not None
+    apart = replace(result.apart, after=replace(result.apart.after, similarity=similarity))
+    report = excitation_report(replace(result, apart=apart))
+    assert report.tone == tone
+    assert f"look alike by {shown} " in report.verdict
+    assert ("still call them rivals" in report.verdict) == (tone == "attention")
+
+
+def test_a_robot_that_nobody_named_is_said_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The shipped one where no robot.toml is here; nothing of the kind for one that was named."""
+    monkeypatch.chdir(tmp_path)
+    for robot, said in ((None, True), ("rrr", False)):
+        settings = design_excitation.Settings(robot=robot, purpose="hold", rehearse=False)
+        report = run_stage(design_excitation.STAGE, Request((), out=tmp_path / f"{robot}", no_report=True), settings).report
+        assert ("no robot.toml is here: the shipped rrr" in " ".join(report.basis)) == said
 
 
 def test_what_one_leaves_of_the_other_stands_above_the_noise(both: dict[str, Outcome[Result]]) -> None:

@@ -166,6 +166,17 @@ def test_what_was_rejected_is_introduced_by_why(reasons: tuple[str, ...], said: 
     assert ("believed" in section.text[0]) == (reasons[-1] != "weaker than others")
 
 
+def test_causes_rejected_for_one_reason_share_a_line() -> None:
+    """Ten that were merely weaker hide the one that was looked at closely: it comes first, and none of the ten is lost."""
+    weaker = [("spring", 2), ("cogging", 1), ("spring", 3), ("payload", None)]
+    rejected = (*(Rejected(cause, joint, "weaker than others") for cause, joint in weaker),
+                Rejected("stribeck", 1, "the logs do not agree on its size"))
+    page = diagnosis_report(Result(**(NOTHING | {"rejected": rejected})))
+    (table,) = (section.tables[0] for section in page.sections if section.title == "Rejected")
+    assert table.rows == (("Stribeck friction at joint 1", "the logs do not agree on its size"),
+                          ("spring at joints 2 and 3; cogging at joint 1; a load at the tip", "weaker than others"))
+
+
 def test_limits_are_told_for_what_a_technician_can_see() -> None:
     """At how many waves a turn, from which joint: not by which form of a law."""
     at = {"order": Value(106.918, None, "1/rev"), "sharpness": Value(111.0, None, "s/rad"), "inner_loops": Value(0, None, "1")}

@@ -95,6 +95,21 @@ class Absorbed:
         return self.times**2 >= 1.0 + _UNEXPLAINED
 
     @property
+    def taken(self) -> float:
+        """Share of the squared residual beside one set of base parameters for before and after, that it takes away."""
+        return self.explained * self._share
+
+    @property
+    def least(self) -> float:
+        """Of the same, what it has to take away to be named."""
+        return (_ALTOGETHER if self.effect.evidence == "base parameters" else _ALONE) * self._share
+
+    @property
+    def _share(self) -> float:
+        """What a second set of base parameters takes away of what one leaves."""
+        return 1.0 - 1.0 / self.times**2
+
+    @property
     def count(self) -> int:
         """Numbers that were fitted."""
         return len(self.std) + len(self.effect.free) + self.unknowns

@@ -21,18 +21,18 @@ from pipelines.model.diagnosis.beside import acted
 from pipelines.model.diagnosis.calibrated import conditions_of, origin_of, refuse_unfit
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.candidates import Family
-from pipelines.model.diagnosis.carried import carried
+from pipelines.model.diagnosis.carried import carried, unmoved
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.doubted import unlike_noise, unnamed
 from pipelines.model.diagnosis.floored import Floored
 from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.ledger import line_of_moved
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.oscillating import oscillation
 from pipelines.model.diagnosis.pruned import settled
-from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
 from pipelines.model.diagnosis.search import Found, search
@@ -98,7 +98,7 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
     if isinstance(moved, Unexplained):
         return _nameless(told, _MOVED.format(moved.times)) if told.verdict == "nothing-wrong" else told
-    return told if moved is None else _with_moved(told, moved, done.found.final, now, case, chosen)
+    return told if moved is None else _with_moved(told, moved, done.found, now, case, chosen)
 
 
 def _drives(first: Responding, reference: Data, since: Since, seed: int) -> DriveNoise | None:
@@ -143,34 +143,37 @@ def _nameless(told: Diagnosis, why: str) -> Diagnosis:
                    summary=sentence(Ruling("unknown", (), why), (), turning, told.residual_rms.identify))
 
 
-def _with_moved(told: Diagnosis, moved: Absorbed, final: Refined, now: Prepared, case: Case,
+def _with_moved(told: Diagnosis, moved: Absorbed, found: Found, now: Prepared, case: Case,
                 chosen: DiagnosisSettings) -> Diagnosis:
     """With what the base parameters say has changed, where nothing that was found says it already."""
     turning = now.data.logs[0].log.robot.revolute
     if told.verdict == "unknown" or told.extended is None:
         why = "the base parameters have moved as it moves them, beside something that has no name"
-        return replace(told, rejected=(Rejected(moved.effect.name, moved.effect.joint, why), *told.rejected))
+        return _not_accepted(told, moved, why)
     if (like := _alike(moved.effect, told.findings)) is not None:
         why = f"the base parameters have moved, but {within(like.title)}, which was found, moves them too"
-        return _not_accepted(told, moved.effect.name, moved.effect.joint, why)
+        return _not_accepted(told, moved, why)
     if why := moved.unsure:
-        if told.findings:
-            return _not_accepted(told, moved.effect.name, moved.effect.joint, why)
-        return _nameless(told, why)
-    one = carried(moved, final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
+        refused = _not_accepted(told, moved, why)
+        return refused if told.findings else _nameless(refused, why)
+    one = carried(moved, found.final, told.extended, now, case.beside, chosen.blocks, chosen.evidence)
     if one.doubt:
-        told = _not_accepted(told, one.finding.cause, one.finding.joint, one.doubt)
+        told = _not_accepted(told, moved, one.doubt, one.gained)
         return _nameless(told, _MOVED.format(moved.times)) if moved.far and not told.findings else told
     findings, beside = strongest((one.finding, *told.findings)), told.reason if told.verdict == "cause" else ""
     named = replace(told, verdict="cause", findings=findings, reason=beside, extended=one.arm,
+                    unmoved_rms=unmoved(one, found.nominal, now.judge, told.residual_rms.floor),
+                    ledger=(*told.ledger, line_of_moved(moved, told.ledger, one.gained)),
                     summary=sentence(Ruling("cause", (), beside), findings, turning, told.residual_rms.identify))
     if not named.evidence:
         return named
     return with_simulation(named, as_simulated(one.simulated) or followed_by(arms_of(named), now.logs))
 
 
-def _not_accepted(told: Diagnosis, cause: str, joint: int | None, why: str) -> Diagnosis:
-    return replace(told, rejected=(*told.rejected, Rejected(cause, joint, why)))
+def _not_accepted(told: Diagnosis, moved: Absorbed, why: str, gained: float = np.nan) -> Diagnosis:
+    """With the reason among what is rejected, and in the ledger beside what it gains."""
+    return replace(told, rejected=(*told.rejected, Rejected(moved.effect.name, moved.effect.joint, why)),
+                   ledger=(*told.ledger, line_of_moved(moved, told.ledger, gained, why)))
 
 
 def _alike(effect: Effect, found: Iterable[Finding]) -> Finding | None:

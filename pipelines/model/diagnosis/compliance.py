@@ -4,6 +4,7 @@
     told.named             causes that the responses name, with their numbers
     told.rigid             whether they show a rigid arm: what gives way then does so at reversals only, and is a gap
     untold(told)           causes that they leave open, with the reason
+    gaps_untold(told)      causes that only responses without a spring let be named
 """
 
 from __future__ import annotations
@@ -20,10 +21,12 @@ from pipelines.model.diagnosis.result import NotTestable
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
 
-__all__ = ["Compared", "Compliance", "compared", "compliance", "untold"]
+__all__ = ["Compared", "Compliance", "compared", "compliance", "gaps_untold", "untold"]
 
 _MOVED = 3.0  # standard deviations, by which a base's frequency or a joint's stiffness is another one
 _SAME = 0.03  # of it, within which two sessions show the same one: temperature, and how the arm stood
+_NO_RESPONSES = "a gap is told from a spring by frequency responses that show none, and there is no frf log"
+_SPRING = "the frequency responses name a spring, and beside it a gap is not told from it"
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,15 @@ def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotTes
     named = () if told is None else tuple(one.effect.name for one in told.named)
     return tuple(NotTestable(kind.name, None, reason, kind.experiment) for kind in all_effects()
                  if reason and kind.evidence == "frequency responses" and kind.name not in (*named, *without))
+
+
+def gaps_untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotTestable, ...]:
+    """Causes at reversals, which have a name only beside frequency responses that name no spring."""
+    if told is not None and not told.named:
+        return ()
+    reason = _NO_RESPONSES if told is None else _SPRING
+    return tuple(NotTestable(kind.name, None, reason, f"Measure frequency responses, which tell a spring. {kind.experiment}")
+                 for kind in all_effects() if kind.evidence == "reversals" and kind.name not in without)
 
 
 def _acting(one: frf.Finding, arm: Arm) -> Acting:

@@ -37,6 +37,7 @@ from pipelines.model.diagnosis.second_look import looked_again
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.told import diagnosis_of
 from pipelines.model.diagnosis.verdict import rule
+from pipelines.model.diagnosis.without_limit import without_limit
 
 __all__ = ["diagnose"]
 
@@ -75,7 +76,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
             held = plainer_of(found, again)
     if held is again:
         memory.instead(prepared, other)
-    return held
+    return replace(held, without_limit=without_limit(held, bool(logs.frf), chosen.without)) if chosen.limits else held
 
 
 def _again(other: Prepared, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None, memory: Memory) -> Diagnosis:

@@ -22,13 +22,12 @@ from pipelines.model.diagnosis.joined import once_each
 from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.numbers import acting, parameters
 from pipelines.model.diagnosis.refit import Refined
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, Rival, Value
+from pipelines.model.diagnosis.result import RIVALS, Finding, Gain, Rejected, Rival, Value
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
 __all__ = ["Causes", "agreement", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
 
-_ALIKE = 0.8  # cosine from which two causes explain the same
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
 _BLOCKS = 10  # of one log, that must agree as logs do
 _TELLS = 9.0  # times its variance, that the power of the predicted part must have in a log to be asked
@@ -131,7 +130,7 @@ def _rivals(step: Step, best: Tried) -> tuple[Rival, ...]:
     for one in step.rivals:
         theirs = step.before.residual - one.done.residual
         alike = float(mine @ theirs) / max(float(np.linalg.norm(mine) * np.linalg.norm(theirs)), 1e-300)
-        if one is not best and alike > _ALIKE and one.error < 1.0 and one.possible:
+        if one is not best and alike > RIVALS and one.error < 1.0 and one.possible:
             found.append(Rival(one.screened.cause, one.screened.joint, alike))
     return tuple(sorted(found, key=lambda rival: -rival.similarity))
 

@@ -17,7 +17,7 @@ torque exactly, and its strength raised until it passes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -26,17 +26,18 @@ import numpy.typing as npt
 
 from pipelines.fit.bootstrap import apart_in, drawn
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.candidates import Arms, Family, lay_family, lay_one
+from pipelines.model.diagnosis.candidates import Arms, Family, Laid, lay_family, lay_one
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.screen import INVISIBLE, Products, products_apart, products_of
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Hidden", "Probe", "smallest"]
+__all__ = ["Draw", "Hidden", "Probe", "held_out", "quadratics", "smallest"]
 
 _SHAPES, _RANK = 8, 0.75  # of a family that are hidden; share of them for which less, or as much, suffices
 _PHASES = 4  # of a sine and a cosine, each with both signs
+_NUMBERS = 3  # amplitudes that are asked, until one shows
 _HALF = 0.5  # of the held-out power, that chance does not take off
 _NEAR = 0.97  # of the bound, that the torque of the exact cause takes off: it is not linear to the last
 _RAISED, _TIMES = 1.25, 24  # a strength that did not pass, and how often
@@ -108,7 +109,7 @@ class Probe:
 
 
 @dataclass(frozen=True, eq=False)
-class _Draw:
+class Draw:
     """One way in which the cause could be there."""
 
     effect: Effect
@@ -125,8 +126,9 @@ def smallest(family: Family, bound: float, probe: Probe) -> Hidden | None:
     """
     if family.event or family.shapes[0].fixed_amplitudes is not None or not np.isfinite(bound):
         return None
-    worst: dict[Effect, _Draw] = {}
-    for one in _draws(family, bound, probe):
+    worst: dict[Effect, Draw] = {}
+    numbers = (_draws(family, bound, probe, number) for number in range(_NUMBERS))
+    for one in next((some for some in numbers if some), []):  # where the model takes in all of the first, an inertia say, the next
         possible = not np.isfinite(one.strength) or one.effect.possible(one.effect.values(one.strength * one.direction))
         if possible and (one.effect not in worst or worst[one.effect].strength < one.strength):
             worst[one.effect] = one
@@ -137,7 +139,7 @@ def smallest(family: Family, bound: float, probe: Probe) -> Hidden | None:
     strength = chosen.strength
     against = [one for one in (chosen, replace(chosen, direction=-chosen.direction)) if not np.isfinite(strength)
                or one.effect.possible(one.effect.values(strength * one.direction))]
-    for factor in (_exactly(chosen, family, bound, probe), *_held_out(chosen, [one.direction for one in against], probe)):
+    for factor in (_exactly(chosen, family, bound, probe), *held_out(chosen, [one.direction for one in against], probe)):
         strength = _raised(factor, strength)
     found = bool(np.isfinite(strength))
     return Hidden(chosen.effect, (strength if found else 1.0) * chosen.direction, found)
@@ -155,8 +157,8 @@ def _raised(factor: Callable[[float], float], strength: float) -> float:
     return np.inf
 
 
-def _draws(family: Family, bound: float, probe: Probe) -> list[_Draw]:
-    """Some shapes of the family in some directions, and from which strength on the best shape takes off more than `bound`."""
+def _draws(family: Family, bound: float, probe: Probe, number: int = 0) -> list[Draw]:
+    """Some shapes of the family by amplitude `number`, and from which strength on the best shape takes off more than `bound`."""
     arm, count = probe.arms.of(family), len(family.shapes)
     chosen = set(np.unique(np.linspace(0, count - 1, min(count, _SHAPES)).round().astype(int)).tolist())
     hidden: list[tuple[Effect, Array, Array]] = []
@@ -165,7 +167,7 @@ def _draws(family: Family, bound: float, probe: Probe) -> list[_Draw]:
         for place in sorted(chosen & set(range(laid.first, laid.first + len(laid.table)))):
             effect, columns = family.shapes[place], probe.own(laid.rows, laid.table[place - laid.first])
             left, weighted = probe.left_of(columns), columns * probe.final.weights
-            for direction in _directions(effect, len(columns)):
+            for direction in _directions(effect, len(columns), number):
                 one = direction @ left
                 size = float(np.linalg.norm(one))
                 if size > INVISIBLE * float(np.linalg.norm(direction @ weighted)):
@@ -175,16 +177,20 @@ def _draws(family: Family, bound: float, probe: Probe) -> list[_Draw]:
     if not hidden:
         return []
     from_which = np.full(len(hidden), np.inf)
-    for a, b, c in _quadratics(family, probe, np.array(rows)):
+    for a, b, c in quadratics(_laid(family, probe), probe, np.array(rows)):
         from_which = np.minimum(from_which, _last_root(a, b, c - bound).min(axis=0))
-    return [_Draw(*one, float(root * scale)) for one, root, scale in zip(hidden, from_which, scales, strict=True)]
+    return [Draw(*one, float(root * scale)) for one, root, scale in zip(hidden, from_which, scales, strict=True)]
 
 
-def _quadratics(family: Family, probe: Probe, units: Array) -> list[tuple[Array, Array, Array]]:
+def _laid(family: Family, probe: Probe) -> Iterator[Laid]:
+    return lay_family(probe.data, family, probe.arms.of(family))
+
+
+def quadratics(laid_shapes: Iterable[Laid], probe: Probe, units: Array) -> list[tuple[Array, Array, Array]]:
     """Of some shapes at a time g(x⊥), b and g(r), each (shapes, units)."""
     found = []
     residuals = np.concatenate([probe.fit.residual[None], units])
-    for laid in lay_family(probe.data, family, probe.arms.of(family)):
+    for laid in laid_shapes:
         width = laid.table.shape[1]
         products = (products_of(laid, probe.fit, residuals) if probe.later is None else  # a common column, and one of the change
                     products_apart(laid, probe.fit, residuals, probe.later[laid.rows]))
@@ -208,10 +214,12 @@ def _last_root(a: Array, b: Array, c: Array) -> Array:
     return np.where(a <= 0.0, np.inf, np.where(inside < 0.0, 0.0, np.maximum(root, 0.0)))
 
 
-def _directions(effect: Effect, width: int) -> list[Array]:
-    """Of amplitudes: the first, with both signs; of a sine and a cosine, which give one number alike, several phases of it."""
-    first = np.eye(width)[0]
-    if width > 1 and _alike(effect.values(first), effect.values(np.eye(width)[1])):
+def _directions(effect: Effect, width: int, number: int) -> list[Array]:
+    """Of amplitudes: one, with both signs; of a sine and a cosine, which give one number alike, several phases of the first."""
+    if number >= width:
+        return []
+    first = np.eye(width)[number]
+    if number == 0 and width > 1 and _alike(effect.values(first), effect.values(np.eye(width)[1])):
         turn = np.pi * np.arange(2 * _PHASES) / _PHASES
         return [np.cos(x) * first + np.sin(x) * np.eye(width)[1] for x in turn.tolist()]
     return [first, -first]
@@ -223,7 +231,7 @@ def _alike(one: dict[str, float], other: dict[str, float]) -> bool:
     return bool(sizes) and sum(not np.isclose(one[name], other[name]) for name in one) <= 1
 
 
-def _exactly(one: _Draw, family: Family, bound: float, probe: Probe) -> Callable[[float], float]:
+def _exactly(one: Draw, family: Family, bound: float, probe: Probe) -> Callable[[float], float]:
     """How much more it takes to exceed the bound when the torque has all of what the cause does."""
     model, data = probe.final.model, probe.final.data
 
@@ -234,13 +242,14 @@ def _exactly(one: _Draw, family: Family, bound: float, probe: Probe) -> Callable
             torque = model.with_effect(one.effect, strength * one.direction).torque(data) - (data.y - probe.final.left)
         if not np.isfinite(torque).all():
             return np.inf
-        gain = max(float((a + 2.0 * b + c).max()) for a, b, c in _quadratics(family, probe, probe.left_of(torque)[None]))
+        every = quadratics(_laid(family, probe), probe, probe.left_of(torque)[None])
+        gain = max(float((a + 2.0 * b + c).max()) for a, b, c in every)
         return 1.0 if gain > _NEAR * bound else float(np.clip(np.sqrt(bound / max(gain, 1e-300)), 1.02, 3.0))
 
     return factor
 
 
-def _held_out(one: _Draw, directions: Sequence[Array], probe: Probe) -> list[Callable[[float], float]]:
+def held_out(one: Draw, directions: Sequence[Array], probe: Probe) -> list[Callable[[float], float]]:
     """Of each direction how much more it takes until what is held out becomes smaller by more than chance does, when the cause is
     fitted."""
     final, held = probe.final, probe.held

@@ -1,4 +1,4 @@
-"""Every hypothesis of a step with what it gained, what it had to exceed, and why it was accepted or not."""
+"""Every hypothesis of a step with what it gained, what it had to exceed, and why it was accepted or not; and of base parameters."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.effects.base import Effect
 
-__all__ = ["UNBELIEVABLE", "WEAKER", "Tried", "ledger"]
+__all__ = ["ACCEPTED", "UNBELIEVABLE", "WEAKER", "Tried", "ledger", "line_of_moved"]
 
+ACCEPTED = "accepted"
 WEAKER = "weaker than others"
 UNBELIEVABLE = "the arm could not have moved so with it"
 _REFUSED = "time held out does not bear it out"
@@ -55,7 +57,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         accepted = best is not None and fitted is best
         if fitted is None and gain <= thresholds.gain[k] and len(rows) >= _SHOWN:
             continue
-        reason = ("accepted" if accepted else _TOO_LITTLE if np.isinf(thresholds.gain[k]) else
+        reason = (ACCEPTED if accepted else _TOO_LITTLE if np.isinf(thresholds.gain[k]) else
                   "below its threshold" if gain <= thresholds.gain[k] else
                   "comes again at other moments" if not one.stands_out else
                   _REFUSED if id(one) in refused and fitted is None else
@@ -71,3 +73,15 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
                           float(one.visibility[0]), gained, accepted, reason))
     return tuple(rows)
+
+
+def line_of_moved(moved: Absorbed, trials: Sequence[Trial], held_out: float = np.nan, reason: str = ACCEPTED) -> Trial:
+    """The line of a cause that base parameters show, which is asked after the last search.
+
+    Args:
+        trials: of the searches.
+        held_out: share of the squared torque error that it takes away held out, each joint by its own; NaN where nobody asked.
+        reason: why it is not accepted.
+    """
+    last = max((one.step for one in trials), default=1)
+    return Trial(last, moved.effect.name, moved.effect.joint, moved.taken, moved.least, 0.0, held_out, reason == ACCEPTED, reason)

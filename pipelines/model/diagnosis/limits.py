@@ -10,7 +10,7 @@ A ‖c⊥‖ exceeds the root of the threshold by 1.65 of that. c⊥ is that of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.candidates import Family, runs_away
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.injection import Hidden, Probe
 from pipelines.model.diagnosis.injection import smallest as smallest_hidden
+from pipelines.model.diagnosis.injection_of_shapes import weakest
 from pipelines.model.diagnosis.nominal import Fit
 from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
 from pipelines.model.diagnosis.screen import Screened, for_each
@@ -33,22 +34,26 @@ from pipelines.model.rigid.body import Motion
 __all__ = ["detectable", "not_testable"]
 
 _SIDE = 1.65  # normal deviate of 95 %, one-sided
+_TOO_MUCH = "these logs cannot show it: no arm has so much of it that they would"
+_AT_NONE = "hidden in these logs it was found at no strength"
 _VISIBLE = 0.02  # η below which a cause cannot be told from the model
 _MAIN = 0.1  # of a column: a parameter that makes up less of it does not hide it
 
 
 def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: tuple[bool, ...],
-               probe: Probe | None = None) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
+               probe: Probe | None = None, nameable: Collection[str] = ("residual",),
+               ) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
     """Every cause that shows, with the smallest amplitude that would have been found; and those for which it is beyond its range.
 
     Args:
         screened, thresholds: of the last step, in the order of the families.
         probe: the final model, into whose logs causes are put; None: by the formula above.
+        nameable: kinds of evidence there are.
     """
     found, beyond = [], []
     named = {(e.effect.name, e.effect.joint) for e in probe.final.model.effects} if probe is not None else set()
     asked = [(one, float(bound), chance) for one, bound, chance in zip(screened, thresholds.gain, thresholds.own, strict=True)
-             if not (one.best_visibility < _VISIBLE or one.family.shapes[0].evidence != "residual"
+             if not (one.best_visibility < _VISIBLE or one.family.shapes[0].evidence not in nameable
                      or (one.cause, one.joint) in named)]
     smallest = {} if probe is None else _smallest({one.family: bound for one, bound, _ in asked}, probe)
     for one, bound, chance in asked:
@@ -56,17 +61,16 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
         limit = None
         if hidden is not None:
             limit = _limit(hidden.effect, hidden.amplitudes, revolute, one.best_visibility, "injected")
-        elif one.reach > 0.0 and np.isfinite(bound):
+        elif effect.fixed_amplitudes is None and one.reach > 0.0 and np.isfinite(bound):
             amplitudes = (np.sqrt(bound) + _SIDE * np.sqrt(chance)) / one.reach * np.eye(one.width)[0]
             limit = _limit(effect, amplitudes, revolute, one.best_visibility, "analytic")
-        if limit is None:
-            continue
-        told, possible = limit
-        if possible and (hidden is None or hidden.found):
+        told, possible = limit or (None, False)
+        if told is not None and possible and (hidden is None or hidden.found):
             found.append(told)
             continue
-        why = ("these logs cannot show it: no arm has so much of it that they would"
-               if hidden is None or hidden.found else "hidden in these logs it was found at no strength")
+        if told is None and (one.family.event or effect.fixed_amplitudes is not None or not np.isfinite(bound)):
+            continue
+        why = _AT_NONE if hidden is not None and not hidden.found else _TOO_MUCH
         beyond.append(NotTestable(effect.name, effect.joint, why, effect.experiment))
     return tuple(found), tuple(beyond)
 
@@ -74,17 +78,23 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
 def _smallest(bounds: Mapping[Family, float], probe: Probe) -> dict[Family, Hidden | None]:
     """Of each family, by two processes."""
     _ = probe.draws, probe.absorbing  # once, before there are two
-    found = for_each(probe.data, lambda family: smallest_hidden(family, bounds[family], probe), tuple(bounds),
-                     (probe.fit, probe.final.fit), probe.arms.now, probe.arms.start)
+
+    def hidden(family: Family) -> Hidden | None:
+        return (smallest_hidden if family.shapes[0].fixed_amplitudes is None else weakest)(family, bounds[family], probe)
+
+    found = for_each(probe.data, hidden, tuple(bounds), (probe.fit, probe.final.fit), probe.arms.now, probe.arms.start)
     return dict(zip(bounds, found, strict=True))
 
 
 def _limit(effect: Effect, amplitudes: Array, revolute: tuple[bool, ...], visibility: float,
            way: Literal["injected", "analytic"]) -> tuple[Detectable, bool] | None:
     """The reported parameter that goes with the amplitudes, and whether its range holds it."""
-    if effect.fixed_amplitudes is not None:
-        return None
     values = effect.values(amplitudes)
+    if effect.fixed_amplitudes is not None:
+        q = next(q for q in effect.parameters if q.name == effect.grows_with)
+        unit = q.unit_at(effect.joint is None or revolute[effect.joint - 1])
+        return Detectable(effect.name, effect.joint, q.name, Value(values[q.name], None, unit), {}, way, visibility,
+                          effect.strength < 0.0), True
     main = next((q for q in effect.parameters if not q.shape and not q.derived and values.get(q.name)
                  and np.isfinite(values[q.name])), None)
     if main is None:

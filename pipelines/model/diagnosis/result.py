@@ -14,10 +14,11 @@ from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
 
-__all__ = ["BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof", "Rejected",
-           "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain", "Trial", "Value",
-           "Verdict"]
+__all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof",
+           "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain",
+           "Trial", "Value", "Verdict", "WithoutLimit"]
 
+RIVALS = 0.8  # similarity from which two causes explain the same
 Verdict = Literal["cause", "nothing-wrong", "unknown"]
 
 
@@ -154,6 +155,7 @@ class Detectable:
     at: dict[str, Value] = field(default_factory=dict)  # non-linear numbers for which it is: order, speed
     way: Literal["injected", "analytic"] = "analytic"  # hidden in these logs and found, or worked out
     visibility: float = float("nan")  # part of its columns that the refitted model cannot absorb
+    or_less: bool = False  # of less of the parameter there is more of the cause: of a limit, the largest that would have been found
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,14 @@ class NotTestable:
     joint: int | None
     reason: str  # "absorbed by p3, p5, p9, p13; needs a reference log"
     record: str  # what to record instead
+
+
+@dataclass(frozen=True)
+class WithoutLimit:
+    """A cause that was looked for, or is none, and of which no size is to tell."""
+
+    cause: str
+    reason: str  # what was seen of it
 
 
 @dataclass(frozen=True)
@@ -182,7 +192,8 @@ class Trial:
     step: int  # from 1: the search for the first, second … finding
     cause: str
     joint: int | None
-    gain: float  # share of the squared weighted residual that it takes away, held out
+    gain: float  # share of the squared weighted residual that it takes away, held out; of base parameters that have moved, of
+    # what one set of them for before and after leaves more
     threshold: float  # that it had to exceed
     visibility: float
     exact_gain: float  # the same after the exact refit; NaN where it was not refitted
@@ -272,3 +283,5 @@ class Diagnosis:
     nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding, with what stands
     extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects
     calibration: Calibration | None = field(default=None, metadata=NOT_STORED, repr=False)  # thresholds
+    unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
+    without_limit: tuple[WithoutLimit, ...] = ()  # causes of the library that no other list has

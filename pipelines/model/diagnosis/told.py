@@ -18,7 +18,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.shared_work import meanwhile
 from pipelines.model.diagnosis.beside import Judged, acted, judged
 from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.compliance import untold
+from pipelines.model.diagnosis.compliance import gaps_untold, untold
 from pipelines.model.diagnosis.doubted import unlike_held_out
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
@@ -76,7 +76,8 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
     with meanwhile(partial(followed_by, arms, first.held.prepared.logs)) if arms else nullcontext(lambda: known) as followed:
         limits = limits or partial(limits_of, done.found.steps[-1], case, first)
         found, beyond = limits() if chosen.limits else ((), ())
-        hidden = (*told.not_testable, *beyond, *untold(first.stiff, chosen.without))
+        hidden = (*told.not_testable, *beyond, *untold(first.stiff, chosen.without),
+                  *gaps_untold(first.stiff, chosen.without))
         return with_simulation(replace(told, detectable=found, not_testable=hidden), followed())
 
 
@@ -155,7 +156,7 @@ def limits_of(last: Step, case: Case, first: Responding, probed: Probed | None =
     arms = case.arms(last.before.model)
     probe, bounds = ((Probe.of(last.before, case.judge, arms), last.thresholds) if probed is None else
                      probed(last.before, case.judge, arms))
-    return detectable(last.screened, bounds, first.held.prepared.data.logs[0].log.robot.revolute, probe)
+    return detectable(last.screened, bounds, first.held.prepared.data.logs[0].log.robot.revolute, probe, case.nameable)
 
 
 def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool], left: Array) -> str:

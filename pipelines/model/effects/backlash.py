@@ -59,6 +59,7 @@ class Backlash(Effect):
     twins = ("joint_elasticity", "presliding")
     needs = ("reversals of torque, or frequency responses at two amplitudes",)
     fixed_amplitudes = (1.0,)
+    grows_with = "gap"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

@@ -71,6 +71,7 @@ class Effect(ABC):
     twins: ClassVar[tuple[str, ...]] = ()  # effects it can be mistaken for
     needs: ClassVar[tuple[str, ...]] = ()  # what beyond position and torque it takes to see it: "reference log"
     fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
+    grows_with: ClassVar[str] = ""  # where physics gives all amplitudes: the number that says how much of it there is
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
     evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
@@ -138,6 +139,11 @@ class Effect(ABC):
     def believable(self, motions: Sequence[Motion], arm: ArmModel) -> bool:
         """Whether an arm with it, in this shape, could have moved as it did in these logs."""
         return True
+
+    @property
+    def strength(self) -> float:
+        """How much of it there is, where physics gives the amplitudes; negative for what grows as its number falls."""
+        return float(getattr(self, self.grows_with)) if self.grows_with else 0.0
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ class TorqueSaturation(Effect):
     twins = ("torque_gain", "load_friction", "quadratic_drag")
     in_drive = True
     fixed_amplitudes = (1.0,)
+    grows_with = "limit"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self._excess(motion, self.own(self._asked(motion, arm)), self.limit))
@@ -49,6 +50,11 @@ class TorqueSaturation(Effect):
         peak = max(float(np.abs(self.own(self._asked(motion, arm))).max()), 1e-3)
         for share in (0.45, 0.55, 0.65, 0.75, 0.82, 0.88, 0.94):
             yield replace(self, limit=float(np.clip(share * peak, 1e-3, 1e5)))
+
+    @property
+    def strength(self) -> float:
+        """The lower the limit, the more is clipped."""
+        return -self.limit
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)

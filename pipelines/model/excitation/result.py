@@ -97,6 +97,7 @@ class Result:
     rehearsal: Rehearsal | None = None
     rehearsal_failed: str = ""
     rehearsals: tuple[tuple[str, Rehearsal], ...] = ()  # of plans, by name
+    robot_from: str = ""  # why this robot, where none was named
     apart: Apart | None = None  # of a design that tells two causes apart
     logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
     table: ControllerTable | None = field(default=None, metadata=NOT_STORED)

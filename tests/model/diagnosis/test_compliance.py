@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.compliance import compliance, untold
+from pipelines.model.diagnosis.compliance import Compliance, compliance, gaps_untold, untold
 from sample_logs.make_model import synthetic_arm
 
 SAMPLES = Path(__file__).resolve().parents[3] / "sample_logs" / "rrr-healthy"
@@ -31,6 +31,15 @@ def test_without_responses_what_gives_way_is_not_testable() -> None:
     told = {one.cause: one for one in untold(None)}
     assert set(told) == {"base_resonance", "joint_elasticity"}
     assert all("no frf log" in one.reason and one.record for one in told.values())
+
+
+def test_a_gap_is_told_from_a_spring_by_responses_alone() -> None:
+    """Without them, and beside a spring, it has no name; where they show a rigid arm it has."""
+    sprung = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm())
+    assert ["no frf log" in one.reason for one in gaps_untold(None)] == [True]
+    assert ["name a spring" in one.reason for one in gaps_untold(sprung)] == [True]
+    assert gaps_untold(Compliance((), True, "")) == ()
+    assert gaps_untold(None, ("backlash",)) == ()
 
 
 def test_responses_of_no_use_are_said() -> None:

@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.limits import _absorbed, detectable
 from pipelines.model.diagnosis.result import Detectable, Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects import effect_names
 from pipelines.model.effects.rotor_inertia import RotorInertia
 from tests.diagnose.sessions import but
 
@@ -78,6 +79,27 @@ def test_well_below_its_limit_it_is_not() -> None:
     """The limit covers both signs: at 0.7 of it the worse one is not found."""
     assert not all(named(7, "torque_offset", 3, part, FEW) for part in (0.7, -0.7))
     assert not named(7, "cogging", 2, 0.4, FEW)
+
+
+def test_at_its_limit_a_clipped_drive_is_found_and_well_above_it_is_not() -> None:
+    """Of a drive that clips there is more the lower it does: three in a hundred below, and three tenths above."""
+    few = but("torque_saturation", "torque_offset", "torque_gain")
+    there = limit(7, "torque_saturation", 3, few)
+    assert (there.parameter, there.way, there.or_less) == ("limit", "injected", True)
+    assert isinstance(there.smallest.value, float)
+    full = make("torque_saturation", machine(7), 3, 1)
+    for part, seen in ((0.97, True), (1.3, False)):
+        fault: Any = replace(full, peak=full.peak * part * there.smallest.value / full.limit)  # type: ignore[attr-defined,call-arg]
+        found = diagnose(logs(7, fault), replace(settings(few), limits=False))
+        assert [(one.cause, one.joint) for one in found.findings] == ([("torque_saturation", 3)] if seen else [])
+
+
+def test_nothing_of_the_library_goes_unsaid() -> None:
+    """Of each cause there is a finding, a smallest size, a record that would show it, or what was seen of it."""
+    found = healthy(7, FEW)
+    lists = (found.findings, found.standing, found.detectable, found.not_testable, found.without_limit)
+    assert {one.cause for some in lists for one in some} == set(effect_names()) - set(FEW)
+    assert all(one.reason for one in (*found.not_testable, *found.without_limit))
 
 
 @pytest.mark.slow

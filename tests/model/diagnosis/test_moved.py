@@ -134,12 +134,15 @@ def test_base_parameters_that_moved_as_no_cause_moves_them_are_no_arm_in_order(w
 @pytest.mark.parametrize(("mass", "verdict"), [(0.3, "unknown"), (0.0, "nothing-wrong")])
 def test_a_load_that_is_not_accepted_leaves_no_arm_in_order(mass: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The base parameters have moved all the same, and the ledger says why the load has no name."""
-    doubted = SimpleNamespace(doubt="it is farther", finding=SimpleNamespace(cause="payload", joint=None))
+    doubted = SimpleNamespace(doubt="it is farther", gained=-0.2, finding=SimpleNamespace(cause="payload", joint=None))
     monkeypatch.setattr(changed_module, "carried", lambda *_: doubted)
     found = diagnose(Logs((loaded(1, mass), loaded(2, mass)), (loaded(3, mass, "validate"),),
                           (loaded(4, 0.0, "reference"), loaded(5, 0.0, "reference"))), SETTINGS)
     assert (found.verdict, found.findings) == (verdict, ())
     assert [one.reason for one in found.rejected if one.cause == "payload"] == (["it is farther"] if mass else [])
+    told = [(one.reason, one.accepted) for one in found.ledger if one.cause == "payload"]
+    assert told == ([("it is farther", False)] if mass else [])
+    assert found.unmoved_rms is None
 
 
 def altered(error: float, mass: float = 0.0) -> Arm:

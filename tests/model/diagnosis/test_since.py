@@ -66,6 +66,18 @@ def test_a_load_at_the_tip_is_named_by_the_base_parameters(loaded: Diagnosis) ->
     assert loaded.findings[0].origin == "base parameters"
 
 
+def test_the_ledger_has_the_load_and_what_the_arm_of_before_leaves_stands_beside_it(loaded: Diagnosis) -> None:
+    """Fitted anew the base parameters hide it: half a newton metre and more goes by what they were before."""
+    line = loaded.ledger[-1]
+    assert (line.cause, line.joint, line.accepted) == ("payload", None, True)
+    assert line.gain > line.threshold
+    assert line.exact_gain > 0.9
+    assert loaded.unmoved_rms is not None
+    assert np.linalg.norm(loaded.unmoved_rms.validate) > 5.0 * np.linalg.norm(loaded.residual_rms.validate)
+    gain = loaded.findings[0].gain.validate_torque_rms
+    assert loaded.unmoved_rms.validate == pytest.approx(gain.before, rel=0.02)
+
+
 def test_the_load_is_worth_what_it_weighs_and_the_model_has_it_apart(loaded: Diagnosis) -> None:
     """Without it the held-out torque is far off. The model's base parameters are those of the bare arm, the load is an effect."""
     gain = loaded.findings[0].gain.validate_torque_rms

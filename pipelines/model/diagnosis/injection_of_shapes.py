@@ -1,0 +1,73 @@
+"""The weakest of a cause whose torque physics gives: of a clipped drive or a gap nothing but a non-linear number says how much.
+
+    hidden = weakest(family, bound, probe)          the shape; None where no shape of it could be
+
+Each shape of the family is put into what the final model leaves, once and as it is, and the model is fitted anew. It is found where
+the best shape, which need not be the hidden one, takes more off the squared residual than the threshold, and what is held out
+becomes smaller by more than chance does: the same that `injection` asks for, with nothing to scale. The weakest is the one from
+which on every stronger one that is tried is found as well: weaker ones than the weakest that is tried may be found too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import takewhile
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.candidates import Family, Laid, lay_family
+from pipelines.model.diagnosis.injection import Draw, Hidden, Probe, held_out, quadratics
+from pipelines.model.effects.base import Effect
+
+__all__ = ["weakest"]
+
+_SHAPES = 8  # of a family that are hidden, and looked for: of a gap, each of another width and lubricant
+_RANK = 0.75  # of the shapes of one strength, which differ in a lubricant say, so many have to be found
+
+
+def weakest(family: Family, bound: float, probe: Probe) -> Hidden | None:
+    """The shape from which on all stronger ones are found.
+
+    Args:
+        bound: the gain that the cause has to exceed.
+    """
+    given = family.shapes[0].fixed_amplitudes
+    if family.event or given is None or not np.isfinite(bound):
+        return None
+    amplitudes = np.array(given)
+    some = np.unique(np.linspace(0, len(family.shapes) - 1, min(len(family.shapes), _SHAPES)).round().astype(int)).tolist()
+    family = replace(family, shapes=tuple(family.shapes[place] for place in some))
+    laid = tuple(lay_family(probe.data, family, probe.arms.of(family)))
+    hidden = list(_hidden(family, laid, amplitudes, probe))
+    if not hidden:
+        return None
+    gains = np.full(len(hidden), -np.inf)
+    for alone, both, nothing in quadratics(laid, probe, np.array([left for _, _, left in hidden])):
+        gains = np.maximum(gains, (alone + 2.0 * both + nothing).max(axis=0))
+    shown: dict[float, list[tuple[Effect, Array, bool]]] = {}
+    for (effect, columns, _), gain in zip(hidden, gains.tolist(), strict=True):
+        shown.setdefault(effect.strength, []).append((effect, columns, gain > bound))
+    strongest = (shown[strength] for strength in sorted(shown, reverse=True))
+    passing = list(takewhile(lambda some: np.mean([found for *_, found in some]) >= _RANK, strongest))
+    last = next((some[0][0] for some in reversed(passing) if _seen_held_out(some, amplitudes, probe)), None)
+    return Hidden(last or hidden[0][0], amplitudes, last is not None)
+
+
+def _hidden(family: Family, every: Iterable[Laid], amplitudes: Array, probe: Probe) -> Iterator[tuple[Effect, Array, Array]]:
+    """Each shape that such an arm could have, its columns (k, rows of the final model), and what the fit leaves of it, weighted."""
+    motions = [log.motion for log in probe.final.data.logs]
+    for laid in every:
+        for place, table in enumerate(laid.table, laid.first):
+            effect = family.shapes[place]
+            if effect.possible(effect.values(amplitudes)) and effect.believable(motions, probe.arms.now):
+                columns = probe.own(laid.rows, table)
+                yield effect, columns, probe.left_of(amplitudes @ columns)
+
+
+def _seen_held_out(some: list[tuple[Effect, Array, bool]], amplitudes: Array, probe: Probe) -> bool:
+    """Whether the first of them that is found makes what is held out smaller, when it is fitted."""
+    effect, columns, _ = next(one for one in some if one[2])
+    (factor,) = held_out(Draw(effect, columns, amplitudes, 1.0), [amplitudes], probe)
+    return factor(1.0) == 1.0
