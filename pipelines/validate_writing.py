@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.errors import NothingMatched, UsageError
-from pipelines.log.derive import derive
+from pipelines.log.canonical import digest_of
+from pipelines.log.derive import derive, recording
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.model_file import ModelFile, read_model
@@ -97,6 +98,8 @@ def read(request: Request, settings: Settings) -> Inputs:
     inputs = read_logs(request, settings) if request.paths or request.roles else Inputs()
     found = settings.model if settings.model is not None else _left_in(request.paths)
     model = None if found is None else read_model(found)
+    if model is not None and settings.model is None and request.session and not _of(model, inputs):
+        found = model = None  # another robot's, or of another day
     sources = [] if found is None or not Path(found).is_file() else [Path(found).absolute()]
     said = f"{Path(found).name} of the folder" if found is not None else ""
     said = said if settings.model is None else f"{Path(settings.model).name}, as given"
@@ -123,6 +126,12 @@ def _left_in(paths: Sequence[Path]) -> str | None:
             if folder.is_dir() and file.is_file():
                 return str(file)
     return None
+
+
+def _of(model: ModelFile, inputs: Inputs) -> bool:
+    """Whether a model was fitted to some of these logs."""
+    ours = {digest_of(recording(opened.log)) for opened in inputs.logs}
+    return any(source.sha256 in ours for source in model.sources)
 
 
 def _robot(request: Request, inputs: Inputs) -> tuple[RobotDescription, list[Path]]:

@@ -40,7 +40,7 @@ def each_by_itself(stage: Any, request: Request, settings: Any, several: Several
         print(f"{clean(several.message[:1].upper() + several.message[1:])}. Each by itself:", file=stream)
     codes, objects = [], []
     for name in several.names:
-        out = None if request.out is None else request.out / slug(name)
+        out = None if request.out is None else request.out / slug(name.replace(" ", "-"))
         if not common.quiet:
             print(f"\n{clean(name, 80)}", file=stream, flush=True)
         code, told = _one(stage, replace(request, session=name, out=out), settings, common, teller)

@@ -16,9 +16,9 @@ from pipelines.log.files import Opened, find_logs, open_log
 from pipelines.log.places import written_by
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
-from pipelines.log.sessions import apart
+from pipelines.log.sessions import Session, apart, called
 
-__all__ = ["Inputs", "Rejected", "Request", "read_by_role", "read_logs"]
+__all__ = ["Inputs", "Rejected", "Request", "only", "read_by_role", "read_logs"]
 
 _NAMED: Final = 6  # rejected files, in one error
 
@@ -114,11 +114,16 @@ def _of_session(inputs: Inputs, wanted: str) -> Inputs:
     if not wanted:
         return inputs
     found = apart(inputs.logs, inputs.named)
-    one = next((session for session in found if session.name == wanted), None)
+    one = called(wanted, found)
     if one is None:
         names = [session.name for session in found]
         raise UsageError("C01", f"no session '{wanted}'{did_you_mean(wanted, names)}", where="--session",
                          remedy=f"there are: {', '.join(names)}")
+    return only(inputs, one)
+
+
+def only(inputs: Inputs, one: Session) -> Inputs:
+    """The inputs with the logs of that session alone; what others were read from is no source of it."""
     kept = {opened.path for opened in one.logs}
     others = {opened.path for opened in inputs.logs} - kept
     return dataclasses.replace(

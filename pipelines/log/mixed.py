@@ -1,7 +1,7 @@
 """Refuse to take the logs of several robots or days for one, and say where nothing but the folder tells two apart.
 
     of_one_session(inputs, reads)   the logs of one; SeveralSessions, with the name of each, where a stage would mix them
-    check_alike(inputs)             S21: logs of one name in two folders, which nothing in them tells apart
+    check_alike(inputs)             S21: logs of one name in two folders, which nothing in them tells apart; another day that judges
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Final
 from pipelines.errors import Check, UsageError, clean
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
-from pipelines.log.inputs import Inputs
-from pipelines.log.sessions import Session, apart
+from pipelines.log.inputs import Inputs, only
+from pipelines.log.sessions import Session, apart, judged_later
 
 __all__ = ["SeveralSessions", "check_alike", "of_one_session"]
 
@@ -46,8 +46,7 @@ def of_one_session(inputs: Inputs, reads: Callable[[ExperimentLog], bool]) -> In
     if len(parts) < 2 or not every:
         return inputs
     if (whole := next((session for session, used in parts if len(used) == len(every)), None)) is not None:
-        kept = {opened.path for opened in whole.logs}
-        return replace(inputs, logs=tuple(opened for opened in inputs.logs if opened.path in kept), robot_name=whole.robot)
+        return only(inputs, whole)
     raise _several(inputs, [(session, used) for session, used in parts if not _within_another(used, parts)])
 
 
@@ -96,7 +95,8 @@ def _members(used: list[Opened], homes: dict[Path, set[str]]) -> str:
 
 def check_alike(inputs: Inputs) -> tuple[Check, ...]:
     """S21: a log's name is unique within a folder of logs. Where two folders below it have logs of one name, and neither robot nor
-    day tells them apart, they may well be of two machines: they are taken for one, and that is said."""
+    day tells them apart, they may well be of two machines: they are taken for one, and that is said. So is a day whose
+    logs judge those of another."""
     found = []
     for session in apart(inputs.logs, inputs.named):
         folders = _doubled(opened for opened in session.logs if opened.path not in inputs.named)
@@ -108,6 +108,10 @@ def check_alike(inputs: Inputs) -> tuple[Check, ...]:
                 "session", where=clean(session.name, 60),
                 remedy="if they are of two machines or sessions, give each folder by itself, or let their logs say so: robot_name, "
                 "recorded"))
+        named_none = replace(session, logs=tuple(opened for opened in session.logs if opened.path not in inputs.named))
+        if day := judged_later(named_none):
+            found.append(Check.of("S21", "warn", f"its logs of {day}, which all judge, were taken with it",
+                                  where=clean(session.name, 60), remedy="if that is another session, name its logs by --validate"))
     return tuple(found)
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from pipelines.log.files import Opened
 
-__all__ = ["Session", "apart", "sessions"]
+__all__ = ["Session", "apart", "called", "judged_later", "sessions"]
 
 Key = tuple[str, str, str]
 
@@ -48,6 +48,12 @@ def apart(logs: Iterable[Opened], named: Collection[Path] = ()) -> tuple[Session
         own = "-".join(filter(None, (day, str(i + 1) if again else ""))) if robots.count(robot) > 1 else ""
         found.append(Session(f"{names[i]} ({i + 1})" if again else names[i], robot, description, tuple(members), own))
     return tuple(found)
+
+
+def called(wanted: str, found: Collection[Session]) -> Session | None:
+    """The session of this name, or the only one of the robot of this name."""
+    of_robot = [one for one in found if one.robot == wanted]
+    return next((one for one in found if one.name == wanted), of_robot[0] if len(of_robot) == 1 else None)
 
 
 def sessions(logs: Iterable[Opened], named: Collection[Path] = ()) -> dict[Key, list[Opened]]:
@@ -91,12 +97,19 @@ def _undated(groups: dict[Key, list[Opened]]) -> None:
 
 def _judged_later(groups: dict[Key, list[Opened]]) -> None:
     """Put days whose logs all judge to the day whose model they judge: by themselves they say nothing."""
-    judging = [key for key, logs in groups.items() if all(opened.log.role == "validate" for opened in logs)]
+    judging = [key for key, logs in groups.items() if key[2] and all(opened.log.role == "validate" for opened in logs)]
     for key in judging:
-        days = sorted(other for other in groups if other[:2] == key[:2] and other not in judging)
+        days = sorted(other for other in groups if other[:2] == key[:2] and other[2] and other not in judging)
         if days:
             before = [other for other in days if other[2] <= key[2]]
             groups[before[-1] if before else days[0]] += groups.pop(key)
+
+
+def judged_later(session: Session) -> str:
+    """The last day of which a session has logs that judge but none that is judged; "" where there is none."""
+    days = {role: {(o.log.recorded or "")[:_DATE] for o in session.logs if (o.log.role == "validate") is role and o.log.recorded}
+            for role in (True, False)}
+    return max(days[True] - days[False], default="") if days[False] else ""
 
 
 def _across_midnight(by_day: list[tuple[Key, Opened]]) -> list[tuple[Key, Opened]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pipelines.model.diagnosis.result import Diagnosis, Trial
-from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_words import named, per_joint
 from pipelines.report.joint_units import Units
 
@@ -24,8 +23,6 @@ def unmoved_words(found: Diagnosis, units: Units) -> str:
             f"nominal model leaves {per_joint(found.residual_rms.validate)} {units.torque}. ")
 
 
-def of_moved(trials: Sequence[Trial], found: Diagnosis) -> str:
+def of_moved(trials: Sequence[Trial]) -> str:
     """What the gain of a cause that base parameters show is a share of; empty where no trial is of one."""
-    kinds = {one.cause for one in found.findings if one.origin == "base parameters"}
-    there = any(one.cause in kinds or find_effect(one.cause).evidence == "base parameters" for one in trials)
-    return _OF_MOVED if there else ""
+    return _OF_MOVED if any(one.of == "base parameters" for one in trials) else ""

@@ -130,6 +130,8 @@ def _nearest(ledger: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
     """What each cause takes off the residual at most; to first order where it was not fitted, for it stayed below its threshold."""
     found: dict[tuple[str, int | None], float] = {}
     for t in ledger:
+        if t.of != "residual":
+            continue
         gain = t.exact_gain if math.isfinite(t.exact_gain) else t.gain
         if gain > found.get((t.cause, t.joint), 0.0):
             found[t.cause, t.joint] = gain
@@ -164,7 +166,7 @@ def _others(result: Result) -> list[Section]:
             ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
             "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
             f"believed. {_OUT_OF_REACH} So is that of a cause that takes next to nothing: none was worked out."
-            f"{_alike(len(result.residual_rms.identify))}{of_moved(shown, result)}", tones),)))
+            f"{_alike(len(result.residual_rms.identify))}{of_moved(shown)}", tones),)))
     return sections
 
 

@@ -9,7 +9,7 @@ import pytest
 from pipelines.log.files import Opened
 from pipelines.log.inputs import Inputs
 from pipelines.log.mixed import SeveralSessions, check_alike, of_one_session
-from pipelines.log.sessions import apart
+from pipelines.log.sessions import apart, called
 from tests.log.logs import ROBOT_TEXT, small_log
 
 DAY, NEXT, LATER = "2026-03-02T09:00:00Z", "2026-03-03T09:00:00Z", "2026-05-18T09:00:00Z"
@@ -52,11 +52,32 @@ def test_a_day_that_only_judges_goes_with_the_day_it_judges() -> None:
     assert list(together(tuesday, opened("d", recorded=LATER, role="validate")).values()) == [{"b"}, {"d"}]
 
 
-def test_a_log_that_tells_no_day_is_of_no_other() -> None:
+def test_another_day_that_judges_is_said() -> None:
+    """A year later, and told as an error of the model otherwise. One that the user named to judge is no news."""
+    monday, tuesday = opened("a", recorded=DAY), opened("b", recorded=LATER, role="validate")
+    (said,) = check_alike(Inputs((monday, tuesday)))
+    assert (said.code, said.level, said.where) == ("RRID-S21", "warn", "rrr-tue 2026-03-02")
+    assert "2026-05-18" in said.message
+    assert not check_alike(Inputs((monday, tuesday), named=frozenset([tuesday.path])))
+    assert not check_alike(Inputs((monday, opened("c", recorded=DAY, role="validate"))))
+
+
+@pytest.mark.parametrize("role", ["identify", "validate"])
+def test_a_log_that_tells_no_day_is_of_no_other(role: str) -> None:
     """Beside one day it is of that; beside two nobody knows of which."""
-    undated, first, second = opened("a", recorded=None), opened("b", recorded=DAY), opened("c", recorded=NEXT)
-    assert list(together(undated, first).values()) == [{"a", "b"}]
+    undated, first, second = opened("a", recorded=None, role=role), opened("b", recorded=DAY), opened("c", recorded=NEXT)
+    assert list(together(undated, first).values()) == [{"b", "a"}]
     assert list(together(undated, first, second).values()) == [{"a"}, {"b"}, {"c"}]
+
+
+def test_a_robot_of_one_day_is_called_by_its_name() -> None:
+    """Without its date, as long as it has no other."""
+    a, b, later = (opened("a", robot_name="arm-a", recorded=DAY), opened("b", robot_name="arm-b", recorded=DAY),
+                   opened("c", robot_name="arm-a", recorded=NEXT))
+    one = called("arm-a", apart((a, b)))
+    assert one is not None
+    assert one.logs == (a,)
+    assert called("arm-a", apart((a, b, later))) is None
 
 
 def test_a_named_log_of_another_robot_stays_apart() -> None:

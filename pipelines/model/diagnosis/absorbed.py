@@ -96,7 +96,7 @@ class Absorbed:
 
     @property
     def taken(self) -> float:
-        """Share of the squared residual beside one set of base parameters for before and after, that it takes away."""
+        """Of the squared residual that one set of base parameters leaves: the share of how they moved, as far as it explains it."""
         return self.explained * self._share
 
     @property

@@ -98,7 +98,11 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
     told = replace(told, question="what has changed", standing=(*first.standing, *since.standing))
     if isinstance(moved, Unexplained):
         return _nameless(told, _MOVED.format(moved.times)) if told.verdict == "nothing-wrong" else told
-    return told if moved is None else _with_moved(told, moved, done.found, now, case, chosen)
+    if moved is None:
+        return told
+    loaded = _with_moved(told, moved, done.found, now, case, chosen)
+    # Of rows that lack what responses have named, the figure would not be that of the nominal model.
+    return replace(loaded, unmoved_rms=None) if first.held.acting else loaded
 
 
 def _drives(first: Responding, reference: Data, since: Since, seed: int) -> DriveNoise | None:
@@ -171,8 +175,9 @@ def _with_moved(told: Diagnosis, moved: Absorbed, found: Found, now: Prepared, c
 
 
 def _not_accepted(told: Diagnosis, moved: Absorbed, why: str, gained: float = np.nan) -> Diagnosis:
-    """With the reason among what is rejected, and in the ledger beside what it gains."""
-    return replace(told, rejected=(*told.rejected, Rejected(moved.effect.name, moved.effect.joint, why)),
+    """With the reason among what is rejected, its rivals with it, and in the ledger beside what it gains."""
+    places = dict.fromkeys((one.name, one.joint) for one in (moved.effect, *moved.rivals))
+    return replace(told, rejected=(*told.rejected, *(Rejected(name, joint, why) for name, joint in places)),
                    ledger=(*told.ledger, line_of_moved(moved, told.ledger, gained, why)))
 
 

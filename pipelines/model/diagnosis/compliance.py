@@ -26,7 +26,7 @@ __all__ = ["Compared", "Compliance", "compared", "compliance", "gaps_untold", "u
 _MOVED = 3.0  # standard deviations, by which a base's frequency or a joint's stiffness is another one
 _SAME = 0.03  # of it, within which two sessions show the same one: temperature, and how the arm stood
 _NO_RESPONSES = "a gap is told from a spring by frequency responses that show none, and there is no frf log"
-_SPRING = "the frequency responses name a spring, and beside it a gap is not told from it"
+_GIVES_WAY = "the frequency responses name something that gives way, and beside it a gap is not told from it"
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,8 @@ def gaps_untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[N
     """Causes at reversals, which have a name only beside frequency responses that name no spring."""
     if told is not None and not told.named:
         return ()
-    reason = _NO_RESPONSES if told is None else _SPRING
-    return tuple(NotTestable(kind.name, None, reason, f"Measure frequency responses, which tell a spring. {kind.experiment}")
+    reason, first = (_NO_RESPONSES, "Measure frequency responses, which tell a spring. ") if told is None else (_GIVES_WAY, "")
+    return tuple(NotTestable(kind.name, None, reason, f"{first}{kind.experiment}")
                  for kind in all_effects() if kind.evidence == "reversals" and kind.name not in without)
 
 

@@ -24,7 +24,6 @@ from pipelines.model.effects.base import Effect
 __all__ = ["apart_from", "best_form", "fitted", "laid_whole", "plainer"]
 
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
-_DECIDED = 0.9  # of the squared error that another law of the same cause leaves, at least
 _NEARLY = 0.95  # of what the best shape explains
 _TELLS = 3.0  # standard deviations of a further number
 _ROUNDING = 1e-12  # of the largest variance, each number in its own deviations
@@ -134,7 +133,7 @@ def best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:
     for form in best.effect.forms():
         other = replace(_refitted(case, now, best.screened, form, error), sure=best.sure)
         further = chosen is best or _count(other) > _count(chosen)
-        if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < (_DECIDED if further else 1.0) * least:
+        if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < (form.decided if further else 1.0) * least:
             chosen, least = other, left
     return chosen
 

@@ -4,15 +4,16 @@
 
 Each shape of the family is put into what the final model leaves, once and as it is, and the model is fitted anew. It is found where
 the best shape, which need not be the hidden one, takes more off the squared residual than the threshold, and what is held out
-becomes smaller by more than chance does: the same that `injection` asks for, with nothing to scale. The weakest is the one from
-which on every stronger one that is tried is found as well: weaker ones than the weakest that is tried may be found too.
+becomes smaller by more than chance does: the same that `injection` asks for, with nothing to scale. The weakest is the one that is
+seen held out too, and from which on every stronger one that is tried is found as well: weaker ones than are tried may be found too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import takewhile
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,7 +24,10 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["weakest"]
 
-_SHAPES = 8  # of a family that are hidden, and looked for: of a gap, each of another width and lubricant
+T = TypeVar("T")
+
+_STRENGTHS, _ALIKE = 8, 3  # of a family that are hidden, and looked for; shapes of one strength: lubricants of a gap
+_SHAPES = 12  # at most
 _RANK = 0.75  # of the shapes of one strength, which differ in a lubricant say, so many have to be found
 
 
@@ -37,8 +41,7 @@ def weakest(family: Family, bound: float, probe: Probe) -> Hidden | None:
     if family.event or given is None or not np.isfinite(bound):
         return None
     amplitudes = np.array(given)
-    some = np.unique(np.linspace(0, len(family.shapes) - 1, min(len(family.shapes), _SHAPES)).round().astype(int)).tolist()
-    family = replace(family, shapes=tuple(family.shapes[place] for place in some))
+    family = replace(family, shapes=tuple(_some(family.shapes)))
     laid = tuple(lay_family(probe.data, family, probe.arms.of(family)))
     hidden = list(_hidden(family, laid, amplitudes, probe))
     if not hidden:
@@ -53,6 +56,21 @@ def weakest(family: Family, bound: float, probe: Probe) -> Hidden | None:
     passing = list(takewhile(lambda some: np.mean([found for *_, found in some]) >= _RANK, strongest))
     last = next((some[0][0] for some in reversed(passing) if _seen_held_out(some, amplitudes, probe)), None)
     return Hidden(last or hidden[0][0], amplitudes, last is not None)
+
+
+def _some(shapes: Sequence[Effect]) -> Iterator[Effect]:
+    """A few strengths from the whole range, each by a few of the shapes that have it."""
+    alike: dict[float, list[Effect]] = {}
+    for one in shapes:
+        alike.setdefault(one.strength, []).append(one)
+    each = min(max(map(len, alike.values())), _ALIKE)
+    for strength in _spread(sorted(alike), min(_STRENGTHS, _SHAPES // each)):
+        yield from _spread(alike[strength], each)
+
+
+def _spread(some: Sequence[T], most: int) -> list[T]:
+    """`most` of them, the first and the last among them."""
+    return [some[k] for k in np.unique(np.linspace(0, len(some) - 1, min(len(some), most)).round().astype(int)).tolist()]
 
 
 def _hidden(family: Family, every: Iterable[Laid], amplitudes: Array, probe: Probe) -> Iterator[tuple[Effect, Array, Array]]:

@@ -84,4 +84,5 @@ def line_of_moved(moved: Absorbed, trials: Sequence[Trial], held_out: float = np
         reason: why it is not accepted.
     """
     last = max((one.step for one in trials), default=1)
-    return Trial(last, moved.effect.name, moved.effect.joint, moved.taken, moved.least, 0.0, held_out, reason == ACCEPTED, reason)
+    return Trial(last, moved.effect.name, moved.effect.joint, moved.taken, moved.least, 0.0, held_out, reason == ACCEPTED, reason,
+                 "base parameters")

@@ -199,6 +199,7 @@ class Trial:
     exact_gain: float  # the same after the exact refit; NaN where it was not refitted
     accepted: bool
     reason: str
+    of: Literal["residual", "base parameters"] = "residual"  # what its gain is a share of
 
 
 @dataclass(frozen=True)

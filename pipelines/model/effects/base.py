@@ -116,6 +116,11 @@ class Effect(ABC):
         """A form with more numbers than any that is named: what it takes of a later finding is the rest of its own shape."""
         return self
 
+    @property
+    def decided(self) -> float:
+        """Share of the squared error that another law of the same cause leaves, that it leaves at most, to be taken instead."""
+        return 0.9
+
     def forms(self) -> tuple[Self, ...]:
         """Other laws of the same cause, each to be tried in place of this one, which is the most likely."""
         return ()

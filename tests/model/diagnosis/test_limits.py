@@ -20,8 +20,9 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.injection import _last_root, _raised
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.limits import _absorbed, detectable
-from pipelines.model.diagnosis.result import Detectable, Diagnosis
+from pipelines.model.diagnosis.result import Detectable, Diagnosis, Rejected
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.without_limit import without_limit
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.rotor_inertia import RotorInertia
 from tests.diagnose.sessions import but
@@ -99,7 +100,19 @@ def test_nothing_of_the_library_goes_unsaid() -> None:
     found = healthy(7, FEW)
     lists = (found.findings, found.standing, found.detectable, found.not_testable, found.without_limit)
     assert {one.cause for some in lists for one in some} == set(effect_names()) - set(FEW)
-    assert all(one.reason for one in (*found.not_testable, *found.without_limit))
+
+
+@pytest.mark.parametrize(("cause", "frf", "refused", "said"), [
+    ("coulomb", False, "", "part of the nominal model"), ("three_sigmoid", False, "", "another law of friction"),
+    ("joint_elasticity", True, "", "frequency responses show none"), ("joint_elasticity", False, "", "was looked for"),
+    ("payload", False, "", "not found to have moved"), ("cogging", False, "", "was looked for"),
+    ("payload", False, "the base parameters have moved as link_length or payload moves them", "have moved as link_length")])
+def test_what_has_no_limit_is_said_as_it_was_seen(cause: str, frf: bool, refused: str, said: str) -> None:
+    """A law of the model, a spring that responses deny, what did not move; what was refused, by the words it was refused with."""
+    rejected = (Rejected(cause, None, refused),) if refused else ()
+    told = replace(healthy(7, FEW), rejected=rejected, findings=(), standing=(), detectable=(), not_testable=())
+    (reason,) = (one.reason for one in without_limit(told, frf) if one.cause == cause)
+    assert said in reason
 
 
 @pytest.mark.slow

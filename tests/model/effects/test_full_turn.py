@@ -42,6 +42,13 @@ def test_stops_that_leave_330_degrees_leave_whole_orders(degrees: float, told: b
     assert effect("cogging").again(motion) is told
 
 
+def test_short_of_a_full_turn_one_wave_is_the_curve_of_a_spring() -> None:
+    """A cable that tightens towards a stop: on a circle that is not closed no wave of one or one and a half takes its place."""
+    lowest = [min(one.order for one in effect("cogging").shapes(turning(2.0 * np.pi * turns), FREE))  # type: ignore[attr-defined]
+              for turns in (0.95, 1.0)]
+    assert lowest == [2.0, 1.0]
+
+
 @pytest.mark.parametrize("period", [0.008, 0.03, 0.1])
 def test_a_slide_is_searched_for_the_teeth_that_slides_have(period: float) -> None:
     """Leads of screws and poles of linear motors: over 0.6 m a wave of the grid follows them within half a period."""
