@@ -148,6 +148,9 @@ def _refuse_strange(settings: Settings) -> None:
     """C01, C02 for a setting that makes no sense."""
     for cause in settings.without:
         refuse_unknown(cause, "--without")
+        if ":" in cause:
+            raise UsageError("C02", f"'{cause}': a cause is left out as a whole, at every joint", where="--without",
+                             remedy=f"write {cause.split(':')[0]}")
     if settings.blocks < _FEWEST_BLOCKS:
         raise UsageError("C02", f"{settings.blocks} blocks", where="--blocks", remedy="give 2 or more")
     if settings.replicas < 0 or settings.replicas > 1000:

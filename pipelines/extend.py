@@ -113,17 +113,23 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     said = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
                                min_speed=settings.min_speed)
-    found = extend(chosen, tuple({one.place: one for one in wanted}.values()), engine, given.arm, given.tell, memory)
+    found = extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),
         notes=(f"fitted by rrrid extend, with {', '.join(_place(one.cause, one.joint) for one in found.findings)}",))
     return Extension(
-        accepted=not found.rejected, causes=tuple(one.place for one in wanted), findings=found.findings, rejected=found.rejected,
+        accepted=not found.rejected, causes=tuple(dict.fromkeys(one.place for one in wanted)), findings=found.findings,
+        rejected=found.rejected,
         gain=found.gain, residual_rms=found.before, after_rms=found.after, held_out=found.held_out,
         standing=tuple(one.place for one in found.standing), robot=name, joints=tuple(joint.name for joint in robot.joints),
         rated=tuple(joint.torque for joint in robot.joints), doctor=said, model=model, derived=_derived(found, settings),
         laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name)
+
+
+def _each(wanted: Sequence[Wanted]) -> tuple[Wanted, ...]:
+    """Each once; a place has all the starts that were given there, of the model before and of the user."""
+    return tuple({(one.place, *sorted(one.start.items())): one for one in wanted}.values())
 
 
 def _place(cause: str, joint: int | None) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.model.diagnosis.ledger import WEAKER
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Finding, Rejected, Trial
-from pipelines.model.diagnosis.words import taken_in, where
+from pipelines.model.diagnosis.words import how_much, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
@@ -77,10 +77,12 @@ def _verdict(result: Result) -> str:
     others = f"; and {', '.join(words for _, words in together(more))}" if more else ""
     size = f", {_size(first, result)}" if math.isfinite(first.torque_rms) else ""
     whole = all_together(result.findings)
-    change, alone = tip_change(whole), whole is first.gain
+    alone = whole is first.gain
+    change = tip_change(whole) if not (alone and more) else ""  # of the first alone it says nothing of them all
     moved = f"; with {'it' if alone else 'them'} {change}" if change else ""
     rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
-    return f"{changed}{first.title}{where(first)}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
+    cause = f"{first.title}{how_much(first)}{where(first)}"
+    return f"{changed}{cause}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
 
 
 def _advice(result: Result) -> tuple[str, ...]:

@@ -50,7 +50,8 @@ def extend(
     logs: SomeLogs = None,
     with_: Annotated[list[str] | None, typer.Option("--with", help="CAUSE:JOINT, or CAUSE:JOINT:NAME=VALUE with a start for a "
                                                     "non-linear number: cogging:2:order=18; all causes stand below. "
-                                                    "Repeatable.")] = None,
+                                                    "What may act more than once at a joint, waves of several orders say, "
+                                                    "does so as held-out logs bear it out. Repeatable.")] = None,
     model: Annotated[str | None, typer.Option(help="model.json to extend: its effects are kept, and fitted anew.")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
     filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,

@@ -113,6 +113,8 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     (("diagnose", "logs", "--twins", "3"), "RRID-C01 rrrid diagnose: no such option '--twins'. See "),
     (("diagnose", "logs", "--without", "coging"),
      "RRID-C01 --without: 'coging' is not a cause, did you mean 'cogging'? 'rrrid extend --help' lists all causes."),
+    (("diagnose", "logs", "--without", "cogging:2"),
+     "RRID-C02 --without: 'cogging:2': a cause is left out as a whole, at every joint. Write cogging."),
     (("extend", "logs", "--with", "quadratic:2"),
      "RRID-C01 --with: 'quadratic' is not a cause, did you mean 'quadratic_drag'? 'rrrid extend --help' lists all causes."),
     (("convert", "logs", "-q", "-v"), "RRID-C02 -q, -v: "),

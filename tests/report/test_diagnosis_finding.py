@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
-from pipelines.model.diagnosis.words import taken_in, where
+from pipelines.model.diagnosis.words import how_much, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
 from pipelines.report.diagnosis_words import together, what_stays
@@ -45,6 +45,14 @@ def test_what_a_model_without_the_finding_imitates_is_said(torque: float, left: 
     one = replace(finding(joint=1), torque_rms=torque)
     assert bool(taken_in(one, np.array([left, 9.0]))) == most
     assert not taken_in(replace(one, joint=None), np.array([left, 9.0]))
+
+
+@pytest.mark.parametrize(("cause", "name", "said"), [("payload", "mass", " of 0.15 kg"), ("cogging", "amplitude", "")])
+def test_a_load_is_told_by_its_mass(cause: str, name: str, said: str) -> None:
+    """One number says how much there is of a load; of waves in several orders none does."""
+    one = finding(cause)
+    assert how_much(replace(one, parameters={name: Value(0.15004, 1e-4, "kg")})) == said
+    assert how_much(replace(one, parameters={})) == ""
 
 
 def test_the_other_joint_is_named() -> None:

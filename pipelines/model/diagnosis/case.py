@@ -44,6 +44,7 @@ class Case:
     unlike: frozenset[int] = frozenset()  # joints, from 0, at speeds at which reference logs leave more than on the whole
     shared: Shared | None = None  # at which of several joints it has, masses being what they were
     again: bool = True  # a cause that may act more than once at its place may be found more than once
+    named: bool = False  # by somebody, so that none has a threshold but what is found at its place once more
     white: bool = False  # its rows were whitened: little of them is signal, and every cause takes a small share
     beside: tuple[Acting, ...] = ()  # effects whose torque is subtracted from the rows: known from elsewhere, or standing
 

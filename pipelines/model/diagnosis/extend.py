@@ -123,7 +123,7 @@ def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSet
     rest = [one for one in wanted if one.place not in given]
     stands = given - {one.place for one in first.held.acting}
     taken_in = [one for one in rest if ask is not None and one.effect.evidence == "base parameters"]
-    every = tuple(_family(case, one) for one in rest if one not in taken_in)
+    every = _families(case, [one for one in rest if one not in taken_in])
     left, refused = list(every), dict[tuple[str, int | None], str]()
     while True:
         say(f"fitting {', '.join(place_of(f.cause, f.joint) for f in left) or 'the nominal model'}")
@@ -170,6 +170,15 @@ def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory,
     return case, replace(prepared, data=case.data, judge=case.judge), since.absorbed
 
 
+def _families(case: Case, wanted: Sequence[Wanted]) -> tuple[Family, ...]:
+    """One of each place, with all starts that were given there."""
+    there: dict[str, list[Family]] = {}
+    for one in wanted:
+        there.setdefault(one.place, []).append(_family(case, one))
+    return tuple(replace(some[0], shapes=tuple(dict.fromkeys(shape for family in some for shape in family.shapes)))
+                 for some in there.values())
+
+
 def _family(case: Case, one: Wanted) -> Family:
     laws = case.model.columns.laws
     every = families(laws, whole_motion(case.data), case.model.arm)
@@ -187,12 +196,18 @@ def _family(case: Case, one: Wanted) -> Family:
     return replace(mine, shapes=tuple(dict.fromkeys(replace(s, **shape) for s in mine.shapes)))
 
 
-def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[Found, tuple[Finding, ...],
-                                                                            dict[tuple[str, int | None], str]]:
-    """Fitted one after the other, the strongest first; and why some of them are not accepted."""
+def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: bool = True,
+           ) -> tuple[Found, tuple[Finding, ...], dict[tuple[str, int | None], str]]:
+    """Fitted one after the other, the strongest first; and why some of them are not accepted.
+
+    Args:
+        again: a cause that may act more than once at its place, waves of other orders say, does so as far as held-out time bears
+            it out; once, where any of them is doubted.
+    """
     none = np.zeros(len(case.families))
     free = Thresholds(none, none, "none: the cause was named", case.weight, tuple(f.joint for f in case.families))
-    found, case = steadied(search(replace(case, thresholds=free, again=False), len(case.families)), case)
+    asked = replace(case, thresholds=free, named=True, again=again)
+    found, case = steadied(search(asked, len(case.families) + chosen.most), case)
     found = unbiased(found, prepared, case, chosen.seed)
     steps = [step for step in found.steps if step.best is not None]
     ruling = Ruling("cause", tuple(range(len(steps))), "")
@@ -202,11 +217,15 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings) -> tuple[F
                     chosen.evidence, case.beside).findings
     why: dict[tuple[str, int | None], str] = {}
     late = any(step.best is not None and step.best.effect.last for step in steps)
+    there = set[tuple[str, int | None]]()
     for k, step in enumerate(steps):
         if step.best is not None and (doubt := at_odds(found, k, prepared, case) or
                                       farther(simulated[k], simulated[k + 1], late=late) or
                                       (BY_CHANCE if vague(found, k, prepared, case) else "")):
+            if (step.best.effect.name, step.best.effect.joint) in there:
+                return _tried(case, prepared, chosen, again=False)
             why[step.best.effect.name, step.best.effect.joint] = doubt
+        there |= {(step.best.effect.name, step.best.effect.joint)} if step.best is not None else set()
     taken = {(one.cause, one.joint) for one in told}
     unlike = {(trial.cause, trial.joint) for step in found.steps for trial in step.trials if trial.reason == UNBELIEVABLE}
     why |= {place: UNBELIEVABLE if place in unlike else "it takes nothing off the held-out error"
@@ -220,8 +239,8 @@ def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, 
     prepared, done = first.held.prepared, judged(first.held, found.final)
     judge, final = done.judge, done.final
     floor = white(final.data, final.left)
-    whole = acted(with_uncertainty(extended_arm(replace(found, final=final), Ruling("cause", tuple(range(len(named))), "")), final),
-                  done.acting)
+    steps = tuple(range(sum(step.best is not None for step in found.steps)))  # of one finding there may be several
+    whole = acted(with_uncertainty(extended_arm(replace(found, final=final), Ruling("cause", steps, "")), final), done.acting)
     ready = replace(prepared, data=final.data, judge=judge)
     load = None if moved is None else carried(moved, final, whole, ready, done.acting, chosen.blocks, chosen.evidence)
     refused = dict(refused) | {(part.acting.effect.name, part.acting.effect.joint): part.doubt for part in done.parts if part.doubt}

@@ -272,10 +272,23 @@ def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
         judged, thresholds = case.changed(now, [bool(one.gain[0] >= _CLOSE**2 * most) for one in screened])
     else:
         thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
+    once_more = _once_more(case, now, screened)
+    if once_more:
+        bound = without_twin(screened, now.rss, now.weight).gain
+        thresholds = replace(thresholds, gain=np.where([id(one) in once_more for one in screened], bound, thresholds.gain))
     passed = tuple(one for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True)
                    if seen.gain[0] > bound and one.stands_out)
-    refused = frozenset() if case.floored else frozenset(id(passed[k]) for k in not_borne_out(case, now, passed))
+    asked = passed if not case.floored else tuple(one for one in passed if id(one) in once_more)
+    refused = frozenset(id(asked[k]) for k in not_borne_out(case, now, asked)) if asked else frozenset()
     return _Gate(judged, thresholds, tuple(one for one in passed if id(one) not in refused), refused)
+
+
+def _once_more(case: Case, now: Refined, screened: Sequence[Screened]) -> set[int]:
+    """Ids of the causes that somebody named, and that were found at their places before: nobody said how often they act there."""
+    if not case.named:
+        return set()
+    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
+    return {id(one) for one in screened if (one.cause, one.joint) in taken}
 
 
 def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, chosen: Tried | None = None) -> Step:
@@ -287,9 +300,10 @@ def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, 
     happened = {id(one.screened) for one in tried if one.log is not None and now.rss - one.done.rss <= bound[id(one.screened)]}
     refused = gate.refused | happened
     tried = [one for one in tried if id(one.screened) not in happened]
-    if not case.floored:
-        refused |= {id(one.screened) for one in tried if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
-        tried = [one for one in tried if id(one.screened) not in refused]
+    once_more = _once_more(case, now, screened)
+    asked = [one for one in tried if not case.floored or id(one.screened) in once_more]
+    refused |= {id(one.screened) for one in asked if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
+    tried = [one for one in tried if id(one.screened) not in refused]
     best = (chosen or fewest(tried)) if more else None
     if best is not None and case.shared is not None:
         best = at_its_joint(best, tried, now, case.shared)

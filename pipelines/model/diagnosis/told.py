@@ -38,7 +38,7 @@ from pipelines.model.diagnosis.since import Probed
 from pipelines.model.diagnosis.steadied import steady, steady_nominal
 from pipelines.model.diagnosis.unbiased import unbiased
 from pipelines.model.diagnosis.verdict import Ruling
-from pipelines.model.diagnosis.words import taken_in, where
+from pipelines.model.diagnosis.words import how_much, taken_in, where
 
 __all__ = ["Limits", "diagnosis_of", "limits_of", "sentence", "strongest"]
 
@@ -177,7 +177,7 @@ def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool
     what = " or ".join(dict.fromkeys("N m rms of torque" if one else "N rms of force" for one in turns))
     size = f": {first.torque_rms:.2g} {what}{taken_in(first, left)}" if np.isfinite(first.torque_rms) else ""
     beside = f" Beside it, {ruling.reason}." if ruling.reason else ""
-    return f"{first.title}{where(first)}{size}{more}.{beside}"
+    return f"{first.title}{how_much(first)}{where(first)}{size}{more}.{beside}"
 
 
 def strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:

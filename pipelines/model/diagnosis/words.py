@@ -1,6 +1,7 @@
 """Words of a finding that its sentence and its report share: where it is, and how much of it a model without it imitates.
 
     where(finding)                 " at joint 2 (from joint 1)"
+    how_much(finding)              " of 0.15 kg"
     taken_in(finding, left)        ", most of which the nominal model had taken in"
     within(title)                  a title, or a sentence, within another
 """
@@ -13,8 +14,9 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Finding, Value
+from pipelines.model.effects import find_effect
 
-__all__ = ["other_joint", "taken_in", "where", "within"]
+__all__ = ["how_much", "other_joint", "taken_in", "where", "within"]
 
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
@@ -23,6 +25,12 @@ def where(one: Finding) -> str:
     """Its joint, and the other one that it has to do with; empty where it belongs to the whole arm."""
     other = other_joint(one.parameters)
     return ("" if one.joint is None else f" at joint {one.joint}") + (f" ({other})" if other else "")
+
+
+def how_much(one: Finding) -> str:
+    """The number that says how much of it there is, to three digits; empty where no single one does."""
+    told = one.parameters.get(find_effect(one.cause).size)
+    return "" if told is None or not isinstance(told.value, int | float) else f" of {told.value:.3g} {told.unit}"
 
 
 def other_joint(parameters: Mapping[str, Value]) -> str:

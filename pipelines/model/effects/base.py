@@ -68,6 +68,7 @@ class Effect(ABC):
     explanation: ClassVar[str]  # what it is
     remedy: ClassVar[str]  # what to do about it
     experiment: ClassVar[str]  # what to record to be sure
+    size: ClassVar[str] = ""  # the number that a verdict tells beside the title, if one alone says how much of it there is
     twins: ClassVar[tuple[str, ...]] = ()  # effects it can be mistaken for
     needs: ClassVar[tuple[str, ...]] = ()  # what beyond position and torque it takes to see it: "reference log"
     fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted

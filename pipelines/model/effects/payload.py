@@ -40,6 +40,7 @@ class Payload(Effect):
     remedy = "Take it off, or add it to the model."
     experiment = "Repeat the same experiment without the load."
     evidence = "base parameters"
+    size = "mass"
     twins = ("link_length",)
     needs = ("a reference log without the load",)
 
