@@ -21,6 +21,7 @@ from pipelines.signal.spectra import welch
 __all__ = ["evidence", "floors_of", "proof"]
 
 _POINTS = 3000  # of a series
+_AS_MUCH = 0.9  # of what a part tells over time
 _FINE = 96  # bins of a proof: a wave of order 18 over half a turn has ten of them a period
 _STRETCH = 2.0  # [s] of a proof in time
 _SEGMENT = 512  # rows of a spectrum
@@ -129,7 +130,11 @@ def proof(before: Refined, after: Refined, joint: int | None) -> Proof:
         means = binned(values, parts[2])
         return float(np.sum(means.count * means.mean**2))
 
-    best = max(signals(data, shown, data.y - before.left), key=lambda signal: told(signal.values))
+    every = {signal: told(signal.values) for signal in signals(data, shown, data.y - before.left)}
+    best = max(every, key=lambda signal: every[signal])
+    # In a log that goes once through its range anything is told over time, which says when and not by what.
+    other = max((signal for signal in every if signal.name != "time"), key=lambda signal: every[signal])
+    best = other if every[other] >= _AS_MUCH * every[best] else best
     b, a, p = (binned(best.values, x, _FINE) for x in parts)
     t, rows = _stretch(data, shown, parts[2])
     return Proof(shown + 1, best.name, best.unit, b.x, b.mean, a.mean, p.mean, b.spread / np.sqrt(b.count), t,

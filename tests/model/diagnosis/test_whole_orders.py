@@ -17,9 +17,9 @@ from tests.model.diagnosis.test_through import turned
 _LIBRARY = but("cogging", "spring", "torque_offset")
 
 
-def searched(waves: dict[float, float], most: int, mean: float = 0.65) -> Found:
+def searched(waves: dict[float, float], most: int, mean: float = 0.65, runs: int = 2) -> Found:
     """`mean` [rad/s] over ten seconds."""
-    logs = Logs((turned(1, waves, 0.0, mean), turned(2, waves, 0.0, mean)))
+    logs = Logs(tuple(turned(1 + k, waves, 0.0, mean) for k in range(runs)))
     prepared = prepare(logs, DiagnosisSettings(replicas=0, cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     model = Exact.start(columns, fit)
