@@ -104,6 +104,9 @@ def test_curves_that_leave_no_less_are_no_reason_to_ask_again() -> None:
         assert shows(prepared, loosened(prepared)) is less
 
 
+NO_LIMITS = DiagnosisSettings(limits=False)  # of what `told` stands for there are none
+
+
 def wrong_law_of(found: Diagnosis) -> bool:
     """After a search for four."""
     return wrong_law(found, 4)
@@ -200,7 +203,7 @@ def test_stored_thresholds_are_for_the_other_curve_as_well(stored: Calibration |
         return told("cause", () if ("sharpness", "roundness") in free else ("concave_friction:1", "concave_friction:2"))
 
     monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
-    assert len(diagnose_module.diagnose(Logs((hidden(1),)), calibration=stored).findings) == 0
+    assert len(diagnose_module.diagnose(Logs((hidden(1),)), NO_LIMITS, calibration=stored).findings) == 0
     assert [calibration for _, calibration in asked] == [stored, stored]
 
 
@@ -220,7 +223,7 @@ def test_where_the_first_look_shows_one_law_at_several_joints_the_twin_is_made_o
 
     monkeypatch.setattr(diagnose_module, "greatest", lambda rough: [("concave_friction", 1), ("concave_friction", 2)])
     monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
-    assert diagnose_module.diagnose(Logs((hidden(1),))).verdict == verdict
+    assert diagnose_module.diagnose(Logs((hidden(1),)), NO_LIMITS).verdict == verdict
     assert made == asked
 
 
@@ -241,6 +244,6 @@ def test_what_was_worked_out_of_the_other_curve_is_worked_out_once(monkeypatch: 
 
     monkeypatch.setattr(diagnose_module, "_looked_at", looked_at)
     monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
-    diagnose_module.diagnose(Logs((hidden(1),)))
+    diagnose_module.diagnose(Logs((hidden(1),)), NO_LIMITS)
     assert [one[:2] for one in asked] == [("look", False), ("rest", False), ("look", True), ("rest", True)]
     assert asked[2][2] is asked[3][2]

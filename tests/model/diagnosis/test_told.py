@@ -18,14 +18,14 @@ from pipelines.model.diagnosis.verdict import Ruling
     (2, "Cogging at joint 2: 0.25 N rms of force."),
     (None, "Cogging: 0.25 N m rms of torque or N rms of force.")])
 def test_what_a_slide_lacks_is_a_force(joint: int | None, words: str) -> None:
-    finding: Any = SimpleNamespace(title="Cogging", joint=joint, torque_rms=0.25, parameters={})
+    finding: Any = SimpleNamespace(cause="cogging", title="Cogging", joint=joint, torque_rms=0.25, parameters={})
     assert sentence(Ruling("cause", (0,), ""), (finding,), (True, False), np.array([0.3, 0.3])) == words
 
 
 def test_what_the_model_hid_and_the_other_joint_are_told() -> None:
     """4.6 N m at a joint whose model was only 1.6 N m off: friction had taken in the rest."""
-    finding: Any = SimpleNamespace(title="A motor that turns with two joints", joint=1, torque_rms=4.6,
-                                   parameters={"with_joint": Value(2, None, "1")})
+    finding: Any = SimpleNamespace(cause="transmission_coupling", title="A motor that turns with two joints", joint=1,
+                                   torque_rms=4.6, parameters={"with_joint": Value(2, None, "1")})
     assert sentence(Ruling("cause", (0, 1), ""), (finding, finding), (True, True), np.array([1.6, 1.6])) == (
         "A motor that turns with two joints at joint 1 (with joint 2): 4.6 N m rms of torque, most of which the nominal model had "
         "taken in; and 1 more.")
