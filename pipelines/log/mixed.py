@@ -16,7 +16,7 @@ from pipelines.errors import Check, UsageError, clean
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 from pipelines.log.inputs import Inputs, only
-from pipelines.log.sessions import Session, apart, judged_later
+from pipelines.log.sessions import Session, apart, day_that_judges
 
 __all__ = ["SeveralSessions", "check_alike", "of_one_session"]
 
@@ -109,7 +109,7 @@ def check_alike(inputs: Inputs) -> tuple[Check, ...]:
                 remedy="if they are of two machines or sessions, give each folder by itself, or let their logs say so: robot_name, "
                 "recorded"))
         named_none = replace(session, logs=tuple(opened for opened in session.logs if opened.path not in inputs.named))
-        if day := judged_later(named_none):
+        if day := day_that_judges(named_none):
             found.append(Check.of("S21", "warn", f"its logs of {day}, which all judge, were taken with it",
                                   where=clean(session.name, 60), remedy="if that is another session, name its logs by --validate"))
     return tuple(found)

@@ -13,7 +13,7 @@ from typing import Final
 
 from pipelines.log.files import Opened
 
-__all__ = ["Session", "apart", "called", "judged_later", "sessions"]
+__all__ = ["Session", "apart", "called", "day_that_judges", "sessions"]
 
 Key = tuple[str, str, str]
 
@@ -105,7 +105,7 @@ def _judged_later(groups: dict[Key, list[Opened]]) -> None:
             groups[before[-1] if before else days[0]] += groups.pop(key)
 
 
-def judged_later(session: Session) -> str:
+def day_that_judges(session: Session) -> str:
     """The last day of which a session has logs that judge but none that is judged; "" where there is none."""
     days = {role: {(o.log.recorded or "")[:_DATE] for o in session.logs if (o.log.role == "validate") is role and o.log.recorded}
             for role in (True, False)}

@@ -17,10 +17,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.model.diagnosis.borne_out import borne_out, not_borne_out
+from pipelines.model.diagnosis.borne_out import borne_out
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.curves import with_curves_anew
 from pipelines.model.diagnosis.elsewhere import at_its_joint
+from pipelines.model.diagnosis.gate import CLOSE, Gate, gate_of, once_more
 from pipelines.model.diagnosis.hypotheses import best_form, fitted, laid_whole, plainer
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.nominal import fit_columns
@@ -28,14 +29,13 @@ from pipelines.model.diagnosis.parsimony import PARSIMONY, different, fewest
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screen import Screened, screen
-from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
+from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.unnameable import unnameable
 
 __all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "glance", "greatest", "last_step", "provisional",
            "search"]
 
 _RIVALS = 6  # fitted exactly
-_CLOSE = 0.25  # of the best gain: weaker ones are no rivals
 _LEAST, _LEAST_WHITE = 2e-3, 2e-4  # of the squared residual: no cause is fitted for less; of whitened rows
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
 _WORTH = 0.05  # of the squared residual of its joint
@@ -51,16 +51,6 @@ class Explored:
     before: Refined
     screened: tuple[Screened, ...]
     tried: tuple[Tried, ...]  # best first
-
-
-@dataclass(frozen=True, eq=False)
-class _Gate:
-    """What the causes that were screened have to exceed."""
-
-    judged: Sequence[Screened]  # with the gains that the thresholds are for
-    thresholds: Thresholds
-    passed: tuple[Screened, ...]
-    refused: frozenset[int]  # ids of those above their thresholds that other time does not bear out
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,13 +111,13 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
     now = rough[0].before if rough else refine(case.model, case.data, case.weight)
     nominal = now
     steps: list[Step] = []
-    asked: list[tuple[Explored, _Gate]] = []
+    asked: list[tuple[Explored, Gate]] = []
     joined: set[str] = set()
     while True:
         number = len(steps) + 1
         same = number <= len(rough) and rough[number - 1].before is now
         screened = rough[number - 1].screened if same else _screened(case, now)
-        gate = _gate(case, now, screened)
+        gate = gate_of(case, now, screened)
         explored = rough[number - 1] if same else _explored(case, now, screened, gate.passed)
         if same and (not case.floored or _others(case, explored, gate)):
             explored = _explored(case, now, screened, gate.passed, explored.tried)
@@ -154,10 +144,10 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
 def last_step(case: Case, done: Refined, number: int) -> Step:
     """What every cause shows beside all that was found; none is fitted."""
     screened = _screened(case, done)
-    return _step(case, Explored(done, screened, ()), _gate(case, done, screened), number, False)
+    return _step(case, Explored(done, screened, ()), gate_of(case, done, screened), number, False)
 
 
-def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explored, _Gate]]) -> tuple[int, Step, Tried] | None:
+def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explored, Gate]]) -> tuple[int, Step, Tried] | None:
     """The place of an earlier step, that step as it should have been, and what it should have found: where the same cause was found
     at two joints, the joint at which it leaves as little alone.
 
@@ -256,42 +246,16 @@ def _great(case: Case, now: Refined, screened: Sequence[Screened], wanted: Seque
     able = [one for one in able if one.gain[0] >= least * now.rss and one.stands_out and id(one) in asked
             and one.family.shapes[0].evidence in case.nameable]
     able = sorted(able, key=lambda one: -one.gain[0])
-    return [one for one in able[:_RIVALS] if one.gain[0] >= _CLOSE * able[0].gain[0]]
+    return [one for one in able[:_RIVALS] if one.gain[0] >= CLOSE * able[0].gain[0]]
 
 
-def _others(case: Case, explored: Explored, gate: _Gate) -> bool:
+def _others(case: Case, explored: Explored, gate: Gate) -> bool:
     """Whether others than were explored are the greatest of those that pass."""
     tried = {id(one.screened) for one in explored.tried}
     return any(id(one) not in tried for one in _great(case, explored.before, explored.screened, gate.passed))
 
 
-def _gate(case: Case, now: Refined, screened: Sequence[Screened]) -> _Gate:
-    judged: Sequence[Screened] = screened
-    if case.changed is not None:
-        most = max((one.gain[0] for one in screened), default=0.0)
-        judged, thresholds = case.changed(now, [bool(one.gain[0] >= _CLOSE**2 * most) for one in screened])
-    else:
-        thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
-    once_more = _once_more(case, now, screened)
-    if once_more:
-        bound = without_twin(screened, now.rss, now.weight).gain
-        thresholds = replace(thresholds, gain=np.where([id(one) in once_more for one in screened], bound, thresholds.gain))
-    passed = tuple(one for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True)
-                   if seen.gain[0] > bound and one.stands_out)
-    asked = passed if not case.floored else tuple(one for one in passed if id(one) in once_more)
-    refused = frozenset(id(asked[k]) for k in not_borne_out(case, now, asked)) if asked else frozenset()
-    return _Gate(judged, thresholds, tuple(one for one in passed if id(one) not in refused), refused)
-
-
-def _once_more(case: Case, now: Refined, screened: Sequence[Screened]) -> set[int]:
-    """Ids of the causes that somebody named, and that were found at their places before: nobody said how often they act there."""
-    if not case.named:
-        return set()
-    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
-    return {id(one) for one in screened if (one.cause, one.joint) in taken}
-
-
-def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, chosen: Tried | None = None) -> Step:
+def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, chosen: Tried | None = None) -> Step:
     now, screened, thresholds = explored.before, explored.screened, gate.thresholds
     passes = {id(one) for one in gate.passed}
     tried = [one for one in explored.tried if id(one.screened) in passes]
@@ -300,8 +264,8 @@ def _step(case: Case, explored: Explored, gate: _Gate, number: int, more: bool, 
     happened = {id(one.screened) for one in tried if one.log is not None and now.rss - one.done.rss <= bound[id(one.screened)]}
     refused = gate.refused | happened
     tried = [one for one in tried if id(one.screened) not in happened]
-    once_more = _once_more(case, now, screened)
-    asked = [one for one in tried if not case.floored or id(one.screened) in once_more]
+    again = once_more(case, now, screened)
+    asked = [one for one in tried if not case.floored or id(one.screened) in again]
     refused |= {id(one.screened) for one in asked if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
     tried = [one for one in tried if id(one.screened) not in refused]
     best = (chosen or fewest(tried)) if more else None

@@ -16,6 +16,7 @@ from pipelines.model.diagnosis import search as search_module
 from pipelines.model.diagnosis.candidates import Family, families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.gate import Gate
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.ledger import Tried, ledger
 from pipelines.model.diagnosis.mistaken import imitated
@@ -161,7 +162,7 @@ def test_an_event_belongs_to_its_log() -> None:
     for share, event in ((0.9, True), (1.1, False)):  # of what it takes fitted exactly, that its columns had to
         thresholds = replace(step.thresholds, gain=np.full(len(step.screened), share * gained))
         asked = search_module._step(case, search_module.Explored(step.before, step.screened, step.rivals),
-                                    search_module._Gate(step.screened, thresholds, passed, frozenset()), 1, True)
+                                    Gate(step.screened, thresholds, passed, frozenset()), 1, True)
         assert (asked.best is best) is event
 
 
