@@ -24,7 +24,7 @@ class TorqueLag(Effect):
     parameters = (Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one"),)
     signature = "The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative."
     explanation = "The recorder, or the current measurement, filters the torque before it is logged."
-    remedy = "Log the torque unfiltered, or filter position by the same low-pass; the arm itself is in order."
+    remedy = "Log the torque unfiltered, or filter position by the same low-pass; it is no fault of the arm."
     experiment = "Repeat an experiment at two speeds: a fit at one must hold at the other."
     twins = ("time_delay", "drive_lag", "rotor_inertia")
     last = True
