@@ -134,6 +134,7 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     if floored.twin is not None:
         done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
         done = unlike_noise(done, partial(of_replicas, floored.twin))
+    say("weighing what was found, and what these logs would have shown" if chosen.limits else "weighing what was found")
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 
 

@@ -44,7 +44,8 @@ def unnamed(done: Settled, floor: Array) -> Settled:
     return replace(done, ruling=Ruling("nothing-wrong", (), "", done.ruling.doubts), simulated=())
 
 
-def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, moved: bool = False, parts: bool = False) -> Settled:
+def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, moved: bool = False, parts: bool = False,
+                    fitted: Array | None = None) -> Settled:
     """"unknown" where the model leaves, (joints,) [N m], many times the `floor` of the very logs held out, and not little of what
     the `nominal` model leaves there, or more than half of what that leaves above it at the joints of the causes: what was found is
     something else, or what is wrong does not show in the fitted logs.
@@ -52,6 +53,8 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, mov
     Args:
         moved: whether there is a cause that the base parameters show.
         parts: whether `rms` lacks what responses have named, and `nominal` has it.
+        fitted: (joints,) [N m] floor of the fitted logs. What the final model leaves above it there, a twin that is a little too
+            quiet say, is no sign against the name where held-out logs show as much.
     """
     verdict = done.ruling.verdict
     far = _WRONG if verdict == "cause" or moved else _STRANGE
@@ -59,10 +62,16 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, mov
     if verdict == "unknown":
         return done
     if not high:
-        return done if moved or parts or _shown(done, rms, np.maximum(floor, 1e-12), nominal) else _not_believed(done, _MOST_LEFT)
+        return done if moved or parts or _shown(done, rms, _as_loud(done, floor, fitted), nominal) else _not_believed(done, _MOST_LEFT)
     model = "what explains the fitted logs" if verdict == "cause" else "the nominal model, which the fitted logs bear out,"
     times = f"{float((rms / np.maximum(floor, 1e-12)).max()):.2g} times what an arm in order leaves there"
     return _not_believed(done, f"{model} leaves, of {high} in those held out, {times}")
+
+
+def _as_loud(done: Settled, floor: Array, fitted: Array | None) -> Array:
+    """(joints,) [N m] floor of the held-out logs, as far above what a twin says as the final model stands in the fitted ones."""
+    left = 1.0 if fitted is None else np.maximum(done.found.final.rms / np.maximum(fitted, 1e-12), 1.0)
+    return np.maximum(left * floor, 1e-12)
 
 
 def _shown(done: Settled, rms: Array, floor: Array, nominal: Array) -> bool:

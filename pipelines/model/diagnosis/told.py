@@ -66,7 +66,7 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
             done = replace(done, found=unbiased(done.found, prepared, case, chosen.seed))
             own = floor()
         responded = judged(held, done.found.final)
-    done, responded = _held_against(first, case, done, responded, own, chosen, moved)
+    done, responded = _held_against(first, case, done, responded, own, chosen, moved, floored.rms)
     plain = done.found.nominal if held.plain is None else steady(held.plain)  # nothing taken out for what responses name
     named = findings(done.found, done.ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks, chosen.evidence,
                      case.beside)
@@ -131,8 +131,9 @@ def _own_floor(responded: Judged, first: Responding, case: Case, floored: Floore
 
 
 def _held_against(first: Responding, case: Case, done: Settled, responded: Judged, own: Array | None, chosen: DiagnosisSettings,
-                  moved: bool) -> tuple[Settled, Judged]:
-    """What is believed beside the floor of the held-out logs, `own` (joints,) [N m], and what responses have named beside that."""
+                  moved: bool, fitted: Array) -> tuple[Settled, Judged]:
+    """What is believed beside the floor of the held-out logs, `own` (joints,) [N m], that of the fitted ones, and what responses
+    have named beside that."""
     held, prepared = replace(first.held, case=case), first.held.prepared
     judge = first.held.judge if responded.parts else prepared.judge
     if own is None or judge is None or responded.judge is None:
@@ -142,7 +143,7 @@ def _held_against(first: Responding, case: Case, done: Settled, responded: Judge
     plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
     final = responded.final
     believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved,
-                               bool(responded.parts))
+                               bool(responded.parts), fitted)
     return believed, responded if believed is done else judged(held, believed.found.final)
 
 

@@ -65,6 +65,19 @@ def test_half_of_what_the_held_out_logs_show_is_explained(before: float, after: 
     assert believed.found.final is (final if verdict == "cause" else nominal)
 
 
+@pytest.mark.parametrize(("left_of_fitted", "before", "verdict"), [
+    (0.0100, 0.0142, "unknown"), (0.0125, 0.0142, "cause"), (0.0125, 0.024, "unknown")])
+def test_a_twin_too_quiet_is_no_sign_against_a_name(left_of_fitted: float, before: float, verdict: str) -> None:
+    """Warm-up is over in the log that judges: nothing of it is left to explain there. An arm in order whose friction no twin has to
+    the last leaves 1.25 floors of the fitted logs, beside the cause, and 1.4 of those held out."""
+    nominal, final = left(0.0149, 0.01, 0.01), left(left_of_fitted, 0.01, 0.01)
+    found = searched(nominal, (effect("viscous_drift", 1), final))
+    found.steps[0].best.log = None
+    done = Settled(Found(nominal, tuple(found.steps), final), Ruling("cause", (0,), ""), ())
+    held_out = np.array([before, 0.01, 0.01])
+    assert unlike_held_out(done, held_out, FLOOR, held_out, fitted=FLOOR).ruling.verdict == verdict
+
+
 @pytest.mark.parametrize(("held_out", "verdict"), [((0.02, 0.01, 0.02), "cause"), ((0.01, 0.02, 0.01), "unknown")])
 def test_a_cause_of_the_whole_arm_is_asked_where_it_takes_most(held_out: tuple[float, ...], verdict: str) -> None:
     """A link of the wrong length is seen at the shoulder here; what other motion leaves of the others is no matter."""
