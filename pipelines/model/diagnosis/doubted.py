@@ -62,7 +62,8 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, mov
     if verdict == "unknown":
         return done
     if not high:
-        return done if moved or parts or _shown(done, rms, _as_loud(done, floor, fitted), nominal) else _not_believed(done, _MOST_LEFT)
+        told = moved or parts or _shown(done, rms, _as_loud(done, floor, fitted), nominal)
+        return done if told else _not_believed(done, _MOST_LEFT)
     model = "what explains the fitted logs" if verdict == "cause" else "the nominal model, which the fitted logs bear out,"
     times = f"{float((rms / np.maximum(floor, 1e-12)).max()):.2g} times what an arm in order leaves there"
     return _not_believed(done, f"{model} leaves, of {high} in those held out, {times}")

@@ -40,8 +40,8 @@ class ConcaveFriction(Effect):
     )
     signature = "Friction that rises with speed and then levels off, the same in both directions."
     explanation = "Lubricant that thins as it is sheared, and churning in gears: common in geared and lubricated joints."
-    remedy = ("Harmonic drives and greased gears have it, and nothing need be broken: compensate it in the feed-forward; a single viscous "
-              "coefficient is too large at speed and too small below it.")
+    remedy = ("Harmonic drives and greased gears have it, and nothing need be broken: compensate it in the feed-forward; "
+              "a single viscous coefficient is too large at speed and too small below it.")
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
     twins = ("stribeck", "quadratic_drag", "viscous", "three_sigmoid")
     friction = True

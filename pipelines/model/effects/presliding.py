@@ -71,8 +71,8 @@ class Presliding(Effect):
     )
     signature = "After each reversal friction turns over along a loop against position, whatever the speed."
     explanation = "Contacts, seals and gears bend before they slide, and bend back after a reversal."
-    remedy = ("Every bearing has it, and nothing need be broken: simulate it where slow reversals matter; friction compensation by the sign "
-              "of speed alone pushes too early.")
+    remedy = ("Every bearing has it, and nothing need be broken: simulate it where slow reversals matter; friction compensation "
+              "by the sign of speed alone pushes too early.")
     experiment = "Reverse the joint slowly and often, with strokes from a tenth of the distance to many times it."
     twins = ("backlash", "coulomb", "stribeck")
     from_motion = True

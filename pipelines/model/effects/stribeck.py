@@ -44,7 +44,8 @@ class Stribeck(Effect):
     )
     signature = "A hump of the friction curve at low speed, the same in both directions."
     explanation = "Below a certain speed the surfaces touch; above it a film of lubricant carries them."
-    remedy = "Most oiled gears have it, and nothing need be broken: compensate it in the feed-forward; another lubricant moves the hump."
+    remedy = ("Most oiled gears have it, and nothing need be broken: compensate it in the feed-forward; "
+              "another lubricant moves the hump.")
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
     twins = ("quadratic_drag", "three_sigmoid", "concave_friction", "presliding")
     shared = ("sharpness",)
