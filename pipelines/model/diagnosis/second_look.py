@@ -34,7 +34,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step, last_step, search
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import excess, explained, rule
+from pipelines.model.diagnosis.verdict import REST_UNKNOWN, excess, explained, rule
 from pipelines.model.diagnosis.whitening import Whitening
 
 __all__ = ["looked_again"]
@@ -85,7 +85,7 @@ def _believed(first: Settled, second: Settled, floor: Array, scatter: Array) -> 
     before, now = _names(first), _names(second)
     if now < before:
         return _share(first, before - now, floor) < _LITTLE
-    if before and before < now and _share(second, now - before, floor) < _LEAST:
+    if before and before < now and (_share(second, now - before, floor) < _LEAST or (now - before) & _of_the_rest(first)):
         return False
     left = [excess(one.found.final.rms, floor) for one in (first, second)]
     named = {joint for _, joint in before | now}
@@ -117,6 +117,12 @@ def _in_white(case: Case, twin: Twin) -> tuple[Case, Twin, Array]:
 
 def _names(done: Settled) -> set[Name]:
     return _of(done.found.steps[k] for k in done.ruling.named)
+
+
+def _of_the_rest(done: Settled) -> set[Name]:
+    """What was found beside a law that is not the machine's, in rows as they are: white ones, of which most is noise, show less of
+    what stays above the floor."""
+    return _of(done.found.steps[k] for k, why in done.ruling.doubts.items() if why == REST_UNKNOWN)
 
 
 def _of(steps: Iterable[Step]) -> set[Name]:

@@ -124,7 +124,17 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")
-    return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in once), "", once)
+    doubts = once | {k: REST_UNKNOWN for k, step in enumerate(accepted) if k and _beside_more(step, found.final.rms, floor)}
+    return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
+
+
+def _beside_more(step: Step, final: Array, floor: Array) -> bool:
+    """Whether the joint where a step takes most stands above its floor with all that was found, and the step took next to nothing
+    of what stood there: the law of a cause found before is not the machine's, and what it leaves looks like other causes."""
+    most = takes_most(step, floor)
+    done = step.before if step.best is None else step.best.done
+    before, after, usual = (float(np.square(rms[most])) for rms in (step.before.rms, done.rms, floor))
+    return bool(final[most] > _ABOVE * floor[most] and before - after < _FIFTH * (before - usual))
 
 
 def seen_in(step: Step, nominal: Array, final: Array, floor: Array) -> bool:

@@ -84,6 +84,22 @@ def test_what_leaves_much_of_a_joint_is_not_named() -> None:
     assert rule(found(left(0.01, 0.08, 0.01), left(0.01, 0.04, 0.01)), FLOOR).verdict == "unknown"
 
 
+@pytest.mark.parametrize(("rest", "named"), [(0.026, (0,)), (0.018, (0, 1)), (0.0255, (0,))])
+def test_what_is_found_in_the_rest_of_a_law_that_is_not_the_machines_has_no_name(rest: float, named: tuple[int, ...]) -> None:
+    """Friction that differs by direction is told as an offset where the library lacks it, which leaves 2.8 floors; cogging then
+    takes a tenth of that. What takes more of it is named, though the joint stays above its floor."""
+    ruling = rule(found(left(0.1, 0.01, 0.01), left(0.028, 0.01, 0.01), left(rest, 0.01, 0.01),
+                        effects=(Cogging(1), Cogging(1))), FLOOR)
+    assert (ruling.verdict, ruling.named) == ("cause", named)
+    assert set(ruling.doubts) == {0, 1} - set(named)
+
+
+def test_beside_a_great_cause_that_is_explained_a_small_one_keeps_its_name() -> None:
+    """It takes a tenth of what the joint shows at first, but the joint comes down to its floor."""
+    ruling = rule(found(left(0.1, 0.01, 0.01), left(0.0150, 0.01, 0.01), left(0.0148, 0.01, 0.01)), FLOOR)
+    assert ruling.named == (0, 1)
+
+
 def test_the_reason_names_the_joints_that_are_not_explained() -> None:
     """Joint 1 stands a little above its floor as well, but it is explained for the most part."""
     ruling = rule(found(left(0.1, 0.04, 0.01), left(0.017, 0.03, 0.01)), FLOOR)
