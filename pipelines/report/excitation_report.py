@@ -248,7 +248,7 @@ def _plans_report(result: Result) -> Report:
     sections = [_plans_safety(result), Section("Experiments", (), (table,)), Section("Limits", (words,), (kept,))]
     if moving:
         sections.append(Section("Motions", (), (), tuple(_plan_figure(p, result) for p in moving)))
-    troubled = {name: words for name, found in result.rehearsals if (words := beyond_words(result.joints, found))}
+    troubled = [name for name, found in result.rehearsals if not found.safe]
     if troubled:
         verdict += f" In the rehearsal of {', '.join(troubled)} a limit is not kept."
     safe = not result.rehearsal_failed and not troubled
