@@ -170,7 +170,8 @@ def _settled(folded: _Folded, average: Callable[..., _Folded], passed: Array, le
         average: from the place where the first period begins, of these samples, without those periods.
     """
     out: tuple[int, ...] = ()
-    while (late := folded.periods.settling(passed, least)) and folded.periods.count > _FEWEST:
+    # one that alone measured a part of the period is kept for it, however often it is asked to go
+    while (late := folded.periods.settling(passed, least)) and folded.periods.count > _FEWEST and folded.periods.used[0] not in out:
         out = (*out, folded.periods.used[0])
         folded = average(folded.first, folded.rows, out)
     if late == 0:

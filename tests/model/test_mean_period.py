@@ -104,3 +104,18 @@ def test_two_periods_that_never_settle_are_not_averaged() -> None:
     (check,) = doubts(floor, "log")
     assert check.code == "RRID-T10"
     assert "not averaged" in check.message
+
+
+def test_a_start_is_left_out_of_a_period_that_cannot_be_spared() -> None:
+    """Both later periods lack the same tenth of a second, which the first one has: periods are counted from after its start."""
+    log = settling(3, 0.1)
+    q = log.q.copy()
+    for later in (1, 2):
+        q[later * 10_000 + 5000:later * 10_000 + 5100] = np.nan
+    log = with_signal(log, q=q)
+    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert made is not None
+    assert (floor.left_out, floor.periods) == ((), 2)
+    assert floor.settling > 0.0
+    assert elbow_error(log) < 2e-5
