@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.errors import Check, NothingMatched, RrridError, UsageError
+from pipelines.errors import NothingMatched, UsageError
 from pipelines.log.atomic import write_file
 from pipelines.log.files import write_log
 from pipelines.log.model_file import read_model
@@ -31,11 +31,12 @@ from pipelines.model.excitation.allowed import refuse_strange
 from pipelines.model.excitation.apart import Pair, told_apart
 from pipelines.model.excitation.bounds import parse_bounds
 from pipelines.model.excitation.design import Design, Effort, design
+from pipelines.model.excitation.doubts import doubts
 from pipelines.model.excitation.earlier import USED, first_mode, information_of
 from pipelines.model.excitation.others import frf_plans, friction_plans, hold_plans
 from pipelines.model.excitation.outcome import excitation
 from pipelines.model.excitation.outputs import coefficients, joint_motion, log_of_plan
-from pipelines.model.excitation.rehearse import rehearse, rehearsed
+from pipelines.model.excitation.rehearse import rehearsed, rehearsed_design
 from pipelines.model.excitation.result import CostOfLimit, Result
 from pipelines.model.excitation.task import Task, Wishes, plan_task
 from pipelines.model.named_cause import wanted_cause
@@ -47,7 +48,6 @@ from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 PURPOSES = ("excitation", "friction", "frf", "hold")
-_REHEARSED = 10.0  # [s]
 _APART_HARMONICS = (20,)  # a search without gradients wants fewer
 
 
@@ -76,6 +76,7 @@ class Settings:
     friction: bool | None = None  # count columns of friction; None: on every arm but the paper's, which has tests of its own
     noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
     torque_share: float = 0.9  # of the torque limit that the plan may use
+    speed_share: float = 0.95  # of the speed limit: a loop without feed-forward overshoots by up to 4 %
     tip_speed: float | None = None  # [m/s]
     tip_box: tuple[float, ...] | None = None  # [m]
     recipe: str | None = None  # whose inverse writes controller.csv
@@ -88,8 +89,8 @@ class Settings:
         bands = tuple(zip(self.keep_out[::2], self.keep_out[1::2], strict=False))
         harmonics = self.harmonics if self.harmonics or not self.tell_apart else _APART_HARMONICS
         return Wishes(self.criterion, self.cond_max, harmonics, self.frequency, bands, None, self.rest, self.home,
-                      self.symmetric, self.friction, self.noise, self.torque_share, self.tip_speed, self.tip_box,
-                      self.sample_time, self.periods)
+                      self.symmetric, self.friction, self.noise, self.torque_share, self.speed_share, self.tip_speed,
+                      self.tip_box, self.sample_time, self.periods)
 
 
 @dataclass(frozen=True)
@@ -219,20 +220,19 @@ def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
 
 
 def _result(task: Task, found: Design, settings: Settings, given: Material, after: tuple[str, ...], mode: float | None) -> Result:
+    designed, rehearsal, failed = found, None, ""
+    if settings.rehearse:
+        found, rehearsal, failed = rehearsed_design(task, designed, settings.seed, given.tell)
     given.tell("judging the design")
     judged = excitation(task, found, settings.seed)
-    trajectory, rehearsal, failed = found.trajectory, None, ""
+    goal = task.problem.goal
+    reached = goal.ceiling is None or judged.condition_number <= goal.ceiling or (found.reached and found is designed)
+    trajectory = found.trajectory
     t, motion = trajectory.sampled(settings.sample_time)
-    if task.arm is not None and settings.rehearse:
-        given.tell("rehearsing in simulation")
-        try:
-            rehearsal = rehearse(task.arm, settings.sample_time, motion, task.problem.goal.noise, settings.seed, _REHEARSED)
-        except RrridError as problem:  # a model whose simulation runs away is worth saying, and no reason to lose the design
-            failed = problem.message
     log = planned_log(f"{task.robot.name} {settings.criterion} excitation", task.robot, joint_motion(t, motion), "excitation",
                       "identify")
     log = replace(log, period=trajectory.series.period if task.rest else None)
-    goal, top = task.problem.goal, int(np.flatnonzero(task.harmonics.used.any(axis=0))[-1]) + 1
+    top = int(np.flatnonzero(task.harmonics.used.any(axis=0))[-1]) + 1
     return Result(
         robot=task.robot.name, joints=tuple(j.name for j in task.robot.joints), purpose="excitation",
         criterion=settings.criterion, ceiling=goal.ceiling, condition_number=judged.condition_number,
@@ -240,15 +240,15 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
         smallest_singular_value=judged.smallest_singular_value, log_determinant=judged.log_determinant,
         limits=tuple(CostOfLimit(p.joint, p.quantity, p.peak, p.limit, p.unit, p.share, p.cost) for p in found.peaks),
         evaluations=found.evaluations, found_at=found.found_at, seed=settings.seed,
-        interrupted=found.stopped > 0, stopped=found.stopped, reached=found.reached, shrunk=found.shrunk,
+        interrupted=found.stopped > 0, stopped=found.stopped, reached=reached, shrunk=found.shrunk,
         singular_values=judged.singular_values, parameters=judged.parameters,
         random=judged.random, course=judged.course, period=trajectory.series.period, periods=trajectory.periods,
         run_in=trajectory.run_in, duration=trajectory.duration, sample_time=settings.sample_time,
         home=None if task.home is None else tuple(map(float, task.home)), noise=tuple(map(float, goal.noise)),
         friction_columns=task.problem.columns.friction, torque_checked=task.torque is not None,
         torque_bounded=task.arm is None and task.torque is not None, torque_share=settings.torque_share,
-        after=after, first_mode=mode, mode_factor=settings.mode_factor, top_hz=top / trajectory.series.period,
-        rehearsal=rehearsal, rehearsal_failed=failed, plans=(),
+        speed_share=settings.speed_share, after=after, first_mode=mode, mode_factor=settings.mode_factor,
+        top_hz=top / trajectory.series.period, rehearsal=rehearsal, rehearsal_failed=failed, plans=(),
         logs=(("trajectory", log),), table=controller_table(given.recipe, task.robot, lambda at: trajectory.at(at)[0].T,
                                                             trajectory.duration, settings.sample_time),
         coefficients=coefficients(task, trajectory))
@@ -279,24 +279,11 @@ def write(result: Result, folder: Path, request: Request) -> None:
         write_file(folder / "coefficients.json", fill)
 
 
-def _checks(result: Result) -> tuple[Check, ...]:
-    found = []
-    if not result.reached:
-        dear = result.dearest
-        found.append(Check.of("C08", "warn", f"a condition number of {result.ceiling:g} was not reached"
-                              f"{f'; the {dear} is most in the way' if dear else ''}", where=result.robot, gate=True,
-                              remedy="search longer, give more harmonics, or widen that limit"))
-    if result.rehearsal_failed:
-        found.append(Check.of("D17", "warn", f"the rehearsal failed: {result.rehearsal_failed}", where=result.robot,
-                              remedy="check the model before the robot moves"))
-    return tuple(found)
-
-
 def report(result: Result) -> Report:
     """The motion, how near it comes to its limits, and what it will tell."""
     return excitation_report(result)
 
 
 STAGE = Stage("design-excitation", "Design the excitation", Settings, compute, report, read, write,
-              lambda result, check: result.stopped or int(check and any(found.gate for found in _checks(result))), _checks)
+              lambda result, check: result.stopped or int(check and any(found.gate for found in doubts(result))), doubts)
 

@@ -9,6 +9,9 @@ The motion is averaged, not the equations: the regressor is not linear in it, an
 the motion of the mean positions. It is not tuned anew to their smaller noise, which would let more of it through (of five
 periods with 3e-5 rad of noise the residual would be 3 to 16 % larger) to save a bias that is next to none (`Observers`).
 
+An arm that starts from rest takes a while until its loop has settled and the motion is periodic: its first period is left
+out where two others remain; of two, what had not settled of the first is, so that the mean there is the second one alone.
+
 The mean period lies between copies of itself, so that no filter feels an end; only the samples between them make
 equations, and each of them counts for as many as were averaged. The noise of an encoder falls with the number of periods
 only as far as it differs between them: where an arm repeats its motion to less than a step, the steps repeat as well.
@@ -16,6 +19,7 @@ only as far as it differs between them: where an arm repeats its motion to less 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +47,8 @@ _ALIKE_TORQUE = 0.1  # of the torque
 _NOISE = 3.0  # times what the noise from sample to sample explains: less is no difference
 _DRIFT = 0.25  # of the scatter that goes one way from the first period to the last
 _SURE = 5.0  # standard deviations of that share
+_FEWEST = 2  # periods of a mean
+_SETTLED = 0.5  # of the first of two periods: where it takes longer, too little is left to compare
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,7 @@ class NoiseFloor:
 
     periods: int  # compared
     left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
+    settling: float  # [s] left out at the start of the first period compared, for the motion had not settled
     position: Array  # [rad] standard deviation of one sample of one period
     torque: Array  # [N m]
     cutoff_hz: float | None  # of the low-pass of equations; None: none
@@ -68,6 +75,9 @@ class _Folded:
     rows: Mask  # (kept samples,) that are averaged
     first: int  # place on the grid where the first period begins
     step: float  # [s] between samples of the mean
+    repeats: float  # periods of which a sample of the mean is made, on average
+    settling: float = 0.0  # [s] left out at the start
+    unsettled: str = ""  # why that start cannot be left out, in words
 
 
 def noise_floor(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> NoiseFloor | None:
@@ -103,17 +113,21 @@ def alike(mean: Reconstructed, how: Reconstruction) -> Reconstructed:
 
 
 def doubts(floor: NoiseFloor | None, where: object, averaged: bool = True) -> list[Check]:
-    """T10: periods that are not averaged though it was asked for, and periods left out of the mean."""
+    """T10: periods that are not averaged though it was asked for, and what is left out of the mean."""
     if floor is None or not averaged:
         return []
     if floor.unlike:
         return [Check.of("T10", "warn", f"its periods are not averaged: {floor.unlike}", where=where,
                          remedy="check the attribute period; look for a drift, a touch or a changed load; or say --no-average")]
-    if not floor.left_out:
-        return []
-    left_out = ", ".join(map(str, floor.left_out))
-    return [Check.of("T10", "warn", f"period {left_out} differs from the {floor.periods} others and is left out of their mean",
-                     where=where, remedy="the first one often starts from rest; or somebody touched the arm")]
+    found = []
+    if floor.left_out:
+        left_out = ", ".join(map(str, floor.left_out))
+        found.append(Check.of("T10", "warn", f"period {left_out} differs from the {floor.periods} others and is left out of their "
+                              "mean", where=where, remedy="the first one often starts from rest; or somebody touched the arm"))
+    if floor.settling:
+        found.append(Check.of("T10", "warn", f"the first {floor.settling:.2g} s of its periods, in which the motion settled, are "
+                              "left out of their mean", where=where, remedy="record a period more: the first then is left out"))
+    return found
 
 
 def _two_periods(log: ExperimentLog, found: Reconstructed) -> bool:
@@ -136,13 +150,41 @@ def _fold(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> 
     first = int(grid.place[np.argmax(rows)])
     rows &= ~found.vague[good.kept].any(axis=1)
     x[~rows] = np.nan
-    laid = lay_on(x, grid)[first:]
+    passed, least = _passed(log, grid.step, cutoff_hz)[0], _least(found, x)
+
+    def average(begin: int, kept: Mask, without: tuple[int, ...] = ()) -> _Folded:
+        laid = lay_on(np.where(kept[:, None], x, np.nan), grid)[begin:]
+        periods = average_periods(laid, 1.0 / grid.step, period, amplitude=passed, least=least, without=without)
+        return _Folded(periods, grid, kept, begin, period / len(periods.mean), periods.count)
+
     try:
-        periods = average_periods(laid, 1.0 / grid.step, period, amplitude=_passed(log, grid.step, cutoff_hz)[0],
-                                  least=_least(found, x))
+        return _settled(average(first, rows), average, passed, least)
     except InputRejected as problem:
         return problem.message
-    return _Folded(periods, grid, rows, first, period / len(periods.mean))
+
+
+def _settled(folded: _Folded, average: Callable[..., _Folded], passed: Array, least: Array) -> _Folded:
+    """`folded` without a start unlike the later periods: without all of that period where two others remain, else without it alone.
+
+    Args:
+        average: from the place where the first period begins, of these samples, without those periods.
+    """
+    out: tuple[int, ...] = ()
+    # one that alone measured a part of the period is kept for it, however often it is asked to go
+    while (late := folded.periods.settling(passed, least)) and folded.periods.count > _FEWEST and folded.periods.used[0] not in out:
+        out = (*out, folded.periods.used[0])
+        folded = average(folded.first, folded.rows, out)
+    if late == 0:
+        return folded
+    phases, grid = len(folded.periods.mean), folded.grid
+    size = phases * folded.step / grid.step
+    begin, places = folded.first + round(folded.periods.used[0] * size), int(np.ceil(late * size / phases))
+    if late > _SETTLED * phases:
+        return replace(folded, unsettled=f"the first of its {folded.periods.count} periods has not settled by its middle")
+    if grid.size - begin - places >= _FEWEST * size:  # a run-in came before them
+        return replace(average(begin + places, folded.rows), settling=places * grid.step)
+    rest = folded.rows & ~((grid.place >= begin) & (grid.place < begin + places))
+    return replace(average(folded.first, rest, out), settling=places * grid.step, repeats=folded.periods.count - late / phases)
 
 
 def _one_grid(seen: Measured) -> Grid | str:
@@ -175,14 +217,17 @@ def _floor(log: ExperimentLog, motion: Reconstructed, folded: _Folded, cutoff_hz
     found, joints = folded.periods, log.n_joints
     passed, centred = _passed(log, folded.step, cutoff_hz)
     sample = np.sqrt(found.noise_variance)
-    unlike = _unlike(found.repeats(passed), found, _least(motion, found.mean), joints)
-    return NoiseFloor(found.count, tuple(k + 1 for k in found.outliers), sample[:joints], sample[joints:], cutoff_hz,
-                      passed_std(found.rest[..., :joints], passed), passed_std(found.rest[..., joints:], centred), unlike)
+    unlike = folded.unsettled or _unlike(found.repeats(passed), found, _least(motion, found.mean), joints)
+    # where one period alone was left, it differs from nothing
+    compared = np.sqrt((found.count - 1) / max(folded.repeats - 1.0, 1e-300))
+    return NoiseFloor(found.count, tuple(k + 1 for k in found.outliers), folded.settling, sample[:joints], sample[joints:],
+                      cutoff_hz, compared * passed_std(found.rest[..., :joints], passed),
+                      compared * passed_std(found.rest[..., joints:], centred), unlike)
 
 
 def _unknown(log: ExperimentLog, cutoff_hz: float | None, why: str) -> NoiseFloor:
     none = np.full(log.n_joints, np.nan)
-    return NoiseFloor(0, (), none, none, cutoff_hz, none, none, why)
+    return NoiseFloor(0, (), 0.0, none, none, cutoff_hz, none, none, why)
 
 
 def _unlike(alike: Repeats, found: Periods, least: Array, joints: int) -> str:
@@ -221,7 +266,7 @@ def _between_copies(log: ExperimentLog, found: Reconstructed, folded: _Folded) -
     good = replace(usable(mean), saturated=fold(found.good.saturated.astype(np.float64)) > 0.0)
     varies, counting = folded.periods.noise_variance[:joints], encoder_resolution(found.good) ** 2 / 12.0
     differing = np.asarray(varies / np.maximum(varies, counting))
-    how = Mean(copies * phases, (copies + 1) * phases, folded.periods.count, differing, recording(log), found, fold)
+    how = Mean(copies * phases, (copies + 1) * phases, folded.repeats, differing, recording(log), found, fold)
     return mean, _averaged(how, good, t)
 
 

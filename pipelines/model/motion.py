@@ -70,7 +70,7 @@ class Mean:
 
     first: int  # samples from here on are the mean; those before are copies of it
     last: int  # and those from here on
-    periods: int  # in the mean
+    periods: float  # in the mean: of each of its samples, on average
     differing: Array  # (joints,) share of the noise variance of positions that differs between periods; the rest repeats
     source: ExperimentLog
     whole: Reconstructed  # the motion of the source

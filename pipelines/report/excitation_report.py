@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pipelines.model.excitation.rehearse import Rehearsal
+from pipelines.model.excitation.doubts import beyond_words
 from pipelines.model.excitation.result import DrawnPlan, Result
 from pipelines.report.excitation_apart import alike_words, apart_section, are_rivals
 from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
@@ -37,19 +37,11 @@ def excitation_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     found = result.rehearsal
-    if not result.reached or result.interrupted or result.rehearsal_failed or (found is not None and _trouble(result, found)):
+    if not result.reached or result.interrupted or result.rehearsal_failed or (found is not None and not found.safe):
         return "attention"
     if are_rivals(result.apart):
         return "attention"
     return "good" if result.torque_checked else "attention"
-
-
-def _trouble(result: Result, found: Rehearsal) -> list[str]:
-    """What its rehearsal says against a motion: drives that saturate, joints beyond their speed."""
-    full = [f"the drive of {name} saturates in {format_number(100 * share, 2)} % of the samples"
-            for name, share in zip(result.joints, found.saturated, strict=True) if share > 0.0]
-    return full + [f"{result.joints[j]} reaches {format_number(100 * share, 3)} % of its speed limit"
-                   for j, share in found.too_fast]
 
 
 def _verdict(result: Result) -> str:
@@ -65,7 +57,7 @@ def _verdict(result: Result) -> str:
         text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"
     if not result.torque_checked:
         text += "; torque limits could not be checked, for neither a model nor the links are known"
-    if result.rehearsal is not None and (trouble := _trouble(result, result.rehearsal)):
+    if result.rehearsal is not None and (trouble := beyond_words(result.joints, result.rehearsal)):
         text += f"; in the rehearsal {', '.join(trouble)}"
     if result.interrupted:
         text += "; the search was interrupted, this is its best by then"
@@ -112,14 +104,18 @@ def _safety(result: Result) -> Section:
                     if not result.torque_checked or result.torque_bounded else
                     "It was not rehearsed in simulation.")
     else:
-        end = ", ".join(_trouble(result, found)) or "no drive saturates, no joint exceeds its speed"
-        text.append(f"Its first {found.seconds:.3g} s were rehearsed in simulation under PD control of 8 Hz a joint, without "
+        end = ", ".join(beyond_words(result.joints, found)) or "no drive saturates, no joint exceeds its speed or its range"
+        first = "first " if found.seconds < 0.999 * result.duration else ""
+        text.append(f"Its {first}{found.seconds:.3g} s were rehearsed in simulation under PD control of 8 Hz a joint, without "
                     f"feed-forward: {end}. Another controller will follow otherwise.")
         position, torque, speed = (unit_of(result.limits, quantity) for quantity in ("position", "torque", "speed"))
         tables.append(Table(("joint", f"away, rms [{position}]", f"away, most [{position}]", f"torque, peak [{torque}]",
-                             f"limit [{torque}]", f"speed, peak [{speed}]", f"limit [{speed}]", "saturated [%]"), tuple(
-            (name, found.position_rms[j], found.position_max[j], found.torque_peak[j], found.torque_limit[j], found.speed_peak[j],
-             found.speed_limit[j], 100 * found.saturated[j]) for j, name in enumerate(result.joints))))
+                             f"limit [{torque}]", "used [%]", f"speed, peak [{speed}]", f"limit [{speed}]", "used [%]",
+                             "position, of its range [%]", "saturated [%]"), tuple(
+            (name, found.position_rms[j], found.position_max[j], found.torque_peak[j], found.torque_limit[j],
+             100 * found.torque_peak[j] / found.torque_limit[j], found.speed_peak[j], found.speed_limit[j],
+             100 * found.speed_peak[j] / found.speed_limit[j], 100 * found.position_reach[j] or None,
+             100 * found.saturated[j]) for j, name in enumerate(result.joints))))
     return Section("Before the robot moves", tuple(text), tuple(tables), warning=_UNCHECKED)
 
 
@@ -174,6 +170,8 @@ def _limits(result: Result) -> Section:
         text.append("No model is known: torque limits hold for any parameters between the bounds given.")
         if not result.friction_columns:
             text.append("Friction is not counted in that torque.")
+    if result.speed_share < 1.0:
+        text.append(f"Of every speed limit the plan uses {100 * result.speed_share:.0f} %, for a loop overshoots.")
     if result.torque_checked and result.torque_share < 1.0:
         text.append(f"Of every torque limit the plan uses {100 * result.torque_share:.0f} %; the rest is left to the controller.")
     return Section("Limits", tuple(text), (Table(("joint", "of", "peak", "limit", "unit", "used [%]", "cost [%]"), rows),))
@@ -250,7 +248,10 @@ def _plans_report(result: Result) -> Report:
     sections = [_plans_safety(result), Section("Experiments", (), (table,)), Section("Limits", (words,), (kept,))]
     if moving:
         sections.append(Section("Motions", (), (), tuple(_plan_figure(p, result) for p in moving)))
-    safe = not result.rehearsal_failed and all(found.safe for _, found in result.rehearsals)
+    troubled = [name for name, found in result.rehearsals if not found.safe]
+    if troubled:
+        verdict += f" In the rehearsal of {', '.join(troubled)} a limit is not kept."
+    safe = not result.rehearsal_failed and not troubled
     return Report("Planned experiments", verdict, "neutral" if safe else "attention", None, tuple(sections),
                   basis=(_robot(result),))
 

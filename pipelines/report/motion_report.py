@@ -148,7 +148,9 @@ def _log_section(log: LogResult, series: Series, number: int) -> Section:
         text.append("A stated standard deviation holds only where the innovations are white: do not rely on those of joint "
                     f"{_listed(doubtful)}.")
     if floor is not None:
-        left_out = f" (left out: period {', '.join(map(str, floor.left_out))})" if floor.left_out else ""
+        without = [f"period {', '.join(map(str, floor.left_out))}"] if floor.left_out else []
+        without += [f"the first {floor.settling:.2g} s, in which the motion settled"] if floor.settling else []
+        left_out = f" (left out: {'; '.join(without)})" if without else ""
         mean = ("The motion in the derived log is that of every sample; an estimate takes its equations from the mean of the "
                 "periods, whose deviations stand in the table as well." if log.mean is not None else
                 f"They are not averaged: {floor.unlike}." if floor.unlike else "They are not averaged, as asked for.")

@@ -4,6 +4,7 @@
     found.mean, found.noise_variance                 one period, and the noise of one sample of one period
     passed_std(found.rest, amplitude)                the same noise after a filter
     found.repeats(amplitude)                         whether the periods differ by noise alone
+    found.settling(amplitude, least)                 how long the first of them takes to become like the others
 """
 
 from __future__ import annotations
@@ -22,6 +23,11 @@ Array = npt.NDArray[np.float64]
 _ON_SAMPLE = 1e-3  # of a sample: nearer than this, a phase is taken to lie on a sample
 _OUTLIER = 3.0  # times the usual deviation of a period from the middle one
 _POINTS = 6  # samples that interpolate one between them
+_WINDOWS = 100  # of a period, in which its start is compared with the rest
+_SHORTEST = 8  # samples of a window
+_SETTLED = 3  # windows in a row that are like the rest: what swings passes through zero within one of them
+_REST = (0.6, 0.9)  # of a period: what is like the later ones, if anything is; a filter has the start beside the very end
+_UNSETTLED = 2.0  # times the largest of the rest
 
 
 @dataclass(frozen=True)
@@ -70,9 +76,24 @@ class Periods:
         return Repeats(passed_std(self.rest, amplitude), np.sqrt((signal**2).mean(axis=0)),
                        rough * _white_gain(amplitude, len(self.mean)), order, spread)
 
+    def settling(self, amplitude: Array, least: Array) -> int:
+        """Samples at the start of the first period used that differ from the others by more than the rest of it does.
+
+        0: none; all of them: it goes on dying away to the end.
+        A mean over the whole period hides a start of a fiftieth of it. What noise allows is therefore read from the same
+        period, later on, window by window: the largest deviation there, however it is distributed.
+
+        Args:
+            amplitude: of a filter, as in `passed_std`; a start may stand out in what it passes alone.
+            least: (channels) as in `average_periods`.
+        """
+        first = self.rest[0]
+        return max(_settling(first, least),
+                   _settling(_filtered(first[None], amplitude)[0], least * _white_gain(amplitude, len(first))))
+
 
 def average_periods(x: Array, rate: float, period: float, lags: int = 100, amplitude: Array | None = None,
-                    least: Array | None = None) -> Periods:
+                    least: Array | None = None, without: tuple[int, ...] = ()) -> Periods:
     """Fold `x` (samples, channels...), NaN where missing, at `period` [s].
 
     A period that is no whole number of samples is interpolated by polynomials through six samples, good to 1e-6 of what
@@ -85,6 +106,11 @@ def average_periods(x: Array, rate: float, period: float, lags: int = 100, ampli
             passes alone, where the noise does not hide it.
         least: (channels) deviation of a sample that is never odd: what counting leaves. Periods that are equal but for one
             step of an encoder have no odd one among them.
+        without: periods, counted from 0, to leave out whatever they are like.
+
+    Raises:
+        UsageError: C02, a period of fewer than two samples.
+        InputRejected: T07, fewer than two periods; D02, a part of the period that was never measured; T08, too few samples.
     """
     flat = np.asarray(x, dtype=np.float64).reshape(len(x), -1)
     size = rate * period
@@ -98,7 +124,8 @@ def average_periods(x: Array, rate: float, period: float, lags: int = 100, ampli
     folded, gain, interpolated = _fold(flat, size, count)
     if np.isnan(folded).all(axis=0).any():
         raise InputRejected("D02", "a part of the period was measured in no period at all", remedy="record more periods")
-    outliers = _outliers(folded, amplitude, np.zeros(flat.shape[1]) if least is None else least.ravel())
+    odd = _outliers(folded, amplitude, np.zeros(flat.shape[1]) if least is None else least.ravel())
+    outliers = tuple(sorted({*odd, *without}))
     used = tuple(k for k in range(count) if k not in outliers)
     good = folded[list(used)]
     if np.isnan(good).all(axis=0).any():  # an odd period is the only one that was measured there
@@ -186,6 +213,29 @@ def _apart(away: Array, least: Array) -> npt.NDArray[np.bool_]:
     spread = np.sqrt(np.nansum(away**2, axis=1) / np.maximum(np.isfinite(away).sum(axis=1), 1))
     usual = np.maximum(np.median(spread, axis=0), least)
     return np.asarray((spread > _OUTLIER * usual + 1e-300).any(axis=1))
+
+
+def _settling(first: Array, least: Array) -> int:
+    """Samples at the start of `first` (samples, channels), a period less the mean of all, that stand out in any channel."""
+    window = max(_SHORTEST, len(first) // _WINDOWS)
+    count = len(first) // window
+    power = (first[:count * window].reshape(count, window, -1) ** 2).mean(axis=1)
+    low, high = (int(share * count) for share in _REST)
+    if high - low < _SETTLED:
+        return 0
+    rest = power[low:high]
+    odd = np.flatnonzero((np.sqrt(power) > _UNSETTLED * np.maximum(np.sqrt(rest.max(axis=0)), least) + 1e-300).any(axis=1))
+    last = -1  # window of those that differ from the start on
+    for k in odd.tolist():
+        if k - last > _SETTLED:
+            break
+        last = k
+    if last < 0:
+        return 0
+    # what is slow has not died away in the rest, and makes that look worse than noise is
+    between = power[last + 1:low].mean(axis=0) if last + 1 < low else np.inf
+    ended = between <= (_UNSETTLED * np.maximum(np.sqrt(rest.mean(axis=0)), least)) ** 2 + 1e-300
+    return (last + 1) * window if np.all(ended) else len(first)
 
 
 def _white_gain(amplitude: Array, samples: int) -> float:

@@ -122,7 +122,8 @@ def test_the_report_warns_in_bold(tmp_path: Path) -> None:
     ({"robot": "nobody"}, "RRID-C04"),
     ({"criterion": "C"}, "RRID-C02"), ({"periods": 0}, "RRID-C02"), ({"evaluations": 0}, "RRID-C02"),
     ({"seconds": float("nan")}, "RRID-C02"), ({"seed": -1}, "RRID-C02"), ({"tip_speed": 0.0}, "RRID-C02"),
-    ({"noise": (1.0, -1.0, 1.0)}, "RRID-C02"), ({"torque_share": 1.5}, "RRID-C02"), ({"bounds": "nothing"}, "RRID-C02"),
+    ({"noise": (1.0, -1.0, 1.0)}, "RRID-C02"), ({"torque_share": 1.5}, "RRID-C02"), ({"speed_share": 1.5}, "RRID-C02"),
+    ({"bounds": "nothing"}, "RRID-C02"),
     ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),
 ])
 def test_wrong_usage_is_said(changes: dict[str, Any], code: str, tmp_path: Path) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.mean_period import mean_period
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.mean_period import doubts, mean_period
 from pipelines.model.motion import Reconstruction, reconstruct
-from tests.model.estimation.experiments import motion_of, periodic
+from tests.healthy import with_signal
+from tests.model.estimation.experiments import looped, motion_of, one_period, periodic
 
 
 @pytest.mark.parametrize(("encoder", "gain"), [(3e-6, np.sqrt(5.0)), (3e-5, np.sqrt(5.0)), (0.0, 1.0)])
@@ -33,3 +35,87 @@ def test_the_mean_is_as_good_as_it_says(encoder: float, gain: float) -> None:
         assert ((ratio > 0.7) & (ratio < 1.1)).all(), (name, ratio)
         single = (getattr(found.motion, name) - np.tile(true, (5, 1)))[10_000:-10_000].std(axis=0)
         np.testing.assert_allclose(single / error, gain, rtol=0.15)
+
+
+def settling(periods: int, seconds: float, lead: int = 0) -> ExperimentLog:
+    """An elbow that starts 0.02 rad off and gets there in `seconds`; after it, `lead` samples of a further period."""
+    def sag(q: Array, tau: Array) -> None:
+        away = 0.02 * np.exp(-np.arange(len(q)) * 1e-3 / seconds)
+        q[:, 2] += away
+        tau[:, 2] -= 20.0 * away  # what a loop with that gain answers
+
+    log = periodic(0, periods + 1, spoil=sag)
+    rows = slice(0, 10_000 * periods + lead)
+    return with_signal(log, **{name: log[name][rows] for name in ("t", "q", "tau")})
+
+
+def elbow_error(log: ExperimentLog) -> float:
+    """[rad] largest error of the elbow's mean position."""
+    _, made = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert made is not None
+    mean_log, mean = made
+    assert mean.mean is not None
+    inside = slice(mean.mean.first, mean.mean.last)
+    phase = np.rint(mean_log.t[inside] / 1e-3).astype(int) % 10_000
+    return float(np.abs(mean.motion.q[inside, 2] - one_period(0)[0][phase, 2]).max())
+
+
+def test_of_two_periods_the_start_alone_is_left_out() -> None:
+    """The mean is the true period to 1e-5 rad, not 0.01 beside it, and counts for a little less than two."""
+    log = settling(2, 0.1)
+    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert made is not None
+    assert made[1].mean is not None
+    assert floor.left_out == ()
+    assert 0.5 <= floor.settling <= 1.0
+    assert made[1].mean.periods == pytest.approx(2.0 - floor.settling / 10.0, abs=0.01)
+    assert elbow_error(log) < 2e-5
+    (check,) = doubts(floor, "log")
+    assert f"the first {floor.settling:.2g} s" in check.message
+
+
+def test_where_a_lead_precedes_them_two_whole_periods_remain() -> None:
+    log = settling(2, 0.1, lead=1500)
+    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert made is not None
+    assert made[1].mean is not None
+    assert floor.settling > 0.0
+    assert made[1].mean.periods == 2.0
+    assert elbow_error(log) < 2e-5
+
+
+def test_of_three_periods_the_first_is_left_out() -> None:
+    """As before: two others remain, whose mean has nothing of the start."""
+    log = looped(0, 3)
+    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert made is not None
+    assert (floor.left_out, floor.settling, floor.periods) == ((1,), 0.0, 2)
+
+
+def test_two_periods_that_never_settle_are_not_averaged() -> None:
+    """A sag that is still dying away at the end leaves nothing to compare: said, and every sample is used as it is."""
+    log = settling(2, 4.0)
+    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert made is None
+    (check,) = doubts(floor, "log")
+    assert check.code == "RRID-T10"
+    assert "not averaged" in check.message
+
+
+def test_a_start_is_left_out_of_a_period_that_cannot_be_spared() -> None:
+    """Both later periods lack the same tenth of a second, which the first one has: periods are counted from after its start."""
+    log = settling(3, 0.1)
+    q = log.q.copy()
+    for later in (1, 2):
+        q[later * 10_000 + 5000:later * 10_000 + 5100] = np.nan
+    log = with_signal(log, q=q)
+    floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert made is not None
+    assert (floor.left_out, floor.periods) == ((), 2)
+    assert floor.settling > 0.0
+    assert elbow_error(log) < 2e-5

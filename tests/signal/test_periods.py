@@ -130,3 +130,53 @@ def test_the_mean_of_some_periods() -> None:
     """Of the signal itself, whatever it is: the third period alone."""
     x = np.arange(2000.0)[:, None]
     np.testing.assert_array_equal(mean_of_periods(x, 1000.0, 0.5, (2,))[:, 0], np.arange(1000.0, 1500.0))
+
+
+ALL = np.ones(251)  # passes every harmonic
+NO_STEPS = np.zeros(2)
+
+
+def settling(periods: int, size: float, seconds: float, seed: int = 5) -> np.ndarray:
+    """Periods of 500 samples, noise of 0.1 and 0.02, whose second channel starts off by `size` and dies away in `seconds`."""
+    x = noisy(periods, seed)
+    x[:, 1] += size * np.exp(-np.arange(len(x)) * 1e-3 / seconds)
+    return x
+
+
+def test_a_start_that_dies_away_is_found_until_noise_hides_it() -> None:
+    """e^(-t/10 ms) in noise of 0.02 is three times the noise of a difference after 25 ms."""
+    found = average_periods(settling(2, 1.0, 0.01), 1000.0, 0.5)
+    assert 20 <= found.settling(ALL, NO_STEPS) <= 45
+    assert average_periods(settling(2, 0.0, 0.01), 1000.0, 0.5).settling(ALL, NO_STEPS) == 0
+
+
+def test_a_start_that_noise_hides_is_found_in_what_the_low_pass_leaves() -> None:
+    """0.1 e^(-t/30 ms) in noise of 0.02, of which 40 Hz leave 0.005: seen for longer."""
+    found = average_periods(settling(2, 0.1, 0.03), 1000.0, 0.5)
+    assert found.settling(ALL, NO_STEPS) < 30
+    assert 30 < found.settling(LOW, NO_STEPS) <= 120
+
+
+def test_a_start_that_dies_away_slowly_is_told_from_one_that_ends() -> None:
+    """1 e^(-t/0.2 s) is there at the end of the period of 0.5 s still."""
+    assert average_periods(settling(2, 1.0, 0.2), 1000.0, 0.5).settling(ALL, NO_STEPS) == 500
+
+
+def test_what_is_periodic_has_no_start() -> None:
+    """Of 300 noisy pairs of periods at most three seem to have one, and one step of an encoder is none."""
+    assert sum(average_periods(noisy(2, seed), 1000.0, 0.5).settling(LOW, NO_STEPS) > 0 for seed in range(300)) <= 3
+    x = np.round(periodic(1000, 500) / 1e-3) * 1e-3
+    x[3, 0] += 1e-3
+    assert average_periods(x, 1000.0, 0.5).settling(ALL, np.full(2, 1e-3 / np.sqrt(12.0))) == 0
+
+
+def test_what_differs_later_is_no_start() -> None:
+    """A push in the middle of the first of two periods."""
+    x = noisy(2)
+    x[200:230, 1] += 1.0
+    assert average_periods(x, 1000.0, 0.5).settling(ALL, NO_STEPS) == 0
+
+
+def test_a_period_can_be_left_out_by_name() -> None:
+    found = average_periods(noisy(4), 1000.0, 0.5, without=(0,))
+    assert (found.used, found.outliers) == ((1, 2, 3), (0,))

@@ -17,6 +17,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.errors import Interrupted
 from pipelines.fit.design.budget import Budget, SpentError
 from pipelines.fit.design.lbfgs import minimise
 
@@ -130,7 +131,11 @@ class _Climber:
 
     def _value(self, x: Array, one: Round) -> tuple[float, Array]:
         self.budget.spend()
-        value, gradient, score = self.land.value(x, one.sharpness, one.weight)
+        try:
+            value, gradient, score = self.land.value(x, one.sharpness, one.weight)
+        except Interrupted:  # it has told nothing: as many evaluations as are counted shall give the same answer again
+            self.budget.done -= 1
+            raise
         if np.isfinite(value):
             for best in (self._own, self.best):
                 if score < best.score:

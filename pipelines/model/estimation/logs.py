@@ -156,10 +156,10 @@ def _enough(equations: Sequence[LogEquations], log: ExperimentLog) -> None:
     counts = np.sum([one.counts * one.repeats for one in equations], axis=0)
     j = int(np.argmin(counts))
     if counts[j] < _FEWEST_OF_JOINT:
-        raise InputRejected("T08", f"{counts[j]} equations of joint {j + 1} are left", where=log.source or log.name,
+        raise InputRejected("T08", f"{counts[j]:.0f} equations of joint {j + 1} are left", where=log.source or log.name,
                             remedy="lower --min-speed or --decimate, or record longer")
     if counts.sum() < _FEWEST:
-        raise InputRejected("T08", f"{counts.sum()} equations are left, too few for a fit", where=log.source or log.name,
+        raise InputRejected("T08", f"{counts.sum():.0f} equations are left, too few for a fit", where=log.source or log.name,
                             remedy="lower --decimate, filter higher with --filter, or record longer")
 
 

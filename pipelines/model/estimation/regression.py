@@ -176,8 +176,8 @@ class LogEquations:
         return tuple(slice(max(run.start, mean.first), min(run.stop, mean.last)) for run in self.runs)
 
     @property
-    def repeats(self) -> int:
-        """Periods of which each equation is the mean: scaled by the root of it, all equations have noise of one strength."""
+    def repeats(self) -> float:
+        """Periods of which an equation is the mean, on average; scaled by its root, all have noise of one strength."""
         return 1 if self.found.mean is None else self.found.mean.periods
 
     @property

@@ -35,6 +35,9 @@ class Asked(Protocol):
     def torque_share(self) -> float: ...  # of the limits
 
     @property
+    def speed_share(self) -> float: ...  # of the limits
+
+    @property
     def mode_factor(self) -> float: ...
 
     @property
@@ -61,8 +64,8 @@ def refuse_strange(settings: Asked) -> None:
     """
     positive = (("--seconds", settings.seconds), ("--evaluations", settings.evaluations), ("--cond-max", settings.cond_max),
                 ("--periods", settings.periods), ("--tip-speed", settings.tip_speed), ("sample_time", settings.sample_time),
-                ("torque_share", settings.torque_share), ("mode_factor", settings.mode_factor),
-                *(("noise", value) for value in settings.noise or ()))
+                ("torque_share", settings.torque_share), ("speed_share", settings.speed_share),
+                ("mode_factor", settings.mode_factor), *(("noise", value) for value in settings.noise or ()))
     for where, value in positive:
         if value is not None and not 0.0 < value < math.inf:
             raise UsageError("C02", f"{value:g} is not positive and finite", where=where, remedy="give a positive number")
@@ -70,8 +73,8 @@ def refuse_strange(settings: Asked) -> None:
         raise UsageError("C02", "a number is not finite", where="--home, --tip-box, --keep-out", remedy="give finite numbers")
     if any(low > high for low, high in zip(settings.keep_out[::2], settings.keep_out[1::2], strict=False)):
         raise UsageError("C02", "a band ends below where it begins", where="--keep-out", remedy="write 5,8 [Hz]")
-    if settings.torque_share > 1.0:
-        raise UsageError("C02", f"{settings.torque_share:g} of the torque limits is more than there is", where="torque_share",
-                         remedy="give 1 at most")
+    for where, share in (("torque_share", settings.torque_share), ("speed_share", settings.speed_share)):
+        if share > 1.0:
+            raise UsageError("C02", f"{share:g} of the limits is more than there is", where=where, remedy="give 1 at most")
     if settings.seed < 0:
         raise UsageError("C02", f"the seed {settings.seed} is negative", where="--seed", remedy="give 0 or more")

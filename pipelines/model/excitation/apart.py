@@ -21,7 +21,7 @@ import numpy as np
 from pipelines.errors import Interrupted, UsageError
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
-from pipelines.model.excitation.design import Design, finished, landscape
+from pipelines.model.excitation.design import FINISH, Design, finished, landscape
 from pipelines.model.excitation.problem import DesignProblem, grams_of
 from pipelines.model.excitation.task import Task
 from pipelines.model.rigid.body import Array, Motion
@@ -101,7 +101,7 @@ def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluat
                 tell(f"evaluation {done}: similarity {now.similarity:.3f}")
     except Interrupted as signal:  # whoever stops the search wants what it has found by then
         stopped = signal.exit_code
-    after = finished(task, landscape(task, 1, 20), x, designed.evaluations + done, designed.evaluations + done, stopped,
+    after = finished(task, landscape(task, 1, FINISH), x, designed.evaluations + done, designed.evaluations + done, stopped,
                      now.condition_number <= wanted)
     last = alike(task, arm, after.trajectory.series.samples(problem.samples), pair)
     names = tuple(one.name if one.joint is None else f"{one.name}:{one.joint}" for one in (pair.first, pair.second))

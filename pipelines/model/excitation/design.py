@@ -23,9 +23,9 @@ from pipelines.model.excitation.verify import GRID, Peak, peaks, worst
 from pipelines.model.rigid.body import Array
 from pipelines.signal.fourier import good_size
 
-__all__ = ["Design", "Effort", "design", "finished", "landscape"]
+__all__ = ["FINISH", "Design", "Effort", "design", "finished", "landscape"]
 
-_COARSE, _FINE, _FINISH = 8, 10, 20  # samples of a period for each harmonic
+_COARSE, _FINE, FINISH = 8, 10, 20  # samples of a period for each harmonic
 _FEWEST = 200  # samples of a period: fewer do not show what friction does
 _FIFTH = 5  # of the harmonics in the coarse problem
 _FINISHING = (Round(600, 1e-4, 60), Round(2000, 2e-5, 120), Round(6000, 4e-6, 150), Round(20000, 1e-6, 200))
@@ -73,7 +73,7 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
     Raises:
         UsageError: C08, no motion keeps the limits: says which one is in the way.
     """
-    fine, coarse, finish = landscape(task), landscape(task, _FIFTH, _COARSE), landscape(task, 1, _FINISH)
+    fine, coarse, finish = landscape(task), landscape(task, _FIFTH, _COARSE), landscape(task, 1, FINISH)
     _refuse_impossible(fine, np.random.default_rng(seed))
     best = Best()
     budget = Budget(effort.seconds, effort.evaluations, lambda done: effort.tell(_progress(task, done, best)),

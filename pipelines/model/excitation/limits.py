@@ -72,10 +72,10 @@ def middle_and_half(limits: tuple[Limit, ...]) -> tuple[Array, Array]:
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
-def limits_of(robot: RobotDescription, *, torque_share: float = 1.0, tip_speed: float | None = None,
+def limits_of(robot: RobotDescription, *, torque_share: float = 1.0, speed_share: float = 1.0, tip_speed: float | None = None,
               tip_box: Array | None = None) -> Limits:
-    """The limits a description states; of the torque, the share that a plan may use."""
+    """The limits a description states; of torque and speed, the share that a plan may use."""
     joints = robot.joints
-    return Limits(np.array([joint.position for joint in joints]), np.array([joint.velocity for joint in joints]),
+    return Limits(np.array([joint.position for joint in joints]), speed_share * np.array([joint.velocity for joint in joints]),
                   np.array([joint.acceleration for joint in joints]), torque_share * np.array([j.torque for j in joints]),
                   tip_speed, tip_box, robot.revolute)

@@ -90,6 +90,7 @@ class Result:
     torque_checked: bool = False
     torque_bounded: bool = False  # by bounds on the parameters, for no model is known
     torque_share: float = 1.0
+    speed_share: float = 1.0  # of the speed limit that the plan may use
     after: tuple[str, ...] = ()
     first_mode: float | None = None  # [Hz]
     mode_factor: float = 1.0  # times that the top harmonic lies below it, at least

@@ -53,6 +53,7 @@ class Wishes:
     friction: bool | None = None
     noise: tuple[float, ...] | None = None  # [N m] standard deviation of the torque
     torque_share: float = 0.9
+    speed_share: float = 0.95
     tip_speed: float | None = None  # [m/s]
     tip_box: tuple[float, ...] | None = None  # [m] x from, to, y from, to, z from, to
     sample_time: float = 1e-3  # [s]
@@ -99,7 +100,8 @@ def plan_task(robot: RobotDescription, arm: Arm | None, wishes: Wishes, earlier:
     friction = wishes.friction if wishes.friction is not None else not direct
     columns = arm_columns(body, friction=friction)
     box = None if wishes.tip_box is None else _box(wishes.tip_box)
-    limits = limits_of(robot, torque_share=wishes.torque_share, tip_speed=wishes.tip_speed, tip_box=box)
+    limits = limits_of(robot, torque_share=wishes.torque_share, speed_share=wishes.speed_share, tip_speed=wishes.tip_speed,
+                       tip_box=box)
     harmonics = _harmonics(wishes, robot.n_joints, _TOP_HZ if direct else _GEARED_TOP_HZ)
     samples = round(harmonics.period / wishes.sample_time) * wishes.periods
     beta = _beta(columns, arm, robot) if arm is not None else bounds.middle if bounds is not None else None

@@ -9,11 +9,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.experiment import Array, Controller, ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.rigid.body import Motion
+from pipelines.model.simulation import Experiment, Noise, simulate
 from sample_logs.make_closed_form import (
     NOISE,
     Fourier,
@@ -86,6 +87,20 @@ def periodic(seed: int, periods: int, encoder: float = 3e-6, role: str = "identi
     values = {"t": np.arange(len(q), dtype=np.float64) * 1e-3, "q": quantised(q + encoder * rng.standard_normal(q.shape), 1e-5),
               "tau": quantised(tau + NOISE * rng.standard_normal(q.shape), torque_step(log.robot))}
     return replace(log, signals={name: replace(log.signals[name], values=x) for name, x in values.items()}, name=f"periodic-{seed}")
+
+
+@lru_cache(maxsize=8)
+def looped(seed: int, periods: int, role: str = "identify", loop_hz: float = 8.0) -> ExperimentLog:
+    """The same motion under PD control without feed-forward, from rest: the arm sags some hundredths of a radian at first."""
+    log, t = experiment(seed, role), np.arange(10_000 * periods, dtype=np.float64) * 1e-3
+    motion, omega = motion_of(seed)(t), 2.0 * math.pi * loop_hz
+    inertia = np.diag(arm().body.mass_matrix(motion.q[:1], arm().p)[0])
+    law = Controller("pd", kp=inertia * omega**2, kd=2.0 * inertia * omega, velocity="backward-difference", delay=0,
+                     output_limit=np.array([joint.torque for joint in log.robot.joints]))
+    asked = Experiment(1e-3, 0.0, law, motion.q, motion.dq, motion.ddq, motion.q[0], motion.dq[0], np.zeros(3), np.full(3, 1e-5))
+    done = simulate(arm(), asked, Noise(NOISE, np.zeros(3)), (seed,))
+    values = {"t": t, "q": done.q[0], "tau": done.tau[0]}
+    return replace(log, signals={name: replace(log.signals[name], values=x) for name, x in values.items()}, name=f"{role}-{seed}")
 
 
 def truth(names: list[str]) -> Array:

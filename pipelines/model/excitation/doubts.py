@@ -1,0 +1,35 @@
+"""What is said against a design: a ceiling that was not reached, a rehearsal that failed or went beyond a limit."""
+
+from __future__ import annotations
+
+from pipelines.errors import Check
+from pipelines.model.excitation.rehearse import Rehearsal
+from pipelines.model.excitation.result import Result
+
+__all__ = ["beyond_words", "doubts"]
+
+
+def doubts(result: Result) -> tuple[Check, ...]:
+    """C08, the condition number that was asked for; D17, no rehearsal; D12, a limit that the rehearsal did not keep."""
+    found = []
+    if not result.reached:
+        dear = result.dearest
+        found.append(Check.of("C08", "warn", f"a condition number of {result.ceiling:g} was not reached"
+                              f"{f'; the {dear} is most in the way' if dear else ''}", where=result.robot, gate=True,
+                              remedy="search longer, give more harmonics, or widen that limit"))
+    if result.rehearsal_failed:
+        found.append(Check.of("D17", "warn", f"the rehearsal failed: {result.rehearsal_failed}", where=result.robot,
+                              remedy="check the model before the robot moves"))
+    motion = () if result.rehearsal is None else (("the motion", result.rehearsal),)
+    found += [Check.of("D12", "warn", f"rehearsed in simulation, {name} goes beyond limits: {', '.join(words)}", where=result.robot,
+                       gate=True, remedy="plan a slower one (speed_share, torque_share), or make sure that your controller "
+                       "follows more closely")
+              for name, rehearsal in (*motion, *result.rehearsals) if (words := beyond_words(result.joints, rehearsal))]
+    return tuple(found)
+
+
+def beyond_words(joints: tuple[str, ...], found: Rehearsal) -> list[str]:
+    """What a rehearsal says against a motion, limit by limit: drives that saturate, joints beyond their speed or range."""
+    return [f"the drive of {joints[one.joint]} saturates in {100.0 * found.saturated[one.joint]:.2g} % of the samples"
+            if one.quantity == "torque" else f"{joints[one.joint]} reaches {100.0 * one.share:.4g} % of its {one.quantity} limit"
+            for one in found.beyond]

@@ -1,0 +1,50 @@
+"""A limit that a rehearsal does not keep is said, with a code, and is a gate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.design_excitation import STAGE
+from pipelines.model.excitation.doubts import doubts
+from pipelines.model.excitation.result import Result
+from pipelines.report.excitation_report import excitation_report
+from tests.design_excitation.short import QUICK, designed
+
+
+@pytest.fixture(scope="module")
+def safe(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    result = designed(tmp_path_factory.mktemp("safe") / "out", replace(QUICK, rehearse=True, cond_max=20.0)).result
+    assert isinstance(result, Result)
+    return result
+
+
+def test_a_plan_that_is_followed_within_its_limits_raises_no_doubt(safe: Result) -> None:
+    assert doubts(safe) == ()
+    assert STAGE.exit_code(safe, True) == 0
+
+
+def test_each_joint_beyond_a_limit_is_named(safe: Result) -> None:
+    """104 % of the waist's speed and a drive that saturates: a warning, a gate, and the verdict's own words."""
+    assert safe.rehearsal is not None
+    speed = np.array(safe.rehearsal.speed_peak)
+    speed[0] = 1.04 * safe.rehearsal.speed_limit[0]
+    bad = replace(safe, rehearsal=replace(safe.rehearsal, speed_peak=tuple(speed.tolist()), saturated=(0.0, 0.0, 0.25)))
+    (check,) = doubts(bad)
+    assert (check.code, check.level, check.gate) == ("RRID-D12", "warn", True)
+    for words in (f"{safe.joints[0]} reaches 104 % of its speed limit", f"the drive of {safe.joints[2]} saturates in 25 %"):
+        assert words in check.message
+        assert words in excitation_report(bad).verdict
+    assert STAGE.exit_code(bad, True) == 1
+    assert STAGE.exit_code(bad, False) == 0
+
+
+def test_what_no_smaller_motion_mends_is_not_silent(tmp_path: Path) -> None:
+    """Torque noise of half the limits saturates the drives however small the motion is."""
+    outcome = designed(tmp_path / "out", replace(QUICK, rehearse=True, noise=(30.0, 30.0, 10.0), cond_max=20.0))
+    assert outcome.result.rehearsal is not None
+    assert max(outcome.result.rehearsal.saturated) > 0.0
+    assert [check.code for check in outcome.checks if "saturates" in check.message] == ["RRID-D12"]

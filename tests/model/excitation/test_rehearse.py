@@ -1,0 +1,73 @@
+"""A design keeps its limits when the arm follows it, not on paper alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.robot import RobotDescription
+from pipelines.model.excitation.design import Design, Effort, design
+from pipelines.model.excitation.rehearse import Rehearsal, rehearse, rehearsed_design
+from pipelines.model.excitation.task import Task, Wishes, plan_task
+from tests.model.excitation.arms import described, rrr
+
+SHORT = replace(Wishes(), criterion="A", harmonics=(15,))
+
+
+def designed(wishes: Wishes, robot: RobotDescription, seed: int = 1) -> tuple[Task, Design]:
+    task = plan_task(robot, described(robot), wishes)
+    return task, design(task, Effort(evaluations=200), seed)
+
+
+def plain(task: Task, found: Design) -> Rehearsal:
+    """The whole motion in simulation, as it stands."""
+    assert task.arm is not None
+    _, motion = found.trajectory.sampled(task.sample_time)
+    return rehearse(task.arm, task.sample_time, motion, task.problem.goal.noise, 1, np.inf)
+
+
+@pytest.mark.parametrize("rest", [True, False])
+def test_a_plan_at_its_speed_limit_is_made_as_small_as_its_rehearsal_asks(rest: bool) -> None:
+    """Without a reserve the loop overshoots by some per cent; so much smaller the motion is, and no more."""
+    task, found = designed(replace(SHORT, speed_share=1.0, rest=rest), rrr())
+    before = plain(task, found)
+    assert {one.quantity for one in before.beyond} == {"speed"}
+    overshoot = max(one.share for one in before.beyond)
+    kept, rehearsal, failed = rehearsed_design(task, found, 1, lambda words: None)
+    assert failed == ""
+    assert rehearsal is not None
+    assert rehearsal.safe
+    assert 0.98 < kept.shrunk / found.shrunk * overshoot <= 1.0
+    assert plain(task, kept).safe
+    assert all(peak.share <= 1.0 for peak in kept.peaks)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_reserve_is_what_an_overshoot_takes(seed: int) -> None:
+    """A plan to 95 % of the speed limit, which it uses to the full, is followed within the limit: nothing is made smaller."""
+    task, found = designed(SHORT, rrr(), seed)
+    assert max(peak.share for peak in found.peaks if peak.quantity == "speed") > 0.999
+    kept, rehearsal, _ = rehearsed_design(task, found, seed, lambda words: None)
+    assert kept is found
+    assert rehearsal is not None
+    assert 0.95 < max(np.divide(rehearsal.speed_peak, rehearsal.speed_limit)) <= 1.0
+
+
+def test_a_range_is_kept_by_the_arm_as_by_the_plan() -> None:
+    """Joints that may turn by a radian each way of the horizontal: sagging, the shoulder leaves the range that a plan uses up."""
+    task, found = designed(replace(SHORT, home=(0.0, -0.3, 0.0)), rrr(position=(-1.0, 1.0)))  # type: ignore[arg-type]
+    before = plain(task, found)
+    assert "position" in {one.quantity for one in before.beyond}
+    kept, rehearsal, _ = rehearsed_design(task, found, 1, lambda words: None)
+    assert rehearsal is not None
+    assert rehearsal.safe
+    assert max(rehearsal.position_reach) > 0.98
+    assert 0.9 < kept.shrunk <= 1.0
+
+
+def test_without_a_model_nothing_is_rehearsed() -> None:
+    task = plan_task(rrr(), None, SHORT)
+    found = design(task, Effort(evaluations=100), 1)
+    assert rehearsed_design(task, found, 1, lambda words: None) == (found, None, "")
