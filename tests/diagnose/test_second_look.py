@@ -23,6 +23,7 @@ from pipelines.model.diagnosis.pruned import NEAR_THE_FLOOR
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.twin import Twin
+from pipelines.model.diagnosis.verdict import REST_UNKNOWN
 from tests.diagnose.sessions import but
 from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 
@@ -87,7 +88,7 @@ class SimpleFit:
 def looked(*causes: tuple[Any, Any]) -> Any:
     """A search that names each of these, and what it left of three joints with a floor of 0.01."""
     found = searched(left(0.1, 0.1, 0.01), *causes)
-    return SimpleNamespace(found=found, ruling=SimpleNamespace(named=range(len(causes)), reason=""))
+    return SimpleNamespace(found=found, ruling=SimpleNamespace(named=range(len(causes)), reason="", doubts={}))
 
 
 HUMP, DRAG, OTHER, THERE = effect("stribeck", 1), effect("quadratic_drag", 1), effect("concave_friction", 1), effect("stribeck", 2)
@@ -104,6 +105,16 @@ HUMP, DRAG, OTHER, THERE = effect("stribeck", 1), effect("quadratic_drag", 1), e
     (((HUMP, left(0.02, 0.1, 0.01)), (THERE, left(0.02, 0.01, 0.01))), ((HUMP, left(0.02, 0.1, 0.01)),), False)])  # half of it less
 def test_a_second_look_is_believed_where_it_explains_as_much(first: Any, second: Any, believed: bool) -> None:
     assert second_look._believed(looked(*first), looked(*second), FLOOR, np.full(3, 0.02)) is believed
+
+
+@pytest.mark.parametrize(("why", "believed"), [(REST_UNKNOWN, False), ("it takes away less", True)])
+def test_what_was_doubted_beside_much_without_a_name_is_not_named_by_white_rows(why: str, believed: bool) -> None:
+    """Cogging in the rest of a friction that differs by direction and passes for an offset: in white rows the joint stands nearer to
+    its floor."""
+    offset, waves = (effect("torque_offset", 1), left(0.02, 0.1, 0.01)), (effect("cogging", 1), left(0.019, 0.1, 0.01))
+    first = looked(offset, waves)
+    first.ruling.named, first.ruling.doubts = (0,), {1: why}
+    assert second_look._believed(first, looked(offset, waves), FLOOR, np.full(3, 0.02)) is believed
 
 
 @pytest.mark.parametrize(("scatter", "elsewhere", "leaves", "believed"), [
