@@ -77,7 +77,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
             held = plainer_of(found, again)
     if held is again:
         memory.instead(prepared, other)
-    held = replace(held, fewer_terms=prepared.fewer)
+    held = replace(held, fewer_terms=prepared.fewer) if prepared.fewer else held
     return replace(held, without_limit=without_limit(held, bool(logs.frf), chosen.without)) if chosen.limits else held
 
 
