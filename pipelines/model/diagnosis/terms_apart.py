@@ -63,9 +63,10 @@ def with_terms_told_apart(prepared: Prepared, blocks: int) -> Prepared:
 
 
 def _sets(prepared: Prepared) -> Iterator[tuple[Data, Data | None]]:
-    yield prepared.data, prepared.judge
+    """Those of the time before first: the laws are to be in the shapes that they had when all was in order."""
     if prepared.reference is not None:
         yield prepared.reference, None
+    yield prepared.data, prepared.judge
 
 
 @dataclass(frozen=True, eq=False)
