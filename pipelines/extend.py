@@ -39,6 +39,7 @@ from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
 from pipelines.model.named_cause import refuse_unknown, wanted_cause
 from pipelines.report.extension_report import extension_report
+from pipelines.report.model_words import fewer_words
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_by_role, slug
 
@@ -117,14 +118,15 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),
-        notes=(f"fitted by rrrid extend, with {', '.join(_place(one.cause, one.joint) for one in found.findings)}",))
+        notes=(f"fitted by rrrid extend, with {', '.join(_place(one.cause, one.joint) for one in found.findings)}",
+               *fewer_words(found.fewer)))
     return Extension(
         accepted=not found.rejected, causes=tuple(dict.fromkeys(one.place for one in wanted)), findings=found.findings,
         rejected=found.rejected,
         gain=found.gain, residual_rms=found.before, after_rms=found.after, held_out=found.held_out,
         standing=tuple(one.place for one in found.standing), robot=name, joints=tuple(joint.name for joint in robot.joints),
         rated=tuple(joint.torque for joint in robot.joints), doctor=said, model=model, derived=_derived(found, settings),
-        laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name)
+        laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name, fewer_terms=found.fewer)
 
 
 def _each(wanted: Sequence[Wanted]) -> tuple[Wanted, ...]:

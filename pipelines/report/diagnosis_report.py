@@ -61,7 +61,8 @@ def diagnosis_report(result: Result) -> Report:
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
                   errors_table(now, result.after_rms, result.rated, floor, name,
                                f"{unmoved_words(result, units)}{floor_from}", units),
-                  tuple(sections), _advice(result), (laws_words(result.laws_of, _IN_RUN), threshold_words(result)))
+                  tuple(sections), _advice(result),
+                  (laws_words(result.laws_of, _IN_RUN, result.fewer_terms), threshold_words(result)))
 
 
 def _verdict(result: Result) -> str:
@@ -209,7 +210,8 @@ def _alike(joints: int) -> str:
 
 def _basis(result: Result) -> Section:
     """Where floor and thresholds come from, and what judged."""
-    text = [laws_words(result.laws_of, _IN_RUN), floor_words(result), held_out_words(result.held_out), threshold_words(result)]
+    text = [laws_words(result.laws_of, _IN_RUN, result.fewer_terms), floor_words(result), held_out_words(result.held_out),
+            threshold_words(result)]
     if result.replicas:
         text.append(f"The twin is the fitted model run {result.replicas} times through the same controllers, references, encoders "
                     f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")

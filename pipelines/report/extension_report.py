@@ -34,7 +34,7 @@ def extension_report(result: Extension) -> Report:
         sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
                   torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.floor, *_NOISE, units),
-                  tuple(sections), basis=(laws_words(result.laws_of),))
+                  tuple(sections), basis=(laws_words(result.laws_of, fewer=result.fewer_terms),))
 
 
 def _verdict(result: Extension) -> str:
@@ -54,7 +54,7 @@ def _first_reason(result: Extension) -> str:
 
 
 def _basis(result: Extension, units: Units) -> Section:
-    text = [laws_words(result.laws_of), held_out_words(result.held_out),
+    text = [laws_words(result.laws_of, fewer=result.fewer_terms), held_out_words(result.held_out),
             "A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its "
             "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the "
             "measured one."]

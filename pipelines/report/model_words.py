@@ -5,10 +5,14 @@ Figures of a stage on its own and within a run differ where they rest on differe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pipelines.model.diagnosis.outcome import Result as Diagnosed
+from pipelines.model.diagnosis.result import FewerTerms
+from pipelines.model.effects import find_effect
 from pipelines.model.estimation.result import Result as Estimated
 
-__all__ = ["friction_words", "laws_words", "threshold_words"]
+__all__ = ["fewer_words", "friction_words", "laws_words", "threshold_words"]
 
 
 def friction_words(result: Estimated) -> str:
@@ -23,13 +27,24 @@ def friction_words(result: Estimated) -> str:
             "friction is fitted with the rest.")
 
 
-def laws_words(laws_of: str, in_run: str = "") -> str:
+def laws_words(laws_of: str, in_run: str = "", fewer: Sequence[FewerTerms] = ()) -> str:
     """Of diagnose and extend, which fit the numbers of their laws themselves; `in_run`: the option that a run has for it."""
     if laws_of:
-        return f"Friction laws: those of {laws_of}, as asked for; their numbers are fitted here."
+        return " ".join((f"Friction laws: those of {laws_of}, as asked for; their numbers are fitted here.", *fewer_words(fewer)))
     other = f" (in a run {in_run})" if in_run else ""
     return ("Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run: no earlier fit of friction is "
             f"taken. --model FILE takes the laws of a model{other}.")
+
+
+def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
+    """One sentence for all joints at which the same laws stand in place of the same one."""
+    found = []
+    for law, taken in dict.fromkeys((one.law, one.taken) for one in fewer):
+        places = [f"joint {one.joint} ({one.reason})" for one in fewer if (one.law, one.taken) == (law, taken)]
+        instead = ", ".join(find_effect(name).title for name in taken)
+        found.append(f"The terms of \"{find_effect(law).title}\" are not told apart by these logs at {', '.join(places)}; "
+                     f"fitted there instead: {instead}.")
+    return tuple(found)
 
 
 def threshold_words(result: Diagnosed) -> str:

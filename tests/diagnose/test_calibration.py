@@ -16,11 +16,13 @@ from pipelines import diagnose, run
 from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.log.files import hash_file
 from pipelines.log.model_file import read_model, write_model
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.calibrated import refuse_unfit
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.calibration_file import calibration_schema, read_calibration, write_calibration
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.effects.coulomb import Coulomb
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from rrrid_cli.settings import make_settings
 from tests.diagnose.sessions import but, healthy_again, session, written
@@ -186,9 +188,10 @@ def test_a_run_takes_it_as_diagnose_does(place: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_run_takes_the_friction_laws_of_a_model(place: Path, tmp_path: Path) -> None:
-    """--set diagnose.model leaves what diagnose --model leaves, which is not what Coulomb and viscous friction leave."""
-    model = tmp_path / "model.json"
-    write_model(model, read_model("rrr"))
+    """--set diagnose.model leaves what diagnose --model leaves, which without viscous friction is not what is left with it."""
+    model, arm = tmp_path / "model.json", Arm.from_model(read_model("rrr"))
+    dry = tuple(Acting.of(Coulomb(j), {"level": 1.0, "sharpness": 100.0}, origin="known") for j in (1, 2, 3))
+    write_model(model, replace(arm, friction=dry).to_model())
     sets = [f"diagnose.model={model}", "diagnose.replicas=0", "diagnose.most=1", f"diagnose.without={list(FEW)}"]
     skipped = [name for name in STAGES if name not in ("inspect", "diagnose")]
     settings = make_settings(run.Settings, "run", (*STAGES, "run"), None, [*sets, f"run.skip={skipped}"], {})
@@ -198,6 +201,20 @@ def test_a_run_takes_the_friction_laws_of_a_model(place: Path, tmp_path: Path) -
                     for name, laws in (("alone", str(model)), ("usual", None)))
     np.testing.assert_array_equal(found.residual_rms.identify, alone.residual_rms.identify)
     assert not np.allclose(found.residual_rms.identify, usual.residual_rms.identify, rtol=1e-3)
+    assert found.fewer_terms == usual.fewer_terms == ()
+
+
+@pytest.mark.slow
+def test_three_sigmoids_where_friction_has_one_leave_what_one_leaves(place: Path, tmp_path: Path) -> None:
+    """Asked for by --model rrr: result.json and the report say where one stands in their place, and the cogging is found."""
+    given, usual = (asked(place / "logs", tmp_path / name, replicas=0, model=laws)
+                    for name, laws in (("given", "rrr"), ("usual", None)))
+    np.testing.assert_allclose(given.result.residual_rms.identify, usual.result.residual_rms.identify, rtol=1e-3)
+    assert [(one.cause, one.joint) for one in given.result.findings] == [("cogging", 2)]
+    stored = json.loads((tmp_path / "given/result.json").read_text())["fewer_terms"]
+    assert [(one["joint"], one["law"], one["taken"]) for one in stored] == [(j, "three_sigmoid", ["coulomb", "viscous"])
+                                                                            for j in (1, 2, 3)]
+    assert any("are not told apart by these logs at joint 1" in text for text in given.report.basis)
 
 
 def test_one_that_was_not_read_is_not_passed_over(place: Path) -> None:

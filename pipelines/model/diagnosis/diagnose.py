@@ -50,7 +50,8 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     """What the nominal model of an arm gets wrong in `logs`, and why.
 
     Args:
-        arm: whose friction laws the nominal model takes, fitted anew; Coulomb and viscous friction where left out.
+        arm: whose friction laws the nominal model takes, fitted anew, with no more terms than `logs` tell apart; Coulomb and
+            viscous friction where left out.
         tell: progress, in words.
         calibration: thresholds that an earlier diagnosis has stored, instead of a twin.
         memory: of what was worked out of these logs, for an extension after it.
@@ -76,6 +77,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
             held = plainer_of(found, again)
     if held is again:
         memory.instead(prepared, other)
+    held = replace(held, fewer_terms=prepared.fewer) if prepared.fewer else held
     return replace(held, without_limit=without_limit(held, bool(logs.frf), chosen.without)) if chosen.limits else held
 
 

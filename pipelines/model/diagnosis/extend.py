@@ -38,7 +38,7 @@ from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import at_odds, vague
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import FewerTerms, Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Moved, since_reference
@@ -83,6 +83,7 @@ class Extended:
     standing: tuple[Acting, ...]  # what the reference logs show as well
     motions: Motions  # fitted, then judging
     fitted: int  # of them
+    fewer: tuple[FewerTerms, ...] = ()  # laws of friction that gave way to plainer ones
 
 
 def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | None = None, arm: Arm | None = None,
@@ -90,7 +91,8 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     """The nominal model with the wanted causes, as far as the held-out logs bear them out.
 
     Args:
-        arm: whose friction laws the nominal model takes, fitted anew; Coulomb and viscous friction where left out.
+        arm: whose friction laws the nominal model takes, fitted anew, with no more terms than `logs` tell apart; Coulomb and
+            viscous friction where left out.
         memory: of what a diagnosis of these logs has worked out of them.
 
     Raises:
@@ -264,7 +266,8 @@ def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, 
             torque_gain_of(rows, was, now), *simulation_errors([bare, arm], prepared.judging or prepared.motions))
     rejected = tuple(Rejected(cause, joint, reason) for (cause, joint), reason in refused.items())
     return Extended(arm, tuple(sorted(every, key=lambda one: -one.explained)), rejected, gain, rms[0], rms[1],
-                    "blocks" if judge is None else "logs", standing, (*prepared.motions, *prepared.judging), len(prepared.motions))
+                    "blocks" if judge is None else "logs", standing, (*prepared.motions, *prepared.judging), len(prepared.motions),
+                    prepared.fewer)
 
 
 def with_uncertainty(arm: Arm, done: Refined) -> Arm:

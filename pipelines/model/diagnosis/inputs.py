@@ -18,6 +18,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
+from pipelines.model.diagnosis.result import FewerTerms
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.sharper import sharpened
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, with_cutoff
@@ -67,6 +68,7 @@ class Prepared:
     data: Data
     judge: Data | None  # None: blocks of the fitted ones judge
     reference: Data | None
+    fewer: tuple[FewerTerms, ...] = ()  # laws that gave way to plainer ones
 
 
 def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> Prepared:
@@ -97,8 +99,9 @@ def narrowed(prepared: Prepared, cutoff_hz: float, min_speed: Sequence[float]) -
     recipe = prepared.recipe
     lower = cutoff_hz if recipe.cutoff_hz is None else min(cutoff_hz, recipe.cutoff_hz)
     speeds = tuple(np.maximum(np.broadcast_to(np.array(recipe.min_speed), len(min_speed)), min_speed).tolist())
-    return _laid(prepared.logs, prepared.columns, replace(recipe, cutoff_hz=lower, min_speed=speeds), prepared.motions,
+    laid = _laid(prepared.logs, prepared.columns, replace(recipe, cutoff_hz=lower, min_speed=speeds), prepared.motions,
                  prepared.judging, prepared.referring)
+    return replace(laid, fewer=prepared.fewer)
 
 
 def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging: Motions, referring: Motions) -> Prepared:

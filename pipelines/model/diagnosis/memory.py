@@ -14,6 +14,7 @@ from pipelines.model.diagnosis.gates import examined
 from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Since, since_reference
+from pipelines.model.diagnosis.terms_apart import with_terms_told_apart
 
 __all__ = ["Memory"]
 
@@ -38,10 +39,11 @@ class Memory:
         return made
 
     def prepared(self, logs: Logs, chosen: DiagnosisSettings, arm: Arm | None) -> Prepared:
-        """As `prepare`."""
+        """As `prepare`, for laws of friction whose terms these logs tell apart."""
         parts = (logs.identify, logs.validate, logs.reference, logs.frf, logs.frf_before)
-        settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed)
-        return self.of("rows", (arm, *(log for part in parts for log in part)), settings, lambda: prepare(logs, chosen, arm))
+        settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed, chosen.blocks)
+        return self.of("rows", (arm, *(log for part in parts for log in part)), settings,
+                       lambda: with_terms_told_apart(prepare(logs, chosen, arm), chosen.blocks))
 
     def instead(self, before: A, after: A) -> None:
         """Who would be given `before` is given `after`, which a diagnosis has found to be better: rows for laws that fit better, a

@@ -216,13 +216,15 @@ def law_slopes(data: Data, columns: Columns, all_beta: Array) -> tuple[list[Arra
 
 
 def _best_of_grid(data: Data, law: Effect, columns: Columns, rest: Fit) -> tuple[Effect, Array]:
-    """The shape of `law` in its grid that leaves least beside the columns of `rest`."""
+    """The shape of `law` in its grid that leaves least beside the columns of `rest`; of several terms its own counts as well, for
+    between the coarse points of so wide a grid many a search ends where two of them merge."""
     def gain(table: Array) -> float:
         c = rest.project(table)
         solved, *_ = np.linalg.lstsq(c @ c.T, c @ rest.residual, rcond=1e-10)
         return float(solved @ (c @ rest.residual))
 
-    laid = [(shape, law_rows(data, shape, columns)) for shape in law.shapes(data.logs[0].motion, columns.arm)]
+    shapes = (*((law,) if law.plainer else ()), *law.shapes(data.logs[0].motion, columns.arm))
+    laid = [(shape, law_rows(data, shape, columns)) for shape in shapes]
     return max(laid, key=lambda one: gain(one[1]))
 
 

@@ -10,7 +10,7 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import Diagnosis, FewerTerms, Finding, Gain, Rejected, ResidualRms
 
 __all__ = ["Extension", "Result"]
 
@@ -48,4 +48,5 @@ class Extension:
     doctor: tuple[Check, ...]
     model: ModelFile | None  # None where nothing was accepted
     laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
+    fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart
     derived: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED, repr=False)

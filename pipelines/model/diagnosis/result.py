@@ -14,9 +14,9 @@ from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
 
-__all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable", "Proof",
-           "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError", "TorqueGain",
-           "Trial", "Value", "Verdict", "WithoutLimit"]
+__all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "FewerTerms", "Finding", "Gain", "NotTestable",
+           "Proof", "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",
+           "TorqueGain", "Trial", "Value", "Verdict", "WithoutLimit"]
 
 RIVALS = 0.8  # similarity from which two causes explain the same
 Verdict = Literal["cause", "nothing-wrong", "unknown"]
@@ -177,6 +177,16 @@ class WithoutLimit:
 
 
 @dataclass(frozen=True)
+class FewerTerms:
+    """A friction law that was asked for, and has more terms than these logs tell apart."""
+
+    joint: int | None
+    law: str  # as asked for
+    taken: tuple[str, ...]  # in its place: the same law with fewer terms
+    reason: str
+
+
+@dataclass(frozen=True)
 class ResidualRms:
     """[N m] of the nominal model, before any extension."""
 
@@ -286,3 +296,4 @@ class Diagnosis:
     calibration: Calibration | None = field(default=None, metadata=NOT_STORED, repr=False)  # thresholds
     unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
     without_limit: tuple[WithoutLimit, ...] = ()  # causes of the library that no other list has
+    fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart

@@ -95,7 +95,7 @@ def provisional(case: Case, seen: Explored | None = None) -> tuple[Explored, ...
         best = fewest(one.tried)
         if len(found) == _GREAT or best is None or _share(best.screened, now) < _LARGE:
             return tuple(found)
-        now = _reweighted(best.done)
+        now = _reweighted(best.done, case)
         screened = _screened(case, now)
 
 
@@ -134,10 +134,10 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
             del steps[place:], asked[place + 1:]
             steps.append(instead)
             joined.add(best.effect.name)
-            now, rough = _reweighted(best.done), ()
+            now, rough = _reweighted(best.done, case), ()
             continue
         follows = number < len(rough) and same and step.best is fewest(rough[number - 1].tried)
-        now = rough[number].before if follows else _reweighted(step.best.done)
+        now = rough[number].before if follows else _reweighted(step.best.done, case)
     return Found(nominal, tuple(steps), now)
 
 
@@ -277,9 +277,9 @@ def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, c
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
 
 
-def _reweighted(done: Refined) -> Refined:
+def _reweighted(done: Refined, case: Case) -> Refined:
     """Joints weighted by what this model leaves of them."""
-    done = with_curves_anew(done)
+    done = with_curves_anew(done, case.model.columns.laws)
     for _ in range(_ROUNDS):
         weight = 1.0 / np.maximum(done.rms, 1e-12)
         settled = np.abs(weight / done.weight - 1.0).max() < _SETTLED

@@ -82,6 +82,8 @@ class Effect(ABC):
     in_drive: ClassVar[bool] = False  # all torque of its joint comes through it, whatever was found after it
     misread: ClassVar[bool] = False  # it changes what an encoder says: all but the record is felt where the joint truly is
     passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it
+    plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
+    # names of what it consists of: taken in its place where logs do not tell its terms apart
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
 
     def __post_init__(self) -> None:

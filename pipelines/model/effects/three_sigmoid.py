@@ -43,6 +43,7 @@ class ThreeSigmoid(Effect):
     experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
     evidence = "none"
     twins = ("coulomb", "viscous", "stribeck", "concave_friction")
+    plainer = (("two_sigmoid",), ("coulomb", "viscous"))
     friction = True
     from_motion = True
 

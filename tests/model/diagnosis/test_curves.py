@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
+from pipelines.log.files import open_log
 from pipelines.model.diagnosis.change_of_sign import loosened
 from pipelines.model.diagnosis.curves import with_curves_anew
 from pipelines.model.diagnosis.exact import Exact
@@ -17,8 +19,10 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.stribeck import Stribeck
+from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.rigid.body import Motion
+from sample_logs.make_model import synthetic_arm
 from tests.model.diagnosis.arms import hidden
 from tests.model.estimation.experiments import COULOMB
 
@@ -64,3 +68,22 @@ def test_a_law_of_a_model_that_was_given_keeps_its_form() -> None:
     laws = (*bad.model.columns.laws, Stribeck(1))
     given = replace(bad, model=replace(bad.model, columns=replace(bad.model.columns, laws=laws)))
     assert with_curves_anew(given) is given
+
+
+def test_of_three_sigmoids_that_have_merged_all_are_found_again_beside_a_cause(samples: Path) -> None:
+    """Joint 3 of the arm of three sigmoids, whose second and third a fault has made one: by where they began the truth comes back,
+    and without that knowledge nothing is done again."""
+    logs = [open_log(samples / f"rrr-closed-form/{name}.h5").log for name in ("excitation-1", "free-1")]
+    prepared = prepare(Logs.by_role(logs), DiagnosisSettings(), synthetic_arm())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit).with_effect(TorqueOffset(3), np.zeros(1))
+    merged = tuple(ThreeSigmoid(3, 13.2, 2.77, 2.76) if law.joint == 3 else law for law in columns.laws)
+    good, bad = (refine(one, prepared.data, fit.weight) for one in (model, replace(model, columns=replace(columns, laws=merged))))
+    assert bad.rms[2] > 2.0 * good.rms[2]
+    assert with_curves_anew(bad) is bad
+    again = with_curves_anew(bad, prepared.columns.laws)
+    np.testing.assert_allclose(again.rms, good.rms, rtol=0.01)
+    curve = next(law for law in again.model.columns.laws if isinstance(law, ThreeSigmoid) and law.joint == 3)
+    assert curve.w3 == pytest.approx(12.0, rel=0.05)
+    assert curve.w1 > 1.3 * curve.w2 > 3.9 * curve.w3
+    assert again.model.effects[0].effect == TorqueOffset(3)

@@ -26,7 +26,7 @@ REPO = Path(__file__).resolve().parents[3]
 # a frequency response tells apart without any motion.
 MAY_NAME = ("pipelines/model/friction/", "pipelines/report/friction_report.py", "pipelines/model/estimation/nominal.py",
             "pipelines/model/frf/")
-NOMINAL = {"coulomb", "viscous", "three_sigmoid"}  # laws that a nominal model has
+NOMINAL = {"coulomb", "viscous", "two_sigmoid", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
 
 every_effect = pytest.mark.parametrize("kind", all_effects(), ids=lambda kind: kind.name)

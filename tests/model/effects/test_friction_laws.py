@@ -9,6 +9,7 @@ import pytest
 
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
+from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import FRICTION, synthetic_arm
 
@@ -69,6 +70,20 @@ def test_the_grid_is_ordered_and_finds_a_known_curve() -> None:
         left.append(np.linalg.norm(truth - X @ np.linalg.lstsq(X, truth, rcond=None)[0]) / np.linalg.norm(truth))
     assert len(left) == 56
     assert min(left) < 0.01
+
+
+def test_two_sigmoids_are_three_of_which_one_has_no_height() -> None:
+    """Curve and simulated curve; and their grid has every pair of eight sharpnesses once, the sharper first."""
+    v, arm = np.linspace(-2, 2, 401), synthetic_arm()
+    two = TwoSigmoid(1)
+    values = named([3.0, -1.0], [90.0, 12.0], 0.1)
+    three = ThreeSigmoid(1).curve(v, arm, named([3.0, -1.0, 0.0], [90.0, 12.0, 1.0], 0.1))
+    np.testing.assert_allclose(two.curve(v, arm, values), three, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(two.speed_curve(values).torque(v), three, rtol=1e-12, atol=1e-12)
+    motion = Motion(np.arange(10.0), np.zeros((10, 3)), np.linspace(-1.0, 1.0, 30).reshape(10, 3), np.zeros((10, 3)))
+    pairs = [(law.w1, law.w2) for law in two.shapes(motion, arm)]
+    assert len(set(pairs)) == 28
+    assert all(sharper > blunter > 0.0 for sharper, blunter in pairs)
 
 
 def test_a_joint_at_rest_still_has_shapes() -> None:

@@ -1,0 +1,63 @@
+"""Friction as two sigmoids and a viscous term: what is left of three where logs do not tell these apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Self
+
+import numpy as np
+
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["TwoSigmoid"]
+
+_GRID = 8  # sharpnesses in the grid: 28 ordered pairs
+
+
+@dataclass(frozen=True)
+class TwoSigmoid(Effect):
+    """τ = f_1 tanh(w_1 v) + f_2 tanh(w_2 v) + b v.
+
+    Kostić et al. 2004, eq. (10), with two terms of its three: a jump at zero speed, and a dip (f_2 < 0) or a slower rise
+    (f_2 > 0) behind it. Two of three sigmoids that are nearly as sharp as each other, against noise, are one of the sum of
+    their heights: only that sum is seen.
+    """
+
+    w1: float = 60.0  # [s/rad]
+    w2: float = 12.0  # [s/rad]
+
+    name = "two_sigmoid"
+    title = "Friction of two sigmoids"
+    parameters = (
+        *(Quantity(f"f{k}", "N m", -50.0, 50.0, f"height of sigmoid {k}") for k in (1, 2)),
+        *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2)),
+        Quantity("b", "N m s/rad", 0.0, 20.0, "viscous coefficient"),
+    )
+    signature = "A friction curve that jumps at zero speed, and dips or rises once more before it grows with speed."
+    explanation = "Dry and fluid friction together, and one passage between them: the lubricant film builds up with speed."
+    remedy = "Compensate it in the feed-forward; a dip is what makes slow motion stick."
+    experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
+    evidence = "none"
+    twins = ("coulomb", "viscous", "three_sigmoid", "stribeck", "concave_friction")
+    plainer = (("coulomb", "viscous"),)
+    friction = True
+    from_motion = True
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        v = self.own(motion.dq)
+        return self.on_own_row(arm, np.tanh(self.w1 * v), np.tanh(self.w2 * v), v)
+
+    def speed_curve(self, values: Values) -> SpeedCurve:
+        return SpeedCurve(viscous=values["b"], heights=(values["f1"], values["f2"]), sharpnesses=(values["w1"], values["w2"]))
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """w1 > w2 on a geometric grid between the fastest and the slowest speeds that this motion holds."""
+        speed = np.abs(self.own(motion.dq))
+        moving = speed[speed > 0]
+        fast, slow = (moving.max(), np.quantile(moving, 0.02)) if moving.size else (1.0, 0.01)
+        grid = np.geomspace(1 / fast, 2 / max(slow, 1e-3 * fast), _GRID)
+        for w1, w2 in combinations(grid[::-1].tolist(), 2):
+            yield replace(self, w1=w1, w2=w2)
