@@ -109,8 +109,8 @@ def test_a_second_look_is_believed_where_it_explains_as_much(first: Any, second:
 
 @pytest.mark.parametrize(("why", "believed"), [(REST_UNKNOWN, False), ("it takes away less", True)])
 def test_what_was_doubted_beside_much_without_a_name_is_not_named_by_white_rows(why: str, believed: bool) -> None:
-    """Cogging in the rest of a friction that differs by direction and passes for an offset: in white rows the joint stands nearer to
-    its floor."""
+    """Cogging in the rest of a friction that differs by direction and passes for an offset: in white rows the joint stands nearer
+    to its floor."""
     offset, waves = (effect("torque_offset", 1), left(0.02, 0.1, 0.01)), (effect("cogging", 1), left(0.019, 0.1, 0.01))
     first = looked(offset, waves)
     first.ruling.named, first.ruling.doubts = (0,), {1: why}
