@@ -18,6 +18,7 @@ from pipelines.report.diagnosis_words import (
     in_order,
     meaning_of,
     named,
+    numbered,
     spoken,
     three_digits,
     told_value,
@@ -119,9 +120,24 @@ def _own_share(one: Finding, nominal: ResidualRms) -> float:
 
 
 def _numbers(one: Finding) -> Table:
+    if not set(one.parameters) <= {q.name for q in find_effect(one.cause).parameters}:
+        return _numbers_of_several(one)
     rows = tuple((spoken(name), told_value(value), unit_or_dash(value.unit), meaning_of(one.cause, name))
                  for name, value in in_order(one.cause, one.parameters))
     return Table(("parameter", "value ± std", "unit", "what it is"), rows, "What was identified.")
+
+
+def _numbers_of_several(one: Finding) -> Table:
+    """A row for each number that parameters end in: the waves of three gears in nine rows, not in 27."""
+    listed = {numbered(name): value for name, value in in_order(one.cause, one.parameters)}
+    names = dict.fromkeys(name for name, _ in listed)
+    units = {name: unit_or_dash(next(value.unit for (own, _), value in listed.items() if own == name)) for name in names}
+    rows = [(number, *(told_value(listed[name, number]) if (name, number) in listed else "–" for name in names))
+            for number in sorted({number for _, number in listed})]
+    said = "; ".join(f"{spoken(name)}: {meaning_of(one.cause, name)}" for name in names)
+    return Table(("number", *(f"{spoken(name)} [{unit}]" for name, unit in units.items())), tuple(rows),
+                 f"What was identified, value ± std, several of the kind at one joint; {said}; from number 2 on, of the next one. "
+                 "In result.json the number ends a parameter's name.")
 
 
 def gain_table(gain: Gain, caption: str, units: Units = _TURNING) -> Table:

@@ -17,7 +17,7 @@ from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
 __all__ = ["as_sentence", "cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words",
-           "in_order", "meaning_of", "named", "per_joint", "spoken", "three_digits", "title_of", "together",
+           "in_order", "meaning_of", "named", "numbered", "per_joint", "spoken", "three_digits", "title_of", "together",
            "told_value", "told_values", "torque_errors", "torque_of", "unit_or_dash", "what_stays",
            "without_keys"]
 
@@ -111,7 +111,7 @@ def three_digits(x: float) -> float | None:
 
 def spoken(parameter: str) -> str:
     """A parameter's key in words: "second amplitude" for "amplitude_2", "gain error" for "gain_error"."""
-    name, number = _split(parameter)
+    name, number = numbered(parameter)
     return (name if number < 2 else f"{_counted(number)} {name}").replace("_", " ")
 
 
@@ -123,7 +123,7 @@ def _counted(number: int) -> str:
     return f"{number}{ending}"
 
 
-def _split(parameter: str) -> tuple[str, int]:
+def numbered(parameter: str) -> tuple[str, int]:
     """Name and number, 1 where it has none: ("order", 2) of "order_2"."""
     found = _NUMBERED.match(parameter)
     return (found[1], int(found[2])) if found else (parameter, 1)
@@ -132,8 +132,8 @@ def _split(parameter: str) -> tuple[str, int]:
 def _part(cause: str, parameter: str) -> tuple[str, int]:
     """The effect's own parameter, and of the how manieth one at its joint it is: its numbers are counted on (`once_each`)."""
     known = [q.name for q in find_effect(cause).parameters] if cause in effect_names() else []
-    name, number = _split(parameter)
-    numbers = max((_split(own)[1] for own in known), default=1)
+    name, number = numbered(parameter)
+    numbers = max((numbered(own)[1] for own in known), default=1)
     first = (number - 1) % numbers + 1
     own = name if first == 1 else f"{name}_{first}"
     return (parameter, 1) if parameter in known or own not in known else (own, (number - 1) // numbers + 1)

@@ -72,6 +72,20 @@ def test_a_finding_is_told_in_words(cause: str) -> None:
         assert all((unit, meaning))
 
 
+def test_several_waves_at_a_joint_are_a_row_each() -> None:
+    """Two gears, each with three waves: six rows of order, amplitude and phase, and what a row does not have is a dash."""
+    one = found("cogging")
+    names = [q.name for q in find_effect("cogging").parameters]
+    again = {f"{name.partition('_')[0]}_{int(name.partition('_')[2] or 1) + 3}": Value(28.0, None, "1/rev") for name in names}
+    del again["phase_6"]
+    numbers = numbers_section(1, replace(one, parameters=one.parameters | again)).tables[0]
+    assert numbers.columns == ("number", "order [1/rev]", "amplitude [N m]", "phase [rad]")
+    assert [row[0] for row in numbers.rows] == [1, 2, 3, 4, 5, 6]
+    assert numbers.rows[0][1:] == ("1.00 ± 0.10",) * 3
+    assert numbers.rows[5][1:] == ("28", "28", "–")
+    assert "waves in one turn" in numbers.caption
+
+
 def test_what_is_told_of_parameters_can_be_read_aloud() -> None:
     """Harmonics are counted, pure numbers have no unit, and no two parameters of an effect get the same words."""
     assert told_values([("amplitude_2", Value(0.12, None, "N m")), ("gain_error", Value(0.1, None, "1"))]) == (
