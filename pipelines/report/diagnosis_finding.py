@@ -132,8 +132,9 @@ def _numbers_of_several(one: Finding) -> Table:
     listed = {numbered(name): value for name, value in in_order(one.cause, one.parameters)}
     names = dict.fromkeys(name for name, _ in listed)
     units = {name: unit_or_dash(next(value.unit for (own, _), value in listed.items() if own == name)) for name in names}
-    rows = [(number, *(told_value(listed[name, number]) if (name, number) in listed else "–" for name in names))
-            for number in sorted({number for _, number in listed})]
+    rows: list[tuple[str | int, ...]] = [
+        (number, *(told_value(listed[name, number]) if (name, number) in listed else "–" for name in names))
+        for number in sorted({number for _, number in listed})]
     said = "; ".join(f"{spoken(name)}: {meaning_of(one.cause, name)}" for name in names)
     return Table(("number", *(f"{spoken(name)} [{unit}]" for name, unit in units.items())), tuple(rows),
                  f"What was identified, value ± std, several of the kind at one joint; {said}; from number 2 on, of the next one. "
