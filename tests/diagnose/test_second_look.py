@@ -23,7 +23,7 @@ from pipelines.model.diagnosis.pruned import NEAR_THE_FLOOR
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import REST_UNKNOWN
+from pipelines.model.diagnosis.verdict import REST_OF_A_LAW, Ruling
 from tests.diagnose.sessions import but
 from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 
@@ -107,14 +107,17 @@ def test_a_second_look_is_believed_where_it_explains_as_much(first: Any, second:
     assert second_look._believed(looked(*first), looked(*second), FLOOR, np.full(3, 0.02)) is believed
 
 
-@pytest.mark.parametrize(("why", "believed"), [(REST_UNKNOWN, False), ("it takes away less", True)])
-def test_what_was_doubted_beside_much_without_a_name_is_not_named_by_white_rows(why: str, believed: bool) -> None:
+@pytest.mark.parametrize(("why", "named"), [(REST_OF_A_LAW, (0, 2)), ("it takes away less", (0, 1, 2))])
+def test_what_was_doubted_beside_much_without_a_name_is_not_named_by_white_rows(why: str, named: tuple[int, ...]) -> None:
     """Cogging in the rest of a friction that differs by direction and passes for an offset: in white rows the joint stands nearer
-    to its floor."""
+    to its floor. What they find elsewhere keeps its name."""
     offset, waves = (effect("torque_offset", 1), left(0.02, 0.1, 0.01)), (effect("cogging", 1), left(0.019, 0.1, 0.01))
     first = looked(offset, waves)
     first.ruling.named, first.ruling.doubts = (0,), {1: why}
-    assert second_look._believed(first, looked(offset, waves), FLOOR, np.full(3, 0.02)) is believed
+    found = looked(offset, waves, (THERE, left(0.019, 0.01, 0.01))).found
+    ruling = second_look._less_the_rest(Ruling("cause", (0, 1, 2), ""), found, first)
+    assert ruling.named == named
+    assert set(ruling.doubts) == {0, 1, 2} - set(named)
 
 
 @pytest.mark.parametrize(("scatter", "elsewhere", "leaves", "believed"), [

@@ -30,6 +30,7 @@ _WRONG, _STRANGE, _TENTH = 8.0, 2.5, 0.1
 # Times the floor: more surely stands above it, and so little may be the floor; share of what stands above it at the joint of a
 # cause that it explains at least. Of 180 right causes that left more the least explained .84, wrong ones .32 and .39.
 _SURELY, _CLEAR, _HALF = 1.4, 1.2, 0.5
+_QUIET = 1.3  # times the floor that a twin gives, that an arm in order leaves of the fitted logs at most: of 147 none left more
 _MOST_LEFT = "what explains the fitted logs leaves more than half of what stands above the floor at its joint in those held out"
 # Times the spectrum beside it, and times the most of any replica, that a line of an oscillation has at least. Of 21 arms in order,
 # twelve of them with drives that wander, none had more than 3; drives that hunt 50 to 1100.
@@ -53,8 +54,8 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, mov
     Args:
         moved: whether there is a cause that the base parameters show.
         parts: whether `rms` lacks what responses have named, and `nominal` has it.
-        fitted: (joints,) [N m] floor of the fitted logs. What the final model leaves above it there, a twin that is a little too
-            quiet say, is no sign against the name where held-out logs show as much.
+        fitted: (joints,) [N m] floor of the fitted logs. What the final model leaves above it there, of a twin that is a little too
+            quiet, is no sign against the name where held-out logs show as much and their error falls.
     """
     verdict = done.ruling.verdict
     far = _WRONG if verdict == "cause" or moved else _STRANGE
@@ -62,28 +63,28 @@ def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, mov
     if verdict == "unknown":
         return done
     if not high:
-        told = moved or parts or _shown(done, rms, _as_loud(done, floor, fitted), nominal)
+        told = moved or parts or _shown(done, rms, np.maximum(floor, 1e-12), nominal, fitted)
         return done if told else _not_believed(done, _MOST_LEFT)
     model = "what explains the fitted logs" if verdict == "cause" else "the nominal model, which the fitted logs bear out,"
     times = f"{float((rms / np.maximum(floor, 1e-12)).max()):.2g} times what an arm in order leaves there"
     return _not_believed(done, f"{model} leaves, of {high} in those held out, {times}")
 
 
-def _as_loud(done: Settled, floor: Array, fitted: Array | None) -> Array:
-    """(joints,) [N m] floor of the held-out logs, as far above what a twin says as the final model stands in the fitted ones."""
-    left = 1.0 if fitted is None else np.maximum(done.found.final.rms / np.maximum(fitted, 1e-12), 1.0)
-    return np.maximum(left * floor, 1e-12)
-
-
-def _shown(done: Settled, rms: Array, floor: Array, nominal: Array) -> bool:
+def _shown(done: Settled, rms: Array, floor: Array, nominal: Array, fitted: Array | None) -> bool:
     """Whether one of the causes that are named, if any lasts, explains half of what surely stands above the floor of the held-out
-    logs at its joint, as all of them do of the fitted ones; or leaves what may be the floor."""
+    logs at its joint, as all of them do of the fitted ones; or leaves what may be the floor. A floor that is too low for an arm in
+    order, as the fitted logs tell, counts as much higher where the error falls."""
     steps = [done.found.steps[k] for k in done.ruling.named]
     joints = [takes_most(step, floor) if best.effect.joint is None else best.effect.joint - 1
               for step in steps if (best := step.best) is not None and best.log is None]
-    above = np.square(nominal / floor) - 1.0
-    return not joints or any(nominal[j] <= _SURELY * floor[j] or rms[j] <= _CLEAR * floor[j] or
-                             above[j] + 1.0 - (rms[j] / floor[j]) ** 2 >= _HALF * above[j] for j in joints)
+    left = np.ones(len(floor)) if fitted is None else np.clip(done.found.final.rms / np.maximum(fitted, 1e-12), 1.0, _QUIET)
+
+    def explained(j: int, usual: float) -> bool:
+        above = (nominal[j] / usual) ** 2 - 1.0
+        near = nominal[j] <= _SURELY * usual or rms[j] <= _CLEAR * usual
+        return bool(near or above + 1.0 - (rms[j] / usual) ** 2 >= _HALF * above)
+
+    return not joints or any(explained(j, floor[j]) or (rms[j] < nominal[j] and explained(j, left[j] * floor[j])) for j in joints)
 
 
 def _not_believed(done: Settled, reason: str) -> Settled:

@@ -34,7 +34,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step, last_step, search
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import REST_UNKNOWN, excess, explained, rule
+from pipelines.model.diagnosis.verdict import REST_OF_A_LAW, Ruling, excess, explained, rule
 from pipelines.model.diagnosis.whitening import Whitening
 
 __all__ = ["looked_again"]
@@ -68,7 +68,8 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
         return done  # what is named would be the same, and its simulation is dear
     mended = put_right(found.nominal.fit, found.final.fit, usual)
     ready = replace(prepared, data=there.data, judge=there.judge)
-    again = settled(found, rule(found, whitened.rms, True, mended), there, ready, whitened.rms)
+    ruling = _less_the_rest(rule(found, whitened.rms, True, mended), found, done)
+    again = settled(found, ruling, there, ready, whitened.rms)
     if again.ruling.verdict != "cause" or _names(done) == _names(again):
         return done
     plain = _as_they_are(again, done, case)
@@ -85,7 +86,7 @@ def _believed(first: Settled, second: Settled, floor: Array, scatter: Array) -> 
     before, now = _names(first), _names(second)
     if now < before:
         return _share(first, before - now, floor) < _LITTLE
-    if before and before < now and (_share(second, now - before, floor) < _LEAST or (now - before) & _of_the_rest(first)):
+    if before and before < now and _share(second, now - before, floor) < _LEAST:
         return False
     left = [excess(one.found.final.rms, floor) for one in (first, second)]
     named = {joint for _, joint in before | now}
@@ -119,10 +120,13 @@ def _names(done: Settled) -> set[Name]:
     return _of(done.found.steps[k] for k in done.ruling.named)
 
 
-def _of_the_rest(done: Settled) -> set[Name]:
-    """What was found beside a law that is not the machine's, in rows as they are: white ones, of which most is noise, show less of
-    what stays above the floor."""
-    return _of(done.found.steps[k] for k, why in done.ruling.doubts.items() if why == REST_UNKNOWN)
+def _less_the_rest(ruling: Ruling, found: Found, first: Settled) -> Ruling:
+    """Without what the first look found in the rest of a law that is not the machine's: white rows, of which most is noise, show
+    less of what stays above the floor there."""
+    rest = _of(first.found.steps[k] for k, why in first.ruling.doubts.items() if why == REST_OF_A_LAW)
+    steps = [step for step in found.steps if step.best is not None]
+    again = {k: REST_OF_A_LAW for k in ruling.named if _of([steps[k]]) & rest}
+    return replace(ruling, named=tuple(k for k in ruling.named if k not in again), doubts={**ruling.doubts, **again})
 
 
 def _of(steps: Iterable[Step]) -> set[Name]:

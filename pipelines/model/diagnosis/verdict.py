@@ -16,8 +16,8 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "much_without_name", "rule", "seen_in",
-           "takes_most", "too_little", "without_steps"]
+__all__ = ["REST_OF_A_LAW", "REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "much_without_name",
+           "rule", "seen_in", "takes_most", "too_little", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -39,6 +39,7 @@ _FIFTH = 0.2
 _MOST_OF_IT, _TIMES = 0.8, 15.0
 _TRIFLE = "it takes away less than what the law of a cause found before it may leave"
 REST_UNKNOWN = "most of what stands above the noise where it is seen has no name, and beside that this one is not sure"
+REST_OF_A_LAW = "most of what stands above the floor where it is seen has no name, and beside that this one is not sure"
 _MISFIT = "beside a gap, where nobody knows how the link lay in it at first, nothing that happened once is told from it"
 _LITTLE = "it explains less than half of what stands above the floor, which is so little that it may be the floor"
 _NO_FLOOR = ("what is left is more than noise, as it is of every recorded arm; whether more than an arm in order leaves is not "
@@ -124,17 +125,19 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
     left = [j for j in joints.tolist() if found.final.rms[j] > (_REST_OF_GAP if gap else _REST) * found.nominal.rms[j]]
     if left:
         return Ruling("unknown", (), f"what was found leaves the residual of {_named(left)} well above the floor")
-    doubts = once | {k: REST_UNKNOWN for k, step in enumerate(accepted) if k and _beside_more(step, found.final.rms, floor)}
+    doubts = once | {k: REST_OF_A_LAW for k in range(len(accepted)) if _in_the_rest(accepted[:k + 1], found.final.rms, floor)}
     return Ruling("cause", tuple(k for k in range(len(accepted)) if k not in doubts), "", doubts)
 
 
-def _beside_more(step: Step, final: Array, floor: Array) -> bool:
-    """Whether the joint where a step takes most stands above its floor with all that was found, and the step took next to nothing
-    of what stood there: the law of a cause found before is not the machine's, and what it leaves looks like other causes."""
+def _in_the_rest(steps: Sequence[Step], final: Array, floor: Array) -> bool:
+    """Whether the last of `steps`, at a joint where one before it was found, took next to nothing beside what stands there above the
+    floor with all that was found: the law of the first is not the machine's, and what that leaves looks like other causes."""
+    *before, step = steps
     most = takes_most(step, floor)
-    done = step.before if step.best is None else step.best.done
-    before, after, usual = (float(np.square(rms[most])) for rms in (step.before.rms, done.rms, floor))
-    return bool(final[most] > _ABOVE * floor[most] and before - after < _FIFTH * (before - usual))
+    if step.best is None or final[most] <= _ABOVE * floor[most] or all(takes_most(one, floor) != most for one in before):
+        return False
+    taken = float(step.before.rms[most] ** 2 - step.best.done.rms[most] ** 2)
+    return taken < _FIFTH * (taken + float(final[most] ** 2 - floor[most] ** 2))
 
 
 def seen_in(step: Step, nominal: Array, final: Array, floor: Array) -> bool:

@@ -65,17 +65,19 @@ def test_half_of_what_the_held_out_logs_show_is_explained(before: float, after: 
     assert believed.found.final is (final if verdict == "cause" else nominal)
 
 
-@pytest.mark.parametrize(("left_of_fitted", "before", "verdict"), [
-    (0.0100, 0.0142, "unknown"), (0.0125, 0.0142, "cause"), (0.0125, 0.024, "unknown")])
-def test_a_twin_too_quiet_is_no_sign_against_a_name(left_of_fitted: float, before: float, verdict: str) -> None:
-    """Warm-up is over in the log that judges: nothing of it is left to explain there. An arm in order whose friction no twin has to
-    the last leaves 1.25 floors of the fitted logs, beside the cause, and 1.4 of those held out."""
-    nominal, final = left(0.0149, 0.01, 0.01), left(left_of_fitted, 0.01, 0.01)
+@pytest.mark.parametrize(("fitted", "before", "after", "verdict"), [
+    (0.0100, 0.0142, 0.0138, "unknown"), (0.0125, 0.0142, 0.0138, "cause"), (0.0125, 0.0142, 0.0143, "unknown"),
+    (0.0125, 0.024, 0.022, "unknown"), (0.06, 0.075, 0.07, "unknown")])
+def test_a_twin_too_quiet_is_no_sign_against_a_name(fitted: float, before: float, after: float, verdict: str) -> None:
+    """Warm-up is nearly over in the log that judges: little of it is left to explain there. An arm in order whose friction no twin
+    has to the last leaves 1.25 floors of the fitted logs, beside the cause, and 1.4 of those held out. A law that is not the
+    machine's leaves more of both, and where the error grows nothing is borne out."""
+    nominal, final = left(0.2, 0.01, 0.01), left(fitted, 0.01, 0.01)
     found = searched(nominal, (effect("viscous_drift", 1), final))
     found.steps[0].best.log = None
     done = Settled(Found(nominal, tuple(found.steps), final), Ruling("cause", (0,), ""), ())
-    held_out = np.array([before, 0.01, 0.01])
-    assert unlike_held_out(done, held_out, FLOOR, held_out, fitted=FLOOR).ruling.verdict == verdict
+    held_out = [np.array([x, 0.01, 0.01]) for x in (after, before)]
+    assert unlike_held_out(done, held_out[0], FLOOR, held_out[1], fitted=FLOOR).ruling.verdict == verdict
 
 
 @pytest.mark.parametrize(("held_out", "verdict"), [((0.02, 0.01, 0.02), "cause"), ((0.01, 0.02, 0.01), "unknown")])

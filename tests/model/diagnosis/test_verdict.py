@@ -94,10 +94,19 @@ def test_what_is_found_in_the_rest_of_a_law_that_is_not_the_machines_has_no_name
     assert set(ruling.doubts) == {0, 1} - set(named)
 
 
-def test_beside_a_great_cause_that_is_explained_a_small_one_keeps_its_name() -> None:
-    """It takes a tenth of what the joint shows at first, but the joint comes down to its floor."""
-    ruling = rule(found(left(0.1, 0.01, 0.01), left(0.0150, 0.01, 0.01), left(0.0148, 0.01, 0.01)), FLOOR)
-    assert ruling.named == (0, 1)
+@pytest.mark.parametrize(("rest", "effects"), [
+    ((0.0150, 0.0148), (Cogging(1), Cogging(1))),  # the joint comes down to its floor
+    ((0.0600, 0.0550, 0.0165), (Cogging(1), Cogging(1), Stribeck(1)))])  # what is found later explains most of it
+def test_beside_a_great_cause_that_is_explained_a_small_one_keeps_its_name(rest: tuple[float, ...], effects: Any) -> None:
+    """It takes a tenth of what the joint shows at first."""
+    after = [left(one, 0.01, 0.01) for one in rest]
+    assert rule(found(left(0.1, 0.01, 0.01), *after, effects=effects), FLOOR).named == tuple(range(len(rest)))
+
+
+def test_a_cause_elsewhere_leaves_no_rest_at_a_joint() -> None:
+    """The greater one was found at joint 3: what joint 1 keeps is not what its law leaves."""
+    after = (left(0.05, 0.01, 0.01), left(0.0475, 0.01, 0.01), left(0.017, 0.01, 0.01))
+    assert rule(found(left(0.05, 0.01, 0.5), *after, effects=(Cogging(3), Cogging(1), Stribeck(1))), FLOOR).named == (0, 1, 2)
 
 
 def test_the_reason_names_the_joints_that_are_not_explained() -> None:
