@@ -130,8 +130,8 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
 
 
 def _in_the_rest(steps: Sequence[Step], final: Array, floor: Array) -> bool:
-    """Whether the last of `steps`, at a joint where one before it was found, took next to nothing beside what stands there above the
-    floor with all that was found: the law of the first is not the machine's, and what that leaves looks like other causes."""
+    """Whether the last of `steps`, at a joint where one before it was found, took next to nothing beside what stands there above
+    the floor with all that was found: the law of the first is not the machine's, and what that leaves looks like other causes."""
     *before, step = steps
     most = takes_most(step, floor)
     if step.best is None or final[most] <= _ABOVE * floor[most] or all(takes_most(one, floor) != most for one in before):
