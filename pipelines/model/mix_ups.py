@@ -112,9 +112,7 @@ def encoder_scale(e: Evidence) -> list[Check]:
     def alone(**other: Array) -> Array:
         return np.diag(quick_residual(e.body, motion, **other))[told]
 
-    # The direction of a joint that bends nothing is that of its torque: S14 tells.
-    magnitudes = {name: factor for name, factor in _SCALES.items() if factor > 0}
-    if (found := _scaled(e, together, alone, _SHARED_BAD, magnitudes)) is None:
+    if (found := _scaled(e, together, alone, _SHARED_BAD, _SCALES)) is None:
         found = _scaled(e, alone, alone, _SCALE_BAD, _SCALES)
         return [] if found is None else [_angle(e, *found)]
     torque = torque_scale(e)
@@ -147,7 +145,9 @@ def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Ar
         for name, factor in scales.items():
             scale = np.where(np.arange(e.n_joints) == joint, factor, 1.0)
             other = {"q": motion.q * scale, "dq": motion.dq * scale, "ddq": motion.ddq * scale}
-            left = _rms(residual(**other))
-            if left <= min(_GOOD, _SCALE_BETTER * before) and (alone(**other) <= _WORSE * rows).all():
+            left, own = _rms(residual(**other)), alone(**other)
+            if factor < 0.0 and not (own <= _MUCH_BETTER * rows).any():
+                continue  # the direction of a joint that bends nothing is that of its torque: S14 tells
+            if left <= min(_GOOD, _SCALE_BETTER * before) and (own <= _WORSE * rows).all():
                 found.append((left, joint, name))
     return (before, *min(found)) if found else None

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path as Folder
 
 import numpy as np
 import pytest
 
 from pipelines.log.doctor.checks import NotTested, Subject
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.files import open_log
 from pipelines.log.robot import LinkParameters
 from pipelines.model import plausibility as plausibility_module
 from pipelines.model.clock_offset import Offset, clock_offset
@@ -118,6 +120,16 @@ def test_a_scale_of_two_is_told_of_every_joint(seed: int, level: float, factor: 
         wrong = with_signal(log, q=log.q * np.where(np.arange(3) == joint, factor, 1.0))
         assert (joint, factor, [c.message.partition(",")[0] for c in plausibility(Subject(wrong)) if c.code == "RRID-S15"]) == (
             joint, factor, [f"q of joint {joint + 1} fits if multiplied by {1 / factor:g}"])
+
+
+@pytest.mark.parametrize("name", ["excitation-1", "excitation-2", "free-1"])
+@pytest.mark.parametrize("joint", [1, 2])
+def test_a_flipped_encoder_is_no_scale(name: str, joint: int, samples: Folder) -> None:
+    """Of an arm that hardly moves too, whose torques fit less badly with an angle that next to nothing is left of."""
+    log = open_log(samples / "rrr-closed-form" / f"{name}.h5").log
+    wrong = with_signal(log, q=log.q * np.where(np.arange(3) == joint, -1.0, 1.0))
+    assert [c.message.partition(",")[0] for c in plausibility(Subject(wrong)) if c.code == "RRID-S15"] == [
+        f"q of joint {joint + 1} fits if multiplied by -1"]
 
 
 @pytest.mark.parametrize(("seed", "hz"), [(9, 0.1), (34, 0.05), (38, 0.1)])
