@@ -20,6 +20,7 @@ ACCEPTED = "accepted"
 WEAKER = "weaker than others"
 UNBELIEVABLE = "the arm could not have moved so with it"
 _REFUSED = "time held out does not bear it out"
+_THERE = "found there already, and not asked again"
 _TOO_LITTLE = "takes next to nothing"  # so that nobody has asked what it would have to
 _SHOWN = 12  # lines of a step, of causes that stay below their thresholds
 
@@ -49,6 +50,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
     """The lines of step `number`, greatest gain first; `judged` holds the gains that `thresholds` are for, `refused` the ids of
     those screened that time held out does not bear out, or, of an event, what is left when it is fitted exactly."""
     exact = {id(one.screened): one for one in tried}
+    there = {(one.effect.name, one.effect.joint) for one in now.model.effects}
     rows: list[Trial] = []
     order = sorted(range(len(screened)), key=lambda k: -judged[k].gain[0])
     for k in order:
@@ -61,6 +63,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
                   "below its threshold" if gain <= thresholds.gain[k] else
                   "comes again at other moments" if not one.stands_out else
                   _REFUSED if id(one) in refused and fitted is None else
+                  _THERE if fitted is None and (one.cause, one.joint) in there else
                   WEAKER if fitted is None else
                   UNBELIEVABLE if not fitted.believable else
                   "impossible numbers" if not fitted.possible else

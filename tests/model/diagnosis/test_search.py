@@ -187,6 +187,17 @@ def test_what_no_arm_could_have_moved_with_is_not_taken(waving: Case) -> None:
     assert "could not have moved" in trial.reason
 
 
+def test_what_was_found_at_a_joint_is_not_called_weaker_than_others(waving: Case) -> None:
+    """A search asks once whether it is there: what is left above a threshold then was not weighed against anything."""
+    found = search(waving, 1)
+    best = found.steps[0].best
+    assert best is not None
+    again = next(one for one in found.steps[0].screened if (one.cause, one.joint) == (best.effect.name, best.effect.joint))
+    trial, = ledger([again], [again], without_twin([again], 1e-9, np.ones(3)), [], None, found.final, 2)
+    assert trial.gain > trial.threshold
+    assert trial.reason == "found there already, and not asked again"
+
+
 def test_what_does_not_pass_is_no_rival_of_what_does(waving: Case) -> None:
     """However great: a cause that gains a hundredth of another is fitted where that other stays below its threshold."""
     rough = provisional(waving)
