@@ -13,8 +13,9 @@ from pipelines.report.tip_words import tip_change
 
 __all__ = ["extension_report"]
 
-_NOISE = ("noise of the residual", "Noise of the residual: what of it no model can explain, for it does not hang "
-          "together in time. An arm in order leaves more, at its reversals say: \"rrrid diagnose\" tells how much.")
+_NOISE = ("noise of the residual", "Noise of the residual: what of it no model can explain, for it does not hang together in time. "
+          "An arm in order leaves more than that, for instance where it reverses: the report of \"rrrid diagnose\" on these logs "
+          "tells how much, and whether what the extended model leaves is in order.")
 
 
 def extension_report(result: Extension) -> Report:
