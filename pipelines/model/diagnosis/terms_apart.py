@@ -29,7 +29,7 @@ from pipelines.model.diagnosis.held_out import cross_validated
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.result import FewerTerms
+from pipelines.model.diagnosis.unasked import FewerTerms
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.regression import Columns

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from pipelines.model.diagnosis.result import Diagnosis, WithoutLimit
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.unasked import WithoutLimit
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.friction.laws import LADDER
