@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pipelines.model.diagnosis.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.result import FewerTerms
+from pipelines.model.diagnosis.unasked import FewerTerms
 from pipelines.model.effects import find_effect
 from pipelines.model.estimation.result import Result as Estimated
 
@@ -42,7 +42,7 @@ def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
     for law, taken in dict.fromkeys((one.law, one.taken) for one in fewer):
         places = [f"joint {one.joint} ({one.reason})" for one in fewer if (one.law, one.taken) == (law, taken)]
         instead = ", ".join(find_effect(name).title for name in taken)
-        found.append(f"The terms of \"{find_effect(law).title}\" are not told apart by these logs at {', '.join(places)}; "
+        found.append(f"The terms of \"{find_effect(law).title}\" are not told apart at {', '.join(places)}; "
                      f"fitted there instead: {instead}.")
     return tuple(found)
 

@@ -50,8 +50,8 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     """What the nominal model of an arm gets wrong in `logs`, and why.
 
     Args:
-        arm: whose friction laws the nominal model takes, fitted anew, with no more terms than `logs` tell apart; Coulomb and
-            viscous friction where left out.
+        arm: whose friction laws the nominal model takes, fitted anew, with no more terms than `logs` tell apart, or with those
+            that a calibration was made with; Coulomb and viscous friction where left out.
         tell: progress, in words.
         calibration: thresholds that an earlier diagnosis has stored, instead of a twin.
         memory: of what was worked out of these logs, for an extension after it.
@@ -62,7 +62,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
-    prepared = memory.prepared(logs, chosen, arm)
+    prepared = memory.prepared(logs, chosen, arm, () if calibration is None else calibration.conditions.laws)
     seen = _looked_at(prepared, chosen, say, calibration, memory)
     other, again = loosened(prepared), None
     if other is not prepared and of_one_law(greatest(seen.rough)):

@@ -38,12 +38,13 @@ from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.pruned import at_odds, vague
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.responding import Responding, responding
-from pipelines.model.diagnosis.result import FewerTerms, Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.since import Moved, since_reference
 from pipelines.model.diagnosis.steadied import steadied, steady
 from pipelines.model.diagnosis.thresholds import Thresholds
+from pipelines.model.diagnosis.unasked import FewerTerms
 from pipelines.model.diagnosis.unbiased import unbiased
 from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects.base import Effect

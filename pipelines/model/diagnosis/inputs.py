@@ -18,9 +18,9 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.data import Data, gather
-from pipelines.model.diagnosis.result import FewerTerms
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.sharper import sharpened
+from pipelines.model.diagnosis.unasked import FewerTerms
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns

@@ -38,12 +38,12 @@ class Memory:
         self._known.append((what, tuple(things), settings, made))
         return made
 
-    def prepared(self, logs: Logs, chosen: DiagnosisSettings, arm: Arm | None) -> Prepared:
-        """As `prepare`, for laws of friction whose terms these logs tell apart."""
+    def prepared(self, logs: Logs, chosen: DiagnosisSettings, arm: Arm | None, stored: tuple[str, ...] = ()) -> Prepared:
+        """As `prepare`, for laws of friction whose terms these logs tell apart, or that thresholds are `stored` for."""
         parts = (logs.identify, logs.validate, logs.reference, logs.frf, logs.frf_before)
         settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed, chosen.blocks)
-        return self.of("rows", (arm, *(log for part in parts for log in part)), settings,
-                       lambda: with_terms_told_apart(prepare(logs, chosen, arm), chosen.blocks))
+        rows = self.of("rows", (arm, *(log for part in parts for log in part)), settings, lambda: prepare(logs, chosen, arm))
+        return self.of("terms", (rows,), stored, lambda: with_terms_told_apart(rows, chosen.blocks, stored))
 
     def instead(self, before: A, after: A) -> None:
         """Who would be given `before` is given `after`, which a diagnosis has found to be better: rows for laws that fit better, a

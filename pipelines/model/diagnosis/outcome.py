@@ -10,7 +10,8 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.result import Diagnosis, FewerTerms, Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.unasked import FewerTerms
 
 __all__ = ["Extension", "Result"]
 

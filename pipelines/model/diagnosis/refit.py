@@ -91,10 +91,12 @@ class Refined:
         """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held.
 
         Of a number that blocks of time left out in turn move by more than that, what they say is its deviation: noise is not all
-        that is left.
+        that is left. Not to be written to.
         """
-        if self.known is not None:
-            return self.known
+        return self._own_covariance if self.known is None else self.known
+
+    @cached_property
+    def _own_covariance(self) -> Array:
         seen = np.ones(len(self.slopes), dtype=bool)
         seen[self.unseen] = False
         table, whole = self.steadied((self.slopes * self.weights)[seen]), np.zeros((len(seen), len(seen)))
@@ -103,6 +105,7 @@ class Refined:
         std = np.sqrt(np.maximum(np.diag(noise), 1e-300))
         wider = np.maximum(left_out(table, residual, self.data.blocks(_PARTS)) / std, 1.0)
         whole[np.ix_(seen, seen)] = noise * wider * wider[:, None]
+        whole.flags.writeable = False
         return whole
 
 

@@ -13,10 +13,11 @@ from pipelines.log.experiment import Array
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
+from pipelines.model.diagnosis.unasked import FewerTerms, WithoutLimit
 
-__all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "FewerTerms", "Finding", "Gain", "NotTestable",
+__all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable",
            "Proof", "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",
-           "TorqueGain", "Trial", "Value", "Verdict", "WithoutLimit"]
+           "TorqueGain", "Trial", "Value", "Verdict"]
 
 RIVALS = 0.8  # similarity from which two causes explain the same
 Verdict = Literal["cause", "nothing-wrong", "unknown"]
@@ -166,24 +167,6 @@ class NotTestable:
     joint: int | None
     reason: str  # "absorbed by p3, p5, p9, p13; needs a reference log"
     record: str  # what to record instead
-
-
-@dataclass(frozen=True)
-class WithoutLimit:
-    """A cause that was looked for, or is none, and of which no size is to tell."""
-
-    cause: str
-    reason: str  # what was seen of it
-
-
-@dataclass(frozen=True)
-class FewerTerms:
-    """A friction law that was asked for, and has more terms than these logs tell apart."""
-
-    joint: int | None
-    law: str  # as asked for
-    taken: tuple[str, ...]  # in its place: the same law with fewer terms
-    reason: str
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from pipelines.model.diagnosis.result import Diagnosis, WithoutLimit
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.unasked import WithoutLimit
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
+from pipelines.model.friction.laws import LADDER
 
 __all__ = ["without_limit"]
 
@@ -23,6 +25,8 @@ _NOT_ASKED = "it was looked for; how small a one would have been found was not w
 def without_limit(told: Diagnosis, frf: bool, without: Collection[str] = ()) -> tuple[WithoutLimit, ...]:
     """Every cause that none of the other lists has, with what is known of it.
 
+    A law that only stands in for one of more terms is none that anybody asks for: it goes unsaid where the nominal model lacks it.
+
     Args:
         frf: whether there are frequency responses.
         without: names of causes that were left out.
@@ -31,7 +35,13 @@ def without_limit(told: Diagnosis, frf: bool, without: Collection[str] = ()) -> 
     laws = set() if told.nominal is None else {law.effect.name for law in told.nominal.friction}
     refused = {one.cause: one.reason for one in told.rejected}
     return tuple(WithoutLimit(kind.name, f"rejected: {refused[kind.name]}" if kind.name in refused else _seen(kind, laws, frf))
-                 for kind in all_effects() if kind.name not in there and kind.name not in without)
+                 for kind in all_effects() if kind.name not in there | _stand_ins() - laws and kind.name not in without)
+
+
+def _stand_ins() -> set[str]:
+    """Laws that are the plainer form of another, and on no rung of the ladder of fit-friction."""
+    plainer = {name for kind in all_effects() for names in kind.plainer for name in names}
+    return plainer - {name for law in LADDER for name in law.members}
 
 
 def _seen(kind: type[Effect], laws: Collection[str], frf: bool) -> str:

@@ -15,6 +15,7 @@ from pipelines.bench.fault import Fault
 from pipelines.bench.faults import make
 from pipelines.bench.machine import Machine, draw_machine
 from pipelines.bench.session import record
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.injection import _last_root, _raised
@@ -25,6 +26,7 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.without_limit import without_limit
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.rotor_inertia import RotorInertia
+from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from tests.diagnose.sessions import but
 
 FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
@@ -99,7 +101,17 @@ def test_nothing_of_the_library_goes_unsaid() -> None:
     """Of each cause there is a finding, a smallest size, a record that would show it, or what was seen of it."""
     found = healthy(7, FEW)
     lists = (found.findings, found.standing, found.detectable, found.not_testable, found.without_limit)
-    assert {one.cause for some in lists for one in some} == set(effect_names()) - set(FEW)
+    assert {one.cause for some in lists for one in some} == set(effect_names()) - set(FEW) - {"two_sigmoid"}
+
+
+def test_a_law_that_only_stands_in_for_another_is_said_where_the_model_has_it() -> None:
+    """Nobody is told that fit-friction chooses two sigmoids: it does not know them."""
+    found = healthy(7, FEW)
+    assert found.nominal is not None
+    assert "two_sigmoid" not in {one.cause for one in without_limit(found, False)}
+    two = Acting.of(TwoSigmoid(1), {"f1": 1.0, "f2": 0.1, "w1": 60.0, "w2": 12.0, "b": 0.1})
+    told = replace(found, nominal=replace(found.nominal, friction=(two, *found.nominal.friction)))
+    assert "part of the nominal model" in next(one.reason for one in without_limit(told, False) if one.cause == "two_sigmoid")
 
 
 @pytest.mark.parametrize(("cause", "frf", "refused", "said"), [
