@@ -28,7 +28,7 @@ from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.allowed import refuse_strange
-from pipelines.model.excitation.apart import Pair, told_apart
+from pipelines.model.excitation.apart import Pair, judged_again, told_apart
 from pipelines.model.excitation.bounds import parse_bounds
 from pipelines.model.excitation.design import Design, Effort, design
 from pipelines.model.excitation.doubts import doubts
@@ -202,7 +202,11 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     found = design(task, Effort(share * settings.seconds, settings.evaluations, given.tell), settings.seed)
     if pair is not None and not found.stopped:
         found, apart = told_apart(task, found, pair, share * settings.seconds, settings.evaluations, settings.seed, given.tell)
-    return replace(_result(task, found, settings, given, after, mode), apart=apart, robot_from=given.why)
+    kept, rehearsal, failed = rehearsed_design(task, found, settings.seed, given.tell) if settings.rehearse else (found, None, "")
+    if pair is not None and apart is not None and kept.trajectory is not found.trajectory:
+        apart = judged_again(task, kept, pair, apart)
+    result = _result(task, kept, settings, given, after, mode)
+    return replace(result, rehearsal=rehearsal, rehearsal_failed=failed, apart=apart, robot_from=given.why)
 
 
 def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
@@ -220,13 +224,10 @@ def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
 
 
 def _result(task: Task, found: Design, settings: Settings, given: Material, after: tuple[str, ...], mode: float | None) -> Result:
-    designed, rehearsal, failed = found, None, ""
-    if settings.rehearse:
-        found, rehearsal, failed = rehearsed_design(task, designed, settings.seed, given.tell)
     given.tell("judging the design")
     judged = excitation(task, found, settings.seed)
     goal = task.problem.goal
-    reached = goal.ceiling is None or judged.condition_number <= goal.ceiling or (found.reached and found is designed)
+    reached = goal.ceiling is None or judged.condition_number <= goal.ceiling or found.reached
     trajectory = found.trajectory
     t, motion = trajectory.sampled(settings.sample_time)
     log = planned_log(f"{task.robot.name} {settings.criterion} excitation", task.robot, joint_motion(t, motion), "excitation",
@@ -248,7 +249,7 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
         friction_columns=task.problem.columns.friction, torque_checked=task.torque is not None,
         torque_bounded=task.arm is None and task.torque is not None, torque_share=settings.torque_share,
         speed_share=settings.speed_share, after=after, first_mode=mode, mode_factor=settings.mode_factor,
-        top_hz=top / trajectory.series.period, rehearsal=rehearsal, rehearsal_failed=failed, plans=(),
+        top_hz=top / trajectory.series.period, plans=(),
         logs=(("trajectory", log),), table=controller_table(given.recipe, task.robot, lambda at: trajectory.at(at)[0].T,
                                                             trajectory.duration, settings.sample_time),
         coefficients=coefficients(task, trajectory))

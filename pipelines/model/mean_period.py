@@ -48,7 +48,7 @@ _NOISE = 3.0  # times what the noise from sample to sample explains: less is no 
 _DRIFT = 0.25  # of the scatter that goes one way from the first period to the last
 _SURE = 5.0  # standard deviations of that share
 _FEWEST = 2  # periods of a mean
-_SETTLED = 0.5  # of the first of two periods: where it takes longer, too little is left to compare
+_LATEST = 0.5  # of the first of two periods that it may take to settle: with more, too little is left to compare
 
 
 @dataclass(frozen=True)
@@ -57,13 +57,13 @@ class NoiseFloor:
 
     periods: int  # compared
     left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
-    settling: float  # [s] left out at the start of the first period compared, for the motion had not settled
     position: Array  # [rad] standard deviation of one sample of one period
     torque: Array  # [N m]
     cutoff_hz: float | None  # of the low-pass of equations; None: none
     position_low_pass: Array  # [rad] what the low-pass leaves of it
     torque_low_pass: Array  # [N m]
     unlike: str  # why the periods are not to be averaged, in words; empty where they may be
+    settling_time: float | None = None  # [s] left out at the start of the first period compared; None: not known
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class _Folded:
     first: int  # place on the grid where the first period begins
     step: float  # [s] between samples of the mean
     repeats: float  # periods of which a sample of the mean is made, on average
-    settling: float = 0.0  # [s] left out at the start
+    settling_time: float = 0.0  # [s] left out at the start
     unsettled: str = ""  # why that start cannot be left out, in words
 
 
@@ -124,9 +124,9 @@ def doubts(floor: NoiseFloor | None, where: object, averaged: bool = True) -> li
         left_out = ", ".join(map(str, floor.left_out))
         found.append(Check.of("T10", "warn", f"period {left_out} differs from the {floor.periods} others and is left out of their "
                               "mean", where=where, remedy="the first one often starts from rest; or somebody touched the arm"))
-    if floor.settling:
-        found.append(Check.of("T10", "warn", f"the first {floor.settling:.2g} s of its periods, in which the motion settled, are "
-                              "left out of their mean", where=where, remedy="record a period more: the first then is left out"))
+    if floor.settling_time:
+        found.append(Check.of("T10", "warn", f"the first {floor.settling_time:.2g} s of its periods, in which the motion settled, "
+                              "are left out of their mean", where=where, remedy="record a period more: the first then is left out"))
     return found
 
 
@@ -164,27 +164,29 @@ def _fold(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> 
 
 
 def _settled(folded: _Folded, average: Callable[..., _Folded], passed: Array, least: Array) -> _Folded:
-    """`folded` without a start unlike the later periods: without all of that period where two others remain, else without it alone.
+    """`folded` without a start unlike the later periods: without the first period where two others remain, else without it alone.
 
     Args:
         average: from the place where the first period begins, of these samples, without those periods.
     """
     out: tuple[int, ...] = ()
-    # one that alone measured a part of the period is kept for it, however often it is asked to go
-    while (late := folded.periods.settling(passed, least)) and folded.periods.count > _FEWEST and folded.periods.used[0] not in out:
-        out = (*out, folded.periods.used[0])
-        folded = average(folded.first, folded.rows, out)
+    late = folded.periods.settling(passed, least)
+    if late and folded.periods.count > _FEWEST and folded.periods.used[0] == 0:
+        out = (0,)
+        folded = average(folded.first, folded.rows, out)  # one that alone measured a part of the period is kept for it
+        late = folded.periods.settling(passed, least)
     if late == 0:
         return folded
-    phases, grid = len(folded.periods.mean), folded.grid
+    phases, grid, used = len(folded.periods.mean), folded.grid, folded.periods.used
     size = phases * folded.step / grid.step
-    begin, places = folded.first + round(folded.periods.used[0] * size), int(np.ceil(late * size / phases))
-    if late > _SETTLED * phases:
+    begin, places = folded.first + round(used[0] * size), int(np.ceil(late * size / phases))
+    if late > _LATEST * phases:
         return replace(folded, unsettled=f"the first of its {folded.periods.count} periods has not settled by its middle")
-    if grid.size - begin - places >= _FEWEST * size:  # a run-in came before them
-        return replace(average(begin + places, folded.rows), settling=places * grid.step)
+    if grid.size - begin - places >= (used[-1] - used[0] + 1) * size:  # a run-in came before them
+        return replace(average(begin + places, folded.rows), settling_time=places * grid.step)
     rest = folded.rows & ~((grid.place >= begin) & (grid.place < begin + places))
-    return replace(average(folded.first, rest, out), settling=places * grid.step, repeats=folded.periods.count - late / phases)
+    return replace(average(folded.first, rest, out), settling_time=places * grid.step,
+                   repeats=folded.periods.count - late / phases)
 
 
 def _one_grid(seen: Measured) -> Grid | str:
@@ -220,14 +222,14 @@ def _floor(log: ExperimentLog, motion: Reconstructed, folded: _Folded, cutoff_hz
     unlike = folded.unsettled or _unlike(found.repeats(passed), found, _least(motion, found.mean), joints)
     # where one period alone was left, it differs from nothing
     compared = np.sqrt((found.count - 1) / max(folded.repeats - 1.0, 1e-300))
-    return NoiseFloor(found.count, tuple(k + 1 for k in found.outliers), folded.settling, sample[:joints], sample[joints:],
+    return NoiseFloor(found.count, tuple(k + 1 for k in found.outliers), sample[:joints], sample[joints:],
                       cutoff_hz, compared * passed_std(found.rest[..., :joints], passed),
-                      compared * passed_std(found.rest[..., joints:], centred), unlike)
+                      compared * passed_std(found.rest[..., joints:], centred), unlike, folded.settling_time)
 
 
 def _unknown(log: ExperimentLog, cutoff_hz: float | None, why: str) -> NoiseFloor:
     none = np.full(log.n_joints, np.nan)
-    return NoiseFloor(0, (), 0.0, none, none, cutoff_hz, none, none, why)
+    return NoiseFloor(0, (), none, none, cutoff_hz, none, none, why, 0.0)
 
 
 def _unlike(alike: Repeats, found: Periods, least: Array, joints: int) -> str:

@@ -105,7 +105,8 @@ def _noise_section(result: Result) -> Section:
     text, rows = [], []
     for log in result.noise_floor:
         left_out = f"; period {', '.join(map(str, log.left_out))} differs and is left out" if log.left_out else ""
-        left_out += f"; its first {log.settling:.2g} s, in which the motion settled, are left out" if log.settling else ""
+        left_out += f"; its first {log.settling_time:.2g} s, in which the motion settled, are left out" if log.settling_time else ""
+        left_out += "; how long its motion took to settle is not known" if log.settling_time is None else ""
         text.append(f"{log.log}: the mean of {log.periods} periods makes the equations{left_out}." if log.averaged else
                     f"{log.log}: its periods are not averaged, {log.why_not}.")
         rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.floor[j],

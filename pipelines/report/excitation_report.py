@@ -60,7 +60,7 @@ def _verdict(result: Result) -> str:
     if result.rehearsal is not None and (trouble := beyond_words(result.joints, result.rehearsal)):
         text += f"; in the rehearsal {', '.join(trouble)}"
     if result.interrupted:
-        text += "; the search was interrupted, this is its best by then"
+        text += "; the work was interrupted, this is its best by then"
     return text + "."
 
 
@@ -105,16 +105,20 @@ def _safety(result: Result) -> Section:
                     "It was not rehearsed in simulation.")
     else:
         end = ", ".join(beyond_words(result.joints, found)) or "no drive saturates, no joint exceeds its speed or its range"
-        first = "first " if found.seconds < 0.999 * result.duration else ""
-        text.append(f"Its {first}{found.seconds:.3g} s were rehearsed in simulation under PD control of 8 Hz a joint, without "
-                    f"feed-forward: {end}. Another controller will follow otherwise.")
+        part = f"one of its {result.periods} periods, {found.seconds:.3g} s" if result.periods > 1 else f"its {found.seconds:.3g} s"
+        part += " with run-in and run-out" if result.periods > 1 and result.run_in else ""
+        text.append(f"Rehearsed in simulation, {part}, under PD control of 8 Hz a joint, without feed-forward: {end}. Another "
+                    "controller will follow otherwise.")
+        if found.position_beyond is None:
+            text.append("How near the joints came to the ends of their ranges is not known.")
         position, torque, speed = (unit_of(result.limits, quantity) for quantity in ("position", "torque", "speed"))
+        past = found.position_beyond or (math.nan,) * len(result.joints)
         tables.append(Table(("joint", f"away, rms [{position}]", f"away, most [{position}]", f"torque, peak [{torque}]",
                              f"limit [{torque}]", "used [%]", f"speed, peak [{speed}]", f"limit [{speed}]", "used [%]",
-                             "position, of its range [%]", "saturated [%]"), tuple(
+                             f"left of its range [{position}]", "saturated [%]"), tuple(
             (name, found.position_rms[j], found.position_max[j], found.torque_peak[j], found.torque_limit[j],
              100 * found.torque_peak[j] / found.torque_limit[j], found.speed_peak[j], found.speed_limit[j],
-             100 * found.speed_peak[j] / found.speed_limit[j], 100 * found.position_reach[j] or None,
+             100 * found.speed_peak[j] / found.speed_limit[j], None if math.isnan(past[j]) else -past[j],
              100 * found.saturated[j]) for j, name in enumerate(result.joints))))
     return Section("Before the robot moves", tuple(text), tuple(tables), warning=_UNCHECKED)
 
@@ -174,7 +178,7 @@ def _limits(result: Result) -> Section:
         text.append(f"Of every speed limit the plan uses {100 * result.speed_share:.0f} %, for a loop overshoots.")
     if result.torque_checked and result.torque_share < 1.0:
         text.append(f"Of every torque limit the plan uses {100 * result.torque_share:.0f} %; the rest is left to the controller.")
-    return Section("Limits", tuple(text), (Table(("joint", "of", "peak", "limit", "unit", "used [%]", "cost [%]"), rows),))
+    return Section("Limits", tuple(text), (Table(("joint", "of", "peak", "limit used", "unit", "of it [%]", "cost [%]"), rows),))
 
 
 def _told(result: Result) -> Section:
@@ -238,7 +242,7 @@ def _plans_report(result: Result) -> Report:
     verdict = f"{len(result.plans)} experiments for {what} are planned, {result.duration:.3g} s altogether."
     rows = tuple((p.name, p.joint, p.seconds, p.speed_peak, p.acceleration_peak, p.words) for p in result.plans)
     table = Table(("experiment", "joint", "duration [s]", "speed, peak [rad/s]", "acceleration, peak [rad/s^2]", "what"), rows)
-    kept = Table(("experiment", "nearest limit", "joint", "peak", "limit", "unit", "used [%]"), tuple(
+    kept = Table(("experiment", "nearest limit", "joint", "peak", "limit used", "unit", "of it [%]"), tuple(
         (p.name, n.quantity, n.joint, n.peak, n.limit, format_unit(n.unit), 100 * n.share)
         for p in result.plans if (n := p.nearest) is not None))
     words = "Position, speed, acceleration and tip are looked at sample by sample, half a step added"

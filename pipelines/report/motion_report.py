@@ -149,13 +149,14 @@ def _log_section(log: LogResult, series: Series, number: int) -> Section:
                     f"{_listed(doubtful)}.")
     if floor is not None:
         without = [f"period {', '.join(map(str, floor.left_out))}"] if floor.left_out else []
-        without += [f"the first {floor.settling:.2g} s, in which the motion settled"] if floor.settling else []
+        without += [f"the first {floor.settling_time:.2g} s, in which the motion settled"] if floor.settling_time else []
         left_out = f" (left out: {'; '.join(without)})" if without else ""
         mean = ("The motion in the derived log is that of every sample; an estimate takes its equations from the mean of the "
                 "periods, whose deviations stand in the table as well." if log.mean is not None else
                 f"They are not averaged: {floor.unlike}." if floor.unlike else "They are not averaged, as asked for.")
         compared = f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
-        text.append(f"{compared if floor.periods else ''}{mean}")
+        text.append(f"{compared if floor.periods else ''}{mean}"
+                    f"{' How long the motion took to settle is not known.' if floor.settling_time is None else ''}")
     return Section(f"Log {log.name}", tuple(text), _tables(log), tuple(_figures(log, series, number == 0)))
 
 

@@ -25,9 +25,13 @@ _OUTLIER = 3.0  # times the usual deviation of a period from the middle one
 _POINTS = 6  # samples that interpolate one between them
 _WINDOWS = 100  # of a period, in which its start is compared with the rest
 _SHORTEST = 8  # samples of a window
-_SETTLED = 3  # windows in a row that are like the rest: what swings passes through zero within one of them
-_REST = (0.6, 0.9)  # of a period: what is like the later ones, if anything is; a filter has the start beside the very end
-_UNSETTLED = 2.0  # times the largest of the rest
+_LULL = 3  # windows in a row that are like the rest: what swings passes through zero within one of them; a filter smears as far
+_QUIET = (0.6, 0.9)  # of a period: what is like the later ones, if anything is; a filter has the start beside the very end
+_UNSETTLED = 2.0  # times the largest of the rest, and of the other periods there
+_ENDED = 3.0  # times the power of the rest: less, and a start is over before that
+_NEAR = 10  # windows to either side in which the other periods show how large the noise is at a phase
+_FALLS = 6.0  # times less power at the end of a start than at its beginning: what dies away, and noise of one level does not
+_LEAST = 1e-200  # of a power: where nothing differs
 
 
 @dataclass(frozen=True)
@@ -80,16 +84,18 @@ class Periods:
         """Samples at the start of the first period used that differ from the others by more than the rest of it does.
 
         0: none; all of them: it goes on dying away to the end.
-        A mean over the whole period hides a start of a fiftieth of it. What noise allows is therefore read from the same
-        period, later on, window by window: the largest deviation there, however it is distributed.
+        A mean over the whole period hides a start of a fiftieth of it. What noise allows is therefore read window by window: from
+        the same period later on, in proportion to how rough the noise is at each phase, for it need not be the same all along a
+        period, and from what the other periods scatter there, where there are two or more. And a start dies away.
 
         Args:
             amplitude: of a filter, as in `passed_std`; a start may stand out in what it passes alone.
             least: (channels) as in `average_periods`.
         """
-        first = self.rest[0]
-        return max(_settling(first, least),
-                   _settling(_filtered(first[None], amplitude)[0], least * _white_gain(amplitude, len(first))))
+        if self.count < 2:
+            return 0
+        return max(_settling(self.rest, self.rest, 1.0, least),
+                   _settling(_filtered(self.rest, amplitude), self.rest, _white_gain(amplitude, self.rest.shape[1]), least))
 
 
 def average_periods(x: Array, rate: float, period: float, lags: int = 100, amplitude: Array | None = None,
@@ -215,27 +221,67 @@ def _apart(away: Array, least: Array) -> npt.NDArray[np.bool_]:
     return np.asarray((spread > _OUTLIER * usual + 1e-300).any(axis=1))
 
 
-def _settling(first: Array, least: Array) -> int:
-    """Samples at the start of `first` (samples, channels), a period less the mean of all, that stand out in any channel."""
-    window = max(_SHORTEST, len(first) // _WINDOWS)
-    count = len(first) // window
-    power = (first[:count * window].reshape(count, window, -1) ** 2).mean(axis=1)
-    low, high = (int(share * count) for share in _REST)
-    if high - low < _SETTLED:
+def _settling(rest: Array, raw: Array, gain: float, least: Array) -> int:
+    """Samples at the start of the first of `rest` (periods, samples, channels), less their mean, that stand out in any channel.
+
+    Args:
+        raw: the same, unfiltered.
+        gain: of the filter, for white noise.
+    """
+    periods, samples = rest.shape[:2]
+    window = max(_SHORTEST, samples // _WINDOWS)
+    count = samples // window
+    low, high = (int(share * count) for share in _QUIET)
+    if high - low < _LULL:
         return 0
-    rest = power[low:high]
-    odd = np.flatnonzero((np.sqrt(power) > _UNSETTLED * np.maximum(np.sqrt(rest.max(axis=0)), least) + 1e-300).any(axis=1))
-    last = -1  # window of those that differ from the start on
-    for k in odd.tolist():
-        if k - last > _SETTLED:
+
+    def powers(x: Array) -> Array:
+        return np.asarray((x[:, :count * window].reshape(len(x), count, window, -1) ** 2).mean(axis=2))
+
+    # less the mean of the others, the first has M / (M-1) of the variance of a sample; they about that mean (M-2) / (M-1)
+    power = powers(rest[:1])[0] * (periods / (periods - 1))
+    near = np.arange(count)[:, None]
+    # noise that is larger at a phase is rougher there, and what dies away is smooth
+    bends = np.pad(np.diff(raw, 2, axis=1), ((0, 0), (0, 2), (0, 0)))
+    bends[:, :-2][(raw[:, :-2] == 0.0) | (raw[:, 1:-1] == 0.0) | (raw[:, 2:] == 0.0)] = 0.0  # beside what was not measured
+    rough = powers(bends).sum(axis=0) * gain**2 / (6.0 * (periods - 1))
+    usual = rough[(near + np.arange(-_LULL + 1, _LULL)) % count].mean(axis=1)
+    if periods > 2:
+        others = powers(rest[1:] + rest[0] / (periods - 1)).sum(axis=0) / (periods - 2)
+        usual = np.maximum(usual, others[(near + np.arange(-_NEAR, _NEAR + 1)) % count].max(axis=1))
+    times = power / np.maximum(usual, np.maximum((gain * least)**2, _LEAST))
+    odd = times > _UNSETTLED**2 * np.maximum(times[low:high].max(axis=0), 1.0)
+    longest = max(_start(odd[:, c], times[:, c], (low, high), power[:, c]) for c in range(odd.shape[1]))
+    return int(samples if longest == count else longest * window)
+
+
+def _start(odd: npt.NDArray[np.bool_], times: Array, quiet: tuple[int, int], power: Array) -> int:
+    """Windows until one channel has settled; all of them where it never does, none where it should fall and does not."""
+    (low, high), last = quiet, -1  # window of those that differ from the start on
+    for k in np.flatnonzero(odd).tolist():
+        if k - last > _LULL:
             break
         last = k
     if last < 0:
         return 0
     # what is slow has not died away in the rest, and makes that look worse than noise is
-    between = power[last + 1:low].mean(axis=0) if last + 1 < low else np.inf
-    ended = between <= (_UNSETTLED * np.maximum(np.sqrt(rest.mean(axis=0)), least)) ** 2 + 1e-300
-    return (last + 1) * window if np.all(ended) else len(first)
+    between = times[last + 1:low].mean() if last + 1 < low else np.inf
+    ended = between <= _ENDED * max(float(times[low:high].mean()), 1.0)
+    if not _dies_away(power[:last + 2 if ended else low], power[high:-_LULL]):
+        return 0
+    return last + 1 if ended else len(times)
+
+
+def _dies_away(start: Array, before: Array) -> bool:
+    """Whether the power of `start`, window by window, is largest where it begins, above what is `before` it, and falls to its end.
+
+    Noise that follows the motion is as large at the end of one period as at the beginning of the next.
+    """
+    peak = int(start.argmax())  # what precedes it may not have been measured
+    falling = start[peak:]
+    third = max(1, len(falling) // 3)
+    return bool(peak < _LULL and start[peak] > _FALLS * before.max(initial=0.0)
+                and falling[:third].mean() > _FALLS * falling[-third:].mean())
 
 
 def _white_gain(amplitude: Array, samples: int) -> float:

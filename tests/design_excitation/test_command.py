@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from pipelines.design_excitation import STAGE
-from pipelines.errors import InputRejected, UsageError
+from pipelines.errors import InputRejected, Interrupted, UsageError
 from pipelines.inspect import STAGE as DOCTOR
 from pipelines.log.files import open_log
 from pipelines.stage import Request, run_stage
@@ -108,6 +109,22 @@ def test_a_rehearsal_before_the_robot_moves(tmp_path: Path) -> None:
     assert done.rehearsal.safe
     assert max(done.rehearsal.position_max) < 0.1
     assert all(peak < limit for peak, limit in zip(done.rehearsal.torque_peak, done.rehearsal.torque_limit, strict=True))
+
+
+def test_who_stops_the_rehearsal_keeps_the_motion_with_all_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C while it is simulated: the motion that was searched, exit 130, and no word of a rehearsal."""
+    def stopped(*given: object) -> None:
+        raise Interrupted(signal.SIGINT)
+
+    monkeypatch.setattr("pipelines.model.excitation.rehearse.rehearse", stopped)
+    outcome = designed(tmp_path / "out", replace(QUICK, rehearse=True))
+    alone = designed(tmp_path / "alone")
+    for name in ("trajectory.h5", "controller.csv", "coefficients.json", "result.json"):
+        assert (outcome.folder / name).is_file()
+    assert (outcome.folder / "controller.csv").read_bytes() == (alone.folder / "controller.csv").read_bytes()
+    assert (outcome.result.rehearsal, outcome.json["interrupted"]) == (None, True)
+    assert STAGE.exit_code(outcome.result, False) == 130
+    assert "interrupted" in outcome.report.verdict
 
 
 def test_the_report_warns_in_bold(tmp_path: Path) -> None:

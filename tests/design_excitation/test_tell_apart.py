@@ -12,6 +12,8 @@ from pipelines import design_excitation
 from pipelines.errors import UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
+from pipelines.model.excitation.design import FINISH, Design, finished, landscape
+from pipelines.model.excitation.task import Task
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.report.excitation_report import excitation_report
 from pipelines.stage import Outcome, Request, run_stage
@@ -21,8 +23,8 @@ NOISE = 0.05  # [N m] rms
 
 
 def designed(out: Path, *causes: str, **more: object) -> Outcome[Result]:
-    settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=150, rehearse=False, tell_apart=causes,
-                                          **more)  # type: ignore[arg-type]
+    settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=150, tell_apart=causes,
+                                          **{"rehearse": False, **more})  # type: ignore[arg-type]
     return run_stage(design_excitation.STAGE, Request((), out=out, no_report=True), settings)
 
 
@@ -90,6 +92,19 @@ def test_what_one_leaves_of_the_other_stands_above_the_noise(both: dict[str, Out
     """More of it than in the plain design, and a multiple of what ten seconds of noise make of a torque."""
     assert missed(trajectory(both["apart"])) > missed(trajectory(both["plain"]))
     assert missed(trajectory(both["apart"])) > 3.0 * NOISE
+
+
+def test_what_is_said_of_them_is_of_the_motion_that_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A motion made smaller by its rehearsal tells less: similarity and condition number are its own."""
+    def halved(task: Task, found: Design, *given: object) -> tuple[Design, None, str]:
+        finish = landscape(task, 1, FINISH)
+        x = finish.space.shrunk(finish.space.point(found.trajectory.series), 0.5)
+        return finished(task, finish, x, 1, 1, 0, False), None, ""
+
+    monkeypatch.setattr(design_excitation, "rehearsed_design", halved)
+    result = designed(tmp_path / "out", "spring:2", "torque_offset:2", rehearse=True).result
+    assert result.apart is not None
+    assert result.apart.after.condition_number == pytest.approx(result.condition_number, rel=1e-3)
 
 
 def test_limits_and_ceiling_are_kept(both: dict[str, Outcome[Result]]) -> None:

@@ -13,6 +13,7 @@ from pipelines import estimate_bps, reconstruct
 from pipelines.estimate_bps import Result, compute
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import Opened
+from pipelines.log.results import decode, encode
 from pipelines.model.estimation.floor import Beside
 from pipelines.report.bps_report import bps_report
 from pipelines.stage import Inputs, Request, run_stage
@@ -103,6 +104,16 @@ def test_a_disturbed_period_is_left_out_and_named() -> None:
     np.testing.assert_allclose(only(found).ratio, 1.0, atol=0.25)
 
 
+def test_a_result_from_before_starts_were_looked_for_is_still_reported() -> None:
+    """Its periods say nothing of how long the motion took to settle: not known, and no reason to refuse the rest."""
+    text, series = encode(of_periods(0, 5))
+    for log in text["noise_floor"]:
+        del log["settling_time"]
+    old = decode(Result, text, series)
+    assert only(old).settling_time is None
+    assert "how long its motion took to settle is not known" in str(bps_report(old).sections)
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_loop_that_settles_spoils_no_mean_of_two_periods(seed: int) -> None:
     """From rest the shoulder sags by 5 to 10 mrad, for 0.3 s, and so does the held-out log.
@@ -111,11 +122,11 @@ def test_a_loop_that_settles_spoils_no_mean_of_two_periods(seed: int) -> None:
     """
     logs = looped(seed, 2), looped(seed + 50, 2, "validate")
     mean, every = (estimated(*logs, average=average, compare=False) for average in (True, False))
-    assert all(log.averaged and 0.1 <= log.settling <= 0.6 for log in mean.noise_floor)
+    assert all(log.averaged and 0.1 <= log.settling_time <= 0.6 for log in mean.noise_floor)
     assert (np.array(mean.torque_rms["validate"]) < 1.02 * np.array(every.torque_rms["validate"])).all()
     assert [check.code for check in mean.doctor if "in which the motion settled" in check.message] == ["RRID-T10"] * 2
     assert not [check for check in every.doctor if check.code == "RRID-T10"]
-    assert f"its first {mean.noise_floor[0].settling:.2g} s, in which the motion settled, are left out" in str(
+    assert f"its first {mean.noise_floor[0].settling_time:.2g} s, in which the motion settled, are left out" in str(
         bps_report(mean).sections)
 
 

@@ -8,8 +8,9 @@ import pytest
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.mean_period import doubts, mean_period
 from pipelines.model.motion import Reconstruction, reconstruct
+from pipelines.signal.periods import Periods
 from tests.healthy import with_signal
-from tests.model.estimation.experiments import looped, motion_of, one_period, periodic
+from tests.model.estimation.experiments import motion_of, one_period, periodic
 
 
 @pytest.mark.parametrize(("encoder", "gain"), [(3e-6, np.sqrt(5.0)), (3e-5, np.sqrt(5.0)), (0.0, 1.0)])
@@ -37,16 +38,27 @@ def test_the_mean_is_as_good_as_it_says(encoder: float, gain: float) -> None:
         np.testing.assert_allclose(single / error, gain, rtol=0.15)
 
 
-def settling(periods: int, seconds: float, lead: int = 0) -> ExperimentLog:
-    """An elbow that starts 0.02 rad off and gets there in `seconds`; after it, `lead` samples of a further period."""
+def settling(periods: int, seconds: float, lead: int = 0, size: float = 0.02) -> ExperimentLog:
+    """An elbow that starts `size` [rad] off and gets there in `seconds`; after it, `lead` samples of a further period."""
     def sag(q: Array, tau: Array) -> None:
-        away = 0.02 * np.exp(-np.arange(len(q)) * 1e-3 / seconds)
+        away = size * np.exp(-np.arange(len(q)) * 1e-3 / seconds)
         q[:, 2] += away
         tau[:, 2] -= 20.0 * away  # what a loop with that gain answers
 
     log = periodic(0, periods + 1, spoil=sag)
     rows = slice(0, 10_000 * periods + lead)
     return with_signal(log, **{name: log[name][rows] for name in ("t", "q", "tau")})
+
+
+def louder(periods: int, seed: int) -> ExperimentLog:
+    """Five milli-newton metres of noise in the elbow's torque, and thirty more while it moves: the first 55 % of every period."""
+    rng = np.random.default_rng([11, seed])
+
+    def noise(q: Array, tau: Array) -> None:
+        moves = np.arange(len(q)) % 10_000 < 5500
+        tau[:, 2] += 0.03 * moves * rng.standard_normal(len(q))
+
+    return periodic(seed, periods, spoil=noise)
 
 
 def elbow_error(log: ExperimentLog) -> float:
@@ -68,11 +80,11 @@ def test_of_two_periods_the_start_alone_is_left_out() -> None:
     assert made is not None
     assert made[1].mean is not None
     assert floor.left_out == ()
-    assert 0.5 <= floor.settling <= 1.0
-    assert made[1].mean.periods == pytest.approx(2.0 - floor.settling / 10.0, abs=0.01)
+    assert 0.5 <= floor.settling_time <= 1.0
+    assert made[1].mean.periods == pytest.approx(2.0 - floor.settling_time / 10.0, abs=0.01)
     assert elbow_error(log) < 2e-5
     (check,) = doubts(floor, "log")
-    assert f"the first {floor.settling:.2g} s" in check.message
+    assert f"the first {floor.settling_time:.2g} s" in check.message
 
 
 def test_where_a_lead_precedes_them_two_whole_periods_remain() -> None:
@@ -81,18 +93,42 @@ def test_where_a_lead_precedes_them_two_whole_periods_remain() -> None:
     assert floor is not None
     assert made is not None
     assert made[1].mean is not None
-    assert floor.settling > 0.0
+    assert floor.settling_time > 0.0
     assert made[1].mean.periods == 2.0
     assert elbow_error(log) < 2e-5
 
 
-def test_of_three_periods_the_first_is_left_out() -> None:
-    """As before: two others remain, whose mean has nothing of the start."""
-    log = looped(0, 3)
+def test_of_three_periods_the_first_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start of 0.6 mrad, too small to make its period an odd one: two others remain, whose mean has nothing of it."""
+    log = settling(3, 0.1, size=6e-4)
+    floor, _ = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert (floor.left_out, floor.settling_time, floor.periods) == ((1,), 0.0, 2)
+    assert elbow_error(log) < 2e-5
+    monkeypatch.setattr(Periods, "settling", lambda *given: 0)
+    floor, _ = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert (floor.left_out, floor.settling_time, floor.periods) == ((), 0.0, 3)
+    assert elbow_error(log) > 3e-5
+
+
+def test_of_what_settles_slowly_the_first_period_goes() -> None:
+    """What is left of it in the second one is no more than noise leaves."""
+    log = settling(5, 1.5)
+    floor, _ = mean_period(log, reconstruct(log, Reconstruction()), None)
+    assert floor is not None
+    assert (floor.left_out, floor.periods, floor.unlike) == ((1,), 4, "")
+    assert elbow_error(log) < 2e-5
+
+
+@pytest.mark.parametrize(("periods", "seed"), [(2, 0), (2, 1), (3, 0), (5, 0), (5, 1)])
+def test_noise_that_is_larger_in_a_part_of_the_period_is_no_start(periods: int, seed: int) -> None:
+    """What is quiet is a joint at rest, not an arm that has settled: every period is averaged."""
+    log = louder(periods, seed)
     floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
     assert floor is not None
     assert made is not None
-    assert (floor.left_out, floor.settling, floor.periods) == ((1,), 0.0, 2)
+    assert (floor.left_out, floor.settling_time, floor.periods, floor.unlike) == ((), 0.0, periods, "")
 
 
 def test_two_periods_that_never_settle_are_not_averaged() -> None:
@@ -107,7 +143,7 @@ def test_two_periods_that_never_settle_are_not_averaged() -> None:
 
 
 def test_a_start_is_left_out_of_a_period_that_cannot_be_spared() -> None:
-    """Both later periods lack the same tenth of a second, which the first one has: periods are counted from after its start."""
+    """Both later periods lack the same tenth of a second, which the first one has: its start alone goes."""
     log = settling(3, 0.1)
     q = log.q.copy()
     for later in (1, 2):
@@ -116,6 +152,6 @@ def test_a_start_is_left_out_of_a_period_that_cannot_be_spared() -> None:
     floor, made = mean_period(log, reconstruct(log, Reconstruction()), None)
     assert floor is not None
     assert made is not None
-    assert (floor.left_out, floor.periods) == ((), 2)
-    assert floor.settling > 0.0
+    assert (floor.left_out, floor.periods) == ((), 3)
+    assert floor.settling_time > 0.0
     assert elbow_error(log) < 2e-5

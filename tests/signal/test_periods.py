@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfreqz
+from scipy.signal import butter, lfilter, sosfreqz
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.filters import passed_both_ways
@@ -168,6 +168,29 @@ def test_what_is_periodic_has_no_start() -> None:
     x = np.round(periodic(1000, 500) / 1e-3) * 1e-3
     x[3, 0] += 1e-3
     assert average_periods(x, 1000.0, 0.5).settling(ALL, np.full(2, 1e-3 / np.sqrt(12.0))) == 0
+
+
+LEVELS = {"the first 55 %": lambda f: np.where(f < 0.55, 3.0, 1.0),
+          "the first fifth": lambda f: np.where(f < 0.2, 10.0, 1.0),
+          "the first tenth": lambda f: np.where(f < 0.1, 10.0, 1.0),
+          "smooth": lambda f: 1.0 + 9.0 * np.clip(np.cos(2 * np.pi * f), 0.0, None), "none": np.ones_like}
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.95])
+@pytest.mark.parametrize("periods", [2, 3, 5])
+@pytest.mark.parametrize("level", LEVELS)
+def test_noise_that_varies_along_the_period_is_no_start(level: str, periods: int, colour: float) -> None:
+    """However much larger it is where the motion begins, and however slow: at most one of a hundred seems to have a start."""
+    size = 2000
+    low = passed_both_ways(np.arange(size // 2 + 1) / 2.0, 40.0, 1000.0)
+    along = np.tile(LEVELS[level](np.arange(size) / size), periods)[:, None]
+    found = 0
+    for seed in range(100):
+        white = np.random.default_rng([seed, 7]).standard_normal(((periods + 1) * size, 2))
+        noise = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], white, axis=0)[size:]
+        x = periodic(periods * size, size) + np.array([0.1, 0.02]) * along * noise
+        found += average_periods(x, 1000.0, 2.0).settling(low, NO_STEPS) > 0
+    assert found <= 1
 
 
 def test_what_differs_later_is_no_start() -> None:

@@ -37,7 +37,6 @@ class Beside:
     averaged: bool
     why_not: str  # the periods are not averaged, in words
     left_out: tuple[int, ...]  # periods that differ from the others, counted from 1
-    settling: float  # [s] left out at the start of the first period compared, for the motion had not settled
     position: Array  # [rad] standard deviation of one sample of one period
     torque: Array  # [N m]
     torque_low_pass: Array  # [N m] what the low-pass over equations leaves of it
@@ -45,6 +44,7 @@ class Beside:
     floor: Array  # [N m] that noise leaves in the equations: torque's, over the root of the periods averaged, and motion's
     residual: Array  # [N m] root mean square of what the estimate leaves in the equations
     ratio: Array  # residual over floor: 1 where the model explains all that repeats
+    settling_time: float | None = None  # [s] left out at the start of the first period compared; None: not known
 
 
 def averaged(motions: Motions, how: Reconstruction, cutoff_hz: float | None) -> tuple[Motions, Floors]:
@@ -83,7 +83,7 @@ def _beside(noise: NoiseFloor, one: LogEquations, log: ExperimentLog, source: Ex
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = residual / floor
     return Beside(log.name, log.role, noise.periods, one.repeats > 1, noise.unlike if asked else "not asked for", noise.left_out,
-                  noise.settling, noise.position, noise.torque, noise.torque_low_pass, motion, floor, residual, ratio)
+                  noise.position, noise.torque, noise.torque_low_pass, motion, floor, residual, ratio, noise.settling_time)
 
 
 def _of_motion(one: LogEquations, noise: NoiseFloor, log: ExperimentLog, fitted: Fitted) -> Array:

@@ -26,7 +26,7 @@ from pipelines.model.excitation.problem import DesignProblem, grams_of
 from pipelines.model.excitation.task import Task
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Alike", "Apart", "Pair", "alike", "told_apart"]
+__all__ = ["Alike", "Apart", "Pair", "alike", "judged_again", "told_apart"]
 
 _SHARPNESS = 200.0  # [s/rad] of Coulomb friction
 _SHAPES = 4  # of a cause
@@ -106,6 +106,13 @@ def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluat
     last = alike(task, arm, after.trajectory.series.samples(problem.samples), pair)
     names = tuple(one.name if one.joint is None else f"{one.name}:{one.joint}" for one in (pair.first, pair.second))
     return after, Apart((names[0], names[1]), before, last, done)
+
+
+def judged_again(task: Task, found: Design, pair: Pair, apart: Apart) -> Apart:
+    """`apart` of a motion that was changed after it was told apart."""
+    if task.arm is None:
+        return apart
+    return replace(apart, after=alike(task, task.arm, found.trajectory.series.samples(landscape(task).samples), pair))
 
 
 def _judged(task: Task, arm: Arm, problem: DesignProblem, x: Array, pair: Pair) -> Alike:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipelines.errors import Check
-from pipelines.model.excitation.rehearse import Rehearsal
+from pipelines.model.excitation.rehearse import Beyond, Rehearsal
 from pipelines.model.excitation.result import Result
 
 __all__ = ["beyond_words", "doubts"]
@@ -30,6 +30,12 @@ def doubts(result: Result) -> tuple[Check, ...]:
 
 def beyond_words(joints: tuple[str, ...], found: Rehearsal) -> list[str]:
     """What a rehearsal says against a motion, limit by limit: drives that saturate, joints beyond their speed or range."""
-    return [f"the drive of {joints[one.joint]} saturates in {100.0 * found.saturated[one.joint]:.2g} % of the samples"
-            if one.quantity == "torque" else f"{joints[one.joint]} reaches {100.0 * one.share:.4g} % of its {one.quantity} limit"
-            for one in found.beyond]
+    return [_words(joints[one.joint], one) for one in found.beyond]
+
+
+def _words(joint: str, one: Beyond) -> str:
+    if one.quantity == "torque":
+        return f"the drive of {joint} saturates in {100.0 * one.by:.2g} % of the samples"
+    if one.quantity == "speed":
+        return f"{joint} reaches {100.0 * (1.0 + one.by):.4g} % of its speed limit"
+    return f"{joint} goes {one.by:.2g} {one.unit} beyond its range"

@@ -9,12 +9,13 @@ at the start; the drives saturate at their limits. No feed-forward: a real contr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.errors import RrridError
+from pipelines.errors import Interrupted, RrridError
 from pipelines.log.experiment import Controller
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.design import FINISH, Design, finished, landscape
@@ -26,9 +27,10 @@ from pipelines.model.simulation import Experiment, Noise, simulate
 __all__ = ["Beyond", "Rehearsal", "rehearse", "rehearsed", "rehearsed_design"]
 
 _LOOP_HZ = 8.0
-_SHRINKINGS = 6  # rehearsals of a design that is made smaller
+_REHEARSALS = 6  # of a design that is made smaller
 _SATURATED = 1.03  # of its limit that a torque is taken to ask for which the drive cuts off
 _INSIDE = 0.998  # of the way to the limit: what is made smaller follows otherwise by about as much
+_HELPS = 0.9  # of what it went beyond before: where a smaller motion goes farther, its size is not what is in the way
 _LIGHTEST = 1e-4  # of the heaviest joint's inertia: a loop about less would ask for gains without bound
 
 
@@ -38,7 +40,8 @@ class Beyond:
 
     joint: int  # counted from 0
     quantity: str  # "position" | "speed" | "torque"
-    share: float  # of the limit that is reached; of a torque 1, for the drive gives no more
+    by: float  # of a position the distance beyond its range; of a speed a share of its limit; of a torque that of samples cut off
+    unit: str = ""  # of that distance
 
 
 @dataclass(frozen=True)
@@ -48,22 +51,24 @@ class Rehearsal:
     seconds: float  # rehearsed
     position_rms: tuple[float, ...]  # [rad] actual minus planned
     position_max: tuple[float, ...]  # [rad]
-    position_reach: tuple[float, ...]  # of the way from the middle of the range to its nearer end; 0 where both are open
     torque_peak: tuple[float, ...]  # [N m] commanded
     torque_limit: tuple[float, ...]  # [N m]
     speed_peak: tuple[float, ...]  # [rad/s]
     speed_limit: tuple[float, ...]  # [rad/s]
     saturated: tuple[float, ...]  # share of samples at the torque limit
+    position_nearest: tuple[float, ...] | None = None  # [rad or m] nearest to an end of its range; None: not known
+    position_beyond: tuple[float, ...] | None = None  # [rad or m] past that end; less than 0 before it, NaN where both are open
+    position_units: tuple[str, ...] | None = None  # "rad" or "m"
 
     @property
     def beyond(self) -> tuple[Beyond, ...]:
         """What goes beyond its limit, joint by joint."""
-        found = []
-        for j, (reach, speed, limit, full) in enumerate(zip(self.position_reach, self.speed_peak, self.speed_limit, self.saturated,
-                                                            strict=True)):
-            found += [Beyond(j, "position", reach)] if reach > 1.0 else []
-            found += [Beyond(j, "speed", speed / limit)] if speed > limit else []
-            found += [Beyond(j, "torque", 1.0)] if full > 0.0 else []
+        joints = len(self.saturated)
+        found, past, units = [], self.position_beyond or (math.nan,) * joints, self.position_units or ("rad",) * joints
+        for j, (far, speed, limit, full) in enumerate(zip(past, self.speed_peak, self.speed_limit, self.saturated, strict=True)):
+            found += [Beyond(j, "position", far, units[j])] if far > 0.0 else []
+            found += [Beyond(j, "speed", speed / limit - 1.0)] if speed > limit else []
+            found += [Beyond(j, "torque", full)] if full > 0.0 else []
         return tuple(found)
 
     @property
@@ -71,10 +76,21 @@ class Rehearsal:
         """No drive saturates, and no joint goes beyond its range or its speed."""
         return not self.beyond
 
-    @property
-    def nearest(self) -> float:
-        """Share of the limit that is come nearest to; of a torque that is cut off, of what it would have asked for."""
-        return max((_SATURATED if one.quantity == "torque" else one.share for one in self.beyond), default=1.0)
+    def size(self, centre: Array) -> float:
+        """Times as large as it is that the motion would keep its limits, if all that it does grew with it.
+
+        Args:
+            centre: (joints,) [rad or m] about which it is made smaller.
+        """
+        return min((self._size(one, centre) for one in self.beyond), default=1.0)
+
+    def _size(self, one: Beyond, centre: Array) -> float:
+        if one.quantity == "torque":  # more was asked for than is known
+            return 1.0 / _SATURATED
+        if one.quantity == "speed" or self.position_nearest is None:
+            return 1.0 / (1.0 + one.by)
+        # (limit - centre) / (reach - centre): the range may lie anywhere about the motion, and be open on one side
+        return float(1.0 - one.by / max(abs(self.position_nearest[one.joint] - centre[one.joint]), 1e-300))
 
 
 def rehearse(arm: Arm, sample_time: float, motion: Array, noise: Array, seed: int, seconds: float,
@@ -99,52 +115,86 @@ def rehearse(arm: Arm, sample_time: float, motion: Array, noise: Array, seed: in
                             np.array([joint.encoder_resolution or 0.0 for joint in joints]),
                             v=None if v is None else v[:samples] @ matrix)
     done = simulate(arm, experiment, Noise(noise, np.zeros(arm.n_joints)), (seed,))
+    nearest, beyond = _nearest(done.true_q[0], np.array([joint.position for joint in joints]))
     away, tau, speed = done.true_q[0] - q, np.abs(done.tau[0]), np.abs(done.true_dq[0])
 
     def each(values: Array) -> tuple[float, ...]:
         return tuple(float(value) for value in values)
 
     return Rehearsal(len(q) * sample_time, each(np.sqrt((away**2).mean(axis=0))), each(np.abs(away).max(axis=0)),
-                     each(_reach(done.true_q[0], np.array([joint.position for joint in joints]))),
                      each(tau.max(axis=0)), each(limit), each(speed.max(axis=0)), tuple(joint.velocity for joint in joints),
-                     each((tau >= limit * (1.0 - 1e-9)).mean(axis=0)))
+                     each((tau >= limit * (1.0 - 1e-9)).mean(axis=0)),
+                     each(nearest), each(beyond),
+                     tuple("m" if joint.type == "prismatic" else "rad" for joint in joints))
 
 
-def _reach(q: Array, ranges: Array) -> Array:
-    """How far q (samples, joints) goes towards the nearer end of `ranges` (joints, 2): 1 is the end, 0 where both are open."""
-    low, high = np.isfinite(ranges).T
-    ends = np.where(np.isfinite(ranges), ranges, 0.0)
-    middle = np.where(low & high, ends.mean(axis=1), np.where(high, ends[:, 1] - 1.0, ends[:, 0] + 1.0))
-    half = np.where(low & high, 0.5 * (ends[:, 1] - ends[:, 0]), 1.0)
-    return np.asarray(np.maximum(np.where(high, (q.max(axis=0) - middle) / half, 0.0),
-                                 np.where(low, (middle - q.min(axis=0)) / half, 0.0)))
+def _nearest(q: Array, ranges: Array) -> tuple[Array, Array]:
+    """Where q (samples, joints) comes nearest to an end of `ranges` (joints, 2), and how far that lies beyond it."""
+    low, high = q.min(axis=0), q.max(axis=0)
+    under, over = ranges[:, 0] - low, high - ranges[:, 1]
+    beyond = np.maximum(under, over)
+    return np.where(under > over, low, high), np.where(np.isfinite(beyond), beyond, np.nan)
 
 
 def rehearsed_design(task: Task, found: Design, seed: int, tell: Callable[[str], None]) -> tuple[Design, Rehearsal | None, str]:
-    """`found` with what its rehearsal did, made smaller where that went beyond a limit; in words what went wrong.
+    """`found` with what its rehearsal did, made smaller where that keeps its limits; in words what went wrong.
 
     One period and what leads to it and away are rehearsed: further periods repeat them. The design keeps a reserve of speed, so
-    that few have to be made smaller; whether its condition number is still what was asked for is for others to look at.
-    Nothing is rehearsed without a model.
+    that few have to be made smaller; whether its condition number is still what was asked for is for others to look at. Where
+    no smaller one keeps them either, for noise or gravity is in the way, the motion stays as large as it was designed.
+    Nothing is rehearsed without a model. Who stops a rehearsal keeps the design as it was before.
     """
+    first = None
+    try:
+        if (first := _alone(task, found, seed, tell)) is None or first.safe:
+            return found, first, ""
+    except RrridError as problem:  # a model whose simulation runs away is worth saying, and no reason to lose the design
+        return found, None, problem.message
+    except Interrupted as signal:
+        return replace(found, stopped=signal.exit_code), None, ""
+    try:
+        smaller = _smaller(task, found, first, seed, tell)
+    except RrridError:
+        smaller = None
+    except Interrupted as signal:
+        return replace(found, stopped=signal.exit_code), first, ""
+    return (found, first, "") if smaller is None else (*smaller, "")
+
+
+def _alone(task: Task, found: Design, seed: int, tell: Callable[[str], None]) -> Rehearsal | None:
     if task.arm is None:
-        return found, None, ""
+        return None
+    tell("rehearsing in simulation" if found.shrunk == 1.0 else f"rehearsing in simulation, {found.shrunk:.3f} times as large")
+    _, motion = replace(found.trajectory, periods=1).sampled(task.sample_time)
+    return rehearse(task.arm, task.sample_time, motion, task.problem.goal.noise, seed, np.inf)
+
+
+def _smaller(task: Task, found: Design, last: Rehearsal, seed: int, tell: Callable[[str], None]) -> tuple[Design, Rehearsal] | None:
+    """The largest motion like `found` that keeps its limits in its rehearsal; None where making it smaller does not help."""
     finish = landscape(task, 1, FINISH)
-    x, last = finish.space.point(found.trajectory.series), None
-    for attempt in range(_SHRINKINGS):
-        tell("rehearsing in simulation" if attempt == 0 else f"rehearsing in simulation, {found.shrunk:.3f} times as large")
-        _, motion = found.trajectory.sampled(task.sample_time)
-        seconds = 2.0 * found.trajectory.run_in + found.trajectory.series.period
-        try:
-            last = rehearse(task.arm, task.sample_time, motion, task.problem.goal.noise, seed, seconds)
-        except RrridError as problem:  # a model whose simulation runs away is worth saying, and no reason to lose the design
-            return found, None, problem.message
-        if last.safe or attempt == _SHRINKINGS - 1:
-            break
-        x = finish.space.shrunk(x, _INSIDE / last.nearest)
-        smaller = finished(task, finish, x, found.evaluations, found.found_at, found.stopped, found.reached)
-        found = replace(smaller, shrunk=found.shrunk * _INSIDE / last.nearest * smaller.shrunk)
-    return found, last, ""
+    x = finish.space.point(found.trajectory.series)
+    for _ in range(_REHEARSALS - 1):
+        centre = found.trajectory.series.offset if task.home is None else task.home
+        size = _INSIDE * last.size(centre)
+        if size <= 0.0:  # even at a standstill it is beyond
+            return None
+        x = finish.space.shrunk(x, size)
+        # whether it still reaches what was asked for is to be judged anew
+        made = finished(task, finish, x, found.evaluations, found.found_at, found.stopped, False)
+        found = replace(made, shrunk=found.shrunk * size * made.shrunk)
+        now = _alone(task, found, seed, tell)
+        if now is None or now.safe:
+            return None if now is None else (found, now)
+        if not _nearer(now, last):
+            return None
+        last = now
+    return None
+
+
+def _nearer(now: Rehearsal, last: Rehearsal) -> bool:
+    """Whether what goes beyond its limits does so by clearly less than before."""
+    before = {(one.joint, one.quantity): one.by for one in last.beyond}
+    return all(one.by < _HELPS * before.get((one.joint, one.quantity), np.inf) for one in now.beyond)
 
 
 def rehearsed(task: Task, plans: tuple[Plan, ...], seed: int, tell: Callable[[str], None],

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.design_excitation import STAGE
+from pipelines.log.results import decode, encode
 from pipelines.model.excitation.doubts import doubts
 from pipelines.model.excitation.result import Result
 from pipelines.report.excitation_report import excitation_report
@@ -48,3 +49,27 @@ def test_what_no_smaller_motion_mends_is_not_silent(tmp_path: Path) -> None:
     assert outcome.result.rehearsal is not None
     assert max(outcome.result.rehearsal.saturated) > 0.0
     assert [check.code for check in outcome.checks if "saturates" in check.message] == ["RRID-D12"]
+    alone = designed(tmp_path / "alone", replace(QUICK, noise=(30.0, 30.0, 10.0), cond_max=20.0))
+    assert outcome.result.shrunk == alone.result.shrunk
+    assert outcome.json["limits"] == alone.json["limits"]
+
+
+def test_a_joint_beyond_its_range_is_named_with_the_distance(safe: Result) -> None:
+    assert safe.rehearsal is not None
+    far = replace(safe.rehearsal, position_beyond=(-1.0, 0.012, float("nan")), position_units=("rad", "m", "rad"))
+    (check,) = doubts(replace(safe, rehearsal=far))
+    assert f"{safe.joints[1]} goes 0.012 m beyond its range" in check.message
+
+
+def test_a_result_from_before_ranges_were_rehearsed_is_still_reported(safe: Result) -> None:
+    """What it does not say is not known; where one limit has two figures, the one that the plan kept is named so."""
+    text, series = encode(safe)
+    for name in ("position_nearest", "position_beyond", "position_units"):
+        del text["rehearsal"][name]
+    old = decode(Result, text, series)
+    assert doubts(old) == ()
+    report = excitation_report(old)
+    assert "How near the joints came to the ends of their ranges is not known." in report.sections[0].text
+    assert report.sections[0].tables[0].rows[0][-2] is None
+    (limits,) = [section for section in report.sections if section.title == "Limits"]
+    assert "limit used" in limits.tables[0].columns

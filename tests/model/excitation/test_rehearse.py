@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+import signal
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pipelines.errors import Interrupted
 from pipelines.log.robot import RobotDescription
+from pipelines.model.excitation import rehearse as rehearsing
 from pipelines.model.excitation.design import Design, Effort, design
 from pipelines.model.excitation.rehearse import Rehearsal, rehearse, rehearsed_design
 from pipelines.model.excitation.task import Task, Wishes, plan_task
@@ -34,7 +38,7 @@ def test_a_plan_at_its_speed_limit_is_made_as_small_as_its_rehearsal_asks(rest: 
     task, found = designed(replace(SHORT, speed_share=1.0, rest=rest), rrr())
     before = plain(task, found)
     assert {one.quantity for one in before.beyond} == {"speed"}
-    overshoot = max(one.share for one in before.beyond)
+    overshoot = max(1.0 + one.by for one in before.beyond)
     kept, rehearsal, failed = rehearsed_design(task, found, 1, lambda words: None)
     assert failed == ""
     assert rehearsal is not None
@@ -63,7 +67,8 @@ def test_a_range_is_kept_by_the_arm_as_by_the_plan() -> None:
     kept, rehearsal, _ = rehearsed_design(task, found, 1, lambda words: None)
     assert rehearsal is not None
     assert rehearsal.safe
-    assert max(rehearsal.position_reach) > 0.98
+    assert rehearsal.position_beyond is not None
+    assert -0.02 < max(rehearsal.position_beyond) <= 0.0
     assert 0.9 < kept.shrunk <= 1.0
 
 
@@ -71,3 +76,64 @@ def test_without_a_model_nothing_is_rehearsed() -> None:
     task = plan_task(rrr(), None, SHORT)
     found = design(task, Effort(evaluations=100), 1)
     assert rehearsed_design(task, found, 1, lambda words: None) == (found, None, "")
+
+
+def test_a_range_open_on_one_side_is_kept_by_as_little_less() -> None:
+    """A shoulder that stands a tenth of a radian from the one end of its range, and sags past it by a tenth of that: it is made
+    smaller about where it stands, by a tenth."""
+    robot = rrr()
+    joints = (robot.joints[0], replace(robot.joints[1], position=(-1.0, math.inf)), robot.joints[2])
+    task, found = designed(replace(SHORT, home=(0.0, -0.9, 0.0)), replace(robot, joints=joints))
+    before = plain(task, found)
+    (past,) = [one for one in before.beyond if one.quantity == "position"]
+    assert before.position_nearest is not None
+    assert past.by == pytest.approx(-1.0 - before.position_nearest[1])
+    kept, rehearsal, _ = rehearsed_design(task, found, 1, lambda words: None)
+    assert rehearsal is not None
+    assert rehearsal.safe
+    assert rehearsal.position_beyond is not None
+    assert -0.002 < rehearsal.position_beyond[1] <= 0.0
+    assert kept.shrunk / found.shrunk == pytest.approx(1.0 - past.by / 0.1, abs=0.03)
+
+
+@pytest.mark.parametrize("rest", [True, False])
+def test_what_no_smaller_motion_mends_stays_as_large_as_it_is(rest: bool) -> None:
+    """Torque noise of the size of the limits saturates the drives at a standstill as well: two rehearsals show that, not six."""
+    task, found = designed(replace(SHORT, noise=(60.0, 60.0, 20.0), rest=rest), rrr())
+    told: list[str] = []
+    kept, rehearsal, failed = rehearsed_design(task, found, 1, told.append)
+    assert kept is found
+    assert rehearsal is not None
+    assert rehearsal.torque_peak == plain(task, found).torque_peak
+    assert {one.quantity for one in rehearsal.beyond} >= {"torque"}
+    assert failed == ""
+    assert len(told) == 2
+
+
+def test_of_several_periods_one_is_rehearsed_with_the_way_in_and_out() -> None:
+    task, found = designed(replace(SHORT, rest=False, periods=3), rrr())
+    _, rehearsal, _ = rehearsed_design(task, found, 1, lambda words: None)
+    assert rehearsal is not None
+    once = replace(found, trajectory=replace(found.trajectory, periods=1))
+    assert rehearsal.position_nearest == plain(task, once).position_nearest
+    assert rehearsal.seconds == pytest.approx(10.0 + 2.0 * found.trajectory.run_in, abs=2e-3)
+
+
+@pytest.mark.parametrize("nth", [1, 2])
+def test_who_stops_a_rehearsal_keeps_the_design(nth: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As it was designed, with what the rehearsal before that did, and the exit code of the signal."""
+    task, found = designed(replace(SHORT, speed_share=1.0), rrr())
+    count = 0
+
+    def stopped(*given: object) -> Rehearsal:
+        nonlocal count
+        count += 1
+        if count == nth:
+            raise Interrupted(signal.SIGINT)
+        return rehearse(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(rehearsing, "rehearse", stopped)
+    kept, rehearsal, failed = rehearsed_design(task, found, 1, lambda words: None)
+    assert kept.trajectory is found.trajectory
+    assert (kept.stopped, failed) == (130, "")
+    assert (rehearsal is None) == (nth == 1)
