@@ -22,10 +22,16 @@ def doubts(result: Result) -> tuple[Check, ...]:
                               remedy="check the model before the robot moves"))
     motion = () if result.rehearsal is None else (("the motion", result.rehearsal),)
     found += [Check.of("D12", "warn", f"rehearsed in simulation, {name} goes beyond limits: {', '.join(words)}", where=result.robot,
-                       gate=True, remedy="plan a slower one (speed_share, torque_share), or make sure that your controller "
-                       "follows more closely")
+                       gate=True, remedy=_remedy(rehearsal))
               for name, rehearsal in (*motion, *result.rehearsals) if (words := beyond_words(result.joints, rehearsal))]
     return tuple(found)
+
+
+def _remedy(found: Rehearsal) -> str:
+    ways = {"torque": "a smaller torque_share", "speed": "a smaller speed_share",
+            "position": "another --home, or a position range in the robot description that leaves room"}
+    named = dict.fromkeys(ways.get(one.quantity, ways["position"]) for one in found.beyond)
+    return f"plan it again with {', and '.join(named)}; or make sure that your controller follows more closely"
 
 
 def beyond_words(joints: tuple[str, ...], found: Rehearsal) -> list[str]:

@@ -59,6 +59,8 @@ def test_a_joint_beyond_its_range_is_named_with_the_distance(safe: Result) -> No
     far = replace(safe.rehearsal, position_beyond=(-1.0, 0.012, float("nan")), position_units=("rad", "m", "rad"))
     (check,) = doubts(replace(safe, rehearsal=far))
     assert f"{safe.joints[1]} goes 0.012 m beyond its range" in check.message
+    assert "--home" in check.remedy
+    assert "speed_share" not in check.remedy
 
 
 def test_a_result_from_before_ranges_were_rehearsed_is_still_reported(safe: Result) -> None:
