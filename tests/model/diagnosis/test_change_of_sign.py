@@ -192,7 +192,7 @@ def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(spe
     assert wrong_law_of(cast("Diagnosis", found)) is asked
 
 
-@pytest.mark.parametrize("stored", [None, cast("Calibration", SimpleNamespace())])
+@pytest.mark.parametrize("stored", [None, cast("Calibration", SimpleNamespace(conditions=SimpleNamespace(laws=())))])
 def test_stored_thresholds_are_for_the_other_curve_as_well(stored: Calibration | None, monkeypatch: pytest.MonkeyPatch) -> None:
     """An arm in order whose friction changes its sign by an arc tangent is in order with and without --calibration."""
     asked = []
