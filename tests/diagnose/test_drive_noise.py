@@ -13,7 +13,7 @@ from tests.diagnose.sessions import but
 
 
 @pytest.mark.parametrize(("sample_time", "cutoff_hz"), [
-    (4e-3, None), (1e-3, 20.0), pytest.param(1e-3, None, marks=pytest.mark.slow)])
+    (4e-3, None), *(pytest.param(1e-3, hz, marks=pytest.mark.slow) for hz in (20.0, None))])
 def test_the_floor_is_what_an_arm_in_order_leaves_however_narrow_the_low_pass(sample_time: float, cutoff_hz: float | None) -> None:
     """Within a half: a narrow low-pass leaves little that is quick of white noise, which the noise was guessed by."""
     logs = Case("wrist", "tanh", "pid", sample_time, noise=0.01, motions=(("fourier", "identify"),), duration=10.0).logs()

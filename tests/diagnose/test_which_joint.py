@@ -60,6 +60,7 @@ def test_reference_logs_tell_at_which_joint_it_is(planar: tuple[ExperimentLog, .
     assert abs(error.value - (1.0 / WRONG - 1.0)) < 3.0 * error.std < 0.005  # applied is less than logged
 
 
+@pytest.mark.slow
 def test_what_is_seen_at_its_joint_alone_has_its_name_there(planar: tuple[ExperimentLog, ...]) -> None:
     """Torque that is offset at one of the same joints."""
     def offset(log: ExperimentLog) -> ExperimentLog:

@@ -114,7 +114,7 @@ def test_a_result_from_before_starts_were_looked_for_is_still_reported() -> None
     assert "how long its motion took to settle is not known" in str(bps_report(old).sections)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_a_loop_that_settles_spoils_no_mean_of_two_periods(seed: int) -> None:
     """From rest the shoulder sags by 5 to 10 mrad, for 0.3 s, and so does the held-out log.
 

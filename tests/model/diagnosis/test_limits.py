@@ -84,6 +84,7 @@ def test_well_below_its_limit_it_is_not() -> None:
     assert not named(7, "cogging", 2, 0.4, FEW)
 
 
+@pytest.mark.slow
 def test_at_its_limit_a_clipped_drive_is_found_and_well_above_it_is_not() -> None:
     """Of a drive that clips there is more the lower it does: three in a hundred below, and three tenths above."""
     few = but("torque_saturation", "torque_offset", "torque_gain")

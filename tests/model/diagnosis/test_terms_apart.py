@@ -124,6 +124,7 @@ def test_three_sigmoids_that_are_told_apart_stay(samples: Path) -> None:
     assert [type(law) for law in done.model.columns.laws] == [ThreeSigmoid, TwoSigmoid, ThreeSigmoid]
 
 
+@pytest.mark.slow
 def test_three_sigmoids_come_out_right_beside_cogging(samples: Path) -> None:
     """The motor of joint 2 cogs since the reference logs, 0.35 N m. By its waves two of the three sigmoids had merged (124 +- 6e4
     s/rad), and 0.17 N m was left of what was held out. The machine has 120, 60 and 12 s/rad."""
