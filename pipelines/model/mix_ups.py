@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import combinations, permutations
 
 import numpy as np
@@ -112,8 +112,8 @@ def encoder_scale(e: Evidence) -> list[Check]:
     def alone(**other: Array) -> Array:
         return np.diag(quick_residual(e.body, motion, **other))[told]
 
-    if (found := _scaled(e, together, alone, _SHARED_BAD, _SCALES)) is None:
-        found = _scaled(e, alone, alone, _SCALE_BAD, _SCALES)
+    if (found := _scaled(e, together, alone, _SHARED_BAD)) is None:
+        found = _scaled(e, alone, alone, _SCALE_BAD)
         return [] if found is None else [_angle(e, *found)]
     torque = torque_scale(e)
     if torque is None or torque.joint != found[2] or torque.after > _EITHER * found[1]:
@@ -130,7 +130,7 @@ def _angle(e: Evidence, before: float, after: float, joint: int, factor: str, ri
 
 
 def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Array], bad: float,
-            scales: Mapping[str, float]) -> tuple[float, float, int, str] | None:
+            ) -> tuple[float, float, int, str] | None:
     """What the log as it is leaves, what the best angle and scale leave, the joint and the factor; None where the log leaves no
     more than `bad` or not far more than that.
 
@@ -142,12 +142,14 @@ def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Ar
         return None
     found: list[tuple[float, int, str]] = []
     for joint in e.telling.tolist():
-        for name, factor in scales.items():
+        for name, factor in _SCALES.items():
             scale = np.where(np.arange(e.n_joints) == joint, factor, 1.0)
             other = {"q": motion.q * scale, "dq": motion.dq * scale, "ddq": motion.ddq * scale}
-            left, own = _rms(residual(**other)), alone(**other)
-            if factor < 0.0 and not (own <= _MUCH_BETTER * rows).any():
-                continue  # the direction of a joint that bends nothing is that of its torque: S14 tells
-            if left <= min(_GOOD, _SCALE_BETTER * before) and (own <= _WORSE * rows).all():
+            left = _rms(residual(**other))
+            if left > min(_GOOD, _SCALE_BETTER * before):
+                continue
+            own = alone(**other)
+            # The direction of a joint that bends nothing is that of its torque: S14 tells.
+            if (own <= _WORSE * rows).all() and (factor > 0.0 or (own <= _MUCH_BETTER * rows).any()):
                 found.append((left, joint, name))
     return (before, *min(found)) if found else None

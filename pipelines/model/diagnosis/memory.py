@@ -41,9 +41,9 @@ class Memory:
     def prepared(self, logs: Logs, chosen: DiagnosisSettings, arm: Arm | None, stored: tuple[str, ...] = ()) -> Prepared:
         """As `prepare`, for laws of friction whose terms these logs tell apart, or that thresholds are `stored` for."""
         parts = (logs.identify, logs.validate, logs.reference, logs.frf, logs.frf_before)
-        settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed, chosen.blocks)
+        settings = (tuple(map(len, parts)), chosen.cutoff_hz, chosen.decimation, chosen.min_speed)
         rows = self.of("rows", (arm, *(log for part in parts for log in part)), settings, lambda: prepare(logs, chosen, arm))
-        return self.of("terms", (rows,), stored, lambda: with_terms_told_apart(rows, chosen.blocks, stored))
+        return self.of("terms", (rows,), (chosen.blocks, stored), lambda: with_terms_told_apart(rows, chosen.blocks, stored))
 
     def instead(self, before: A, after: A) -> None:
         """Who would be given `before` is given `after`, which a diagnosis has found to be better: rows for laws that fit better, a

@@ -249,6 +249,13 @@ class Effect(ABC):
         """`arm.torque(motion)`, kept from one effect and shape to the next; not to be written to."""
         return _predicted(arm, motion)
 
+    def sharpnesses(self, motion: Motion, count: int) -> list[float]:
+        """[s/rad] largest first: a geometric grid between the slowest and the fastest speeds that this motion holds."""
+        speed = np.abs(self.own(motion.dq))
+        moving = speed[speed > 0]
+        fast, slow = (moving.max(), np.quantile(moving, 0.02)) if moving.size else (1.0, 0.01)
+        return [float(w) for w in np.geomspace(1 / fast, 2 / max(slow, 1e-3 * fast), count)[::-1]]
+
     def own(self, signal: Array) -> Array:
         """Column of its own joint, (samples,)."""
         return np.asarray(signal[..., self._index])

@@ -66,12 +66,8 @@ class ThreeSigmoid(Effect):
                           sharpnesses=tuple(values[f"w{k}"] for k in (1, 2, 3)))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """w1 > w2 > w3 on a geometric grid between the fastest and the slowest speeds that this motion holds."""
-        speed = np.abs(self.own(motion.dq))
-        moving = speed[speed > 0]
-        fast, slow = (moving.max(), np.quantile(moving, 0.02)) if moving.size else (1.0, 0.01)
-        grid = np.geomspace(1 / fast, 2 / max(slow, 1e-3 * fast), _GRID)
-        for w1, w2, w3 in combinations(grid[::-1].tolist(), 3):
+        """w1 > w2 > w3 on their grid."""
+        for w1, w2, w3 in combinations(self.sharpnesses(motion, _GRID), 3):
             yield replace(self, w1=w1, w2=w2, w3=w3)
 
     @staticmethod
