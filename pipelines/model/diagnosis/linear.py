@@ -56,16 +56,18 @@ def _apart(gram: Array, place: int, gone: Sequence[int]) -> float:
 def covariance(table: Array, residual: Array) -> Array:
     """(k, k) of the coefficients of `table` (k, rows), weighted.
 
-    Newey & West 1987 over the rows of each joint, 20 lags: neighbouring rows share the noise of the low-pass.
+    Newey & West 1987 over the rows of each joint, 20 lags: neighbouring rows share the noise of the low-pass. Their weights
+    1 - l / (L + 1) are those of the products of sums over L + 1 rows:
+
+        Σ_l (1 - |l| / (L + 1)) Σ_t s_t s_{t+l}ᵀ = 1 / (L + 1) Σ_t u_t u_tᵀ,    u_t = s_{t-L} + … + s_t
     """
     unit, size = _unit(table)
     values, vectors = _seen(unit @ unit.T)
     bread = (vectors / values) @ vectors.T
-    scores = unit * residual
-    meat = scores @ scores.T
-    for lag in range(1, _LAGS + 1):
-        cross = scores[:, lag:] @ scores[:, :-lag].T
-        meat += (1.0 - lag / (_LAGS + 1.0)) * (cross + cross.T)
+    none = np.zeros((len(unit), _LAGS + 1))
+    upto = np.cumsum(np.concatenate([none, unit * residual, none[:, :_LAGS]], axis=1), axis=1)
+    sums = upto[:, _LAGS + 1:] - upto[:, :-_LAGS - 1]
+    meat = sums @ sums.T / (_LAGS + 1)
     return np.asarray(bread @ meat @ bread / size / size[:, None])
 
 
