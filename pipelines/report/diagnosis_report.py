@@ -58,11 +58,17 @@ def diagnosis_report(result: Result) -> Report:
                              numbers_section(number, one, units))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
-    return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _TONES[result.verdict],
+    return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),
                   errors_table(now, result.after_rms, result.rated, floor, name,
                                f"{unmoved_words(result, units)}{floor_from}", units),
                   tuple(sections), _advice(result),
                   (laws_words(result.laws_of, _IN_RUN, result.fewer_terms), threshold_words(result)))
+
+
+def _tone(result: Result) -> Tone:
+    """What machines in order have as well is no fault of this one, unless it has changed."""
+    ordinary = result.question != "what has changed" and all(find_effect(one.cause).ordinary for one in result.findings)
+    return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
 
 
 def _verdict(result: Result) -> str:

@@ -45,7 +45,7 @@ def _verdict(result: Extension) -> str:
     change = "" if result.gain is None else tip_change(result.gain)
     told = f"; with it {change}" if change else ""
     but = f" Not accepted: {refused}." if refused else ""
-    return f"The model with {found} is better on held-out logs{told}.{but}"
+    return f"The model with {found}, all its numbers fitted again, is better on held-out logs{told}.{but}"
 
 
 def _first_reason(result: Extension) -> str:

@@ -139,6 +139,15 @@ def test_a_change_is_told_in_figures_that_show_its_sign() -> None:
     assert [row[4:] for row in rows] == [(0.0487, 0.0474), (0.213, 0.0156)]
 
 
+@pytest.mark.parametrize(("causes", "question", "tone"), [
+    (("stribeck", "presliding"), "what is wrong", "attention"), (("stribeck", "cogging"), "what is wrong", "bad"),
+    (("stribeck",), "what has changed", "bad")])
+def test_what_machines_in_order_have_is_no_problem_unless_it_has_changed(causes: tuple[str, ...], question: str, tone: str) -> None:
+    """No technician needs to look after a machine for the hump of its friction; where it is new he does."""
+    there = NOTHING | {"verdict": "cause", "question": question, "findings": tuple(found(cause) for cause in causes)}
+    assert diagnosis_report(Result(**there)).tone == tone
+
+
 def test_a_threshold_that_nothing_can_exceed_is_no_figure() -> None:
     """No gain is more than the whole residual: 604 % says nothing but that the cause cannot be shown."""
     trials = tuple(Trial(1, "cogging", joint, 0.02, threshold, 0.95, float("nan"), False, "below its threshold")

@@ -85,6 +85,7 @@ class Effect(ABC):
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
+    ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken
 
     def __post_init__(self) -> None:
         if (self.scope == "joint") != (self.joint is not None and self.joint >= 1):

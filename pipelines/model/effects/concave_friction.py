@@ -45,6 +45,7 @@ class ConcaveFriction(Effect):
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
     twins = ("stribeck", "quadratic_drag", "viscous", "three_sigmoid")
     friction = True
+    ordinary = True
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

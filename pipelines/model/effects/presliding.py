@@ -75,6 +75,7 @@ class Presliding(Effect):
               "by the sign of speed alone pushes too early.")
     experiment = "Reverse the joint slowly and often, with strokes from a tenth of the distance to many times it."
     twins = ("backlash", "coulomb", "stribeck")
+    ordinary = True
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

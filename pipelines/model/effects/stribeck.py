@@ -50,6 +50,7 @@ class Stribeck(Effect):
     twins = ("quadratic_drag", "three_sigmoid", "concave_friction", "presliding")
     shared = ("sharpness",)
     friction = True
+    ordinary = True
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
