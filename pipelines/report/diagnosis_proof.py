@@ -29,7 +29,7 @@ def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterato
     if proof is None:
         return
     torque = units.at(proof.joint).torque
-    over = f"Residual of joint {proof.joint} over {proof.against}, means in bins"
+    over = f"Residual of joint {proof.joint} over {proof.against}, {'amplitudes' if _in_waves(proof) else 'means in bins'}"
     yield Figure(f"proof-{number}", f"{over}: {_shown(proof, torque)}.",
                  lambda drawing: draw_proof(drawing.subplots(), proof, torque), (6.0, 3.2))
     yield Figure(f"proof-{number}-in-time", f"The same residual of joint {proof.joint} where the finding shows most, over time.",
@@ -44,11 +44,16 @@ def _shown(proof: Proof, torque: str) -> str:
         return f"{sizes}; what is left without it follows what it predicts"
     if after <= _MUCH * before:
         return f"{sizes}; part of what is left without it follows what it predicts"
-    return f"{sizes}; averaged like this most of it stays, and the gain in numbers has to prove it"
+    alike = "like this" if _in_waves(proof) else "averaged like this"
+    return f"{sizes}; {alike} most of it stays, and the gain in numbers has to prove it"
+
+
+def _in_waves(proof: Proof) -> bool:
+    return proof.against == "frequency"
 
 
 def draw_proof(axes: Axes, proof: Proof, torque: str = "N m") -> None:
-    """Means in bins with their standard errors."""
+    """Means in bins with their standard errors, or amplitudes over frequency."""
     axes.fill_between(proof.x, proof.before - 2.0 * proof.spread, proof.before + 2.0 * proof.spread, color=style.SKY, alpha=0.35,
                       linewidth=0.0)
     axes.plot(proof.x, proof.before, color=style.BLUE, linewidth=1.6, label="without the finding")

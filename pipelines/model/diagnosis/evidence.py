@@ -23,6 +23,7 @@ __all__ = ["evidence", "floors_of", "proof"]
 _POINTS = 3000  # of a series
 _AS_MUCH = 0.9  # of what a part tells over time
 _FINE = 96  # bins of a proof: a wave of order 18 over half a turn has ten of them a period
+_TELLS = 0.2  # of the predicted part, that it is in its means over a signal: what less tells, no signal does
 _STRETCH = 2.0  # [s] of a proof in time
 _SEGMENT = 512  # rows of a spectrum
 _MOST = 0.8  # of the excess that the band holds
@@ -119,7 +120,8 @@ def _bands(spectra: list[Spectrum], joints: int) -> Array:
 
 
 def proof(before: Refined, after: Refined, joint: int | None) -> Proof:
-    """Over the signal that tells the predicted part best, of the joint that shows most of it."""
+    """Over the signal that tells the predicted part best, of the joint that shows most of it; over frequency where none does:
+    what a resonance adds is nowhere alike along an angle or a speed."""
     data = before.data
     predicted = before.left - after.left
     shown = joint - 1 if joint is not None else int(np.argmax(data.rms(predicted) / before.rms))
@@ -135,8 +137,14 @@ def proof(before: Refined, after: Refined, joint: int | None) -> Proof:
     # In a log that goes once through its range anything is told over time, which says when and not by what.
     other = max((signal for signal in every if signal.name != "time"), key=lambda signal: every[signal])
     best = other if every[other] >= _AS_MUCH * every[best] else best
-    b, a, p = (binned(best.values, x, _FINE) for x in parts)
     t, rows = _stretch(data, shown, parts[2])
+    if every[best] < _TELLS * float(parts[2] @ parts[2]):
+        lines = [line for x in (before.left, after.left, predicted) if (line := _frequency(data, x, shown)) is not None]
+        if len(lines) == len(parts):
+            (x, without), (_, left), (_, alone) = lines
+            return Proof(shown + 1, "frequency", "Hz", x, without, left, alone, np.zeros(len(x)), t,
+                         *(x[rows] for x in parts))
+    b, a, p = (binned(best.values, x, _FINE) for x in parts)
     return Proof(shown + 1, best.name, best.unit, b.x, b.mean, a.mean, p.mean, b.spread / np.sqrt(b.count), t,
                  *(x[rows] for x in parts))
 

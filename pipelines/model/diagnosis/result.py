@@ -89,17 +89,18 @@ class Gain:
 class Proof:
     """The figure that proves a finding: the residual before and after, beside what the cause predicts.
 
-    Of the joint that shows most of it, over the signal that the cause depends on, in bins of equal count; and a stretch of time.
+    Of the joint that shows most of it, over the signal that the cause depends on, in bins of equal count, or, where it depends on
+    none, the amplitudes of all three over frequency; and a stretch of time.
     """
 
     joint: int  # 1-based, whose residual is shown
-    against: str  # "time" | "position" | "speed" | "load" | "travel since reversal" | "speed of joint 2" …
+    against: str  # "time" | "position" | "speed" | "load" | "travel since reversal" | "speed of joint 2" | "frequency" …
     unit: str
     x: Array  # (bins,) middle of each
     before: Array  # (bins,) [N m] mean residual without the finding
     after: Array  # with it
     predicted: Array  # what the finding predicts of `before`
-    spread: Array  # (bins,) [N m] standard error of `before`
+    spread: Array  # (bins,) [N m] standard error of `before`; none over frequency
     t: Array  # (samples,) [s] a stretch of time where it shows most
     before_in_time: Array
     after_in_time: Array
