@@ -74,7 +74,7 @@ def design(task: Task, effort: Effort, seed: int = 0) -> Design:
         UsageError: C08, no motion keeps the limits: says which one is in the way.
     """
     fine, coarse, finish = landscape(task), landscape(task, _FIFTH, _COARSE), landscape(task, 1, FINISH)
-    _refuse_impossible(fine, np.random.default_rng(seed))
+    _refuse_impossible(fine, np.random.default_rng(seed), task.home)
     best = Best()
     budget = Budget(effort.seconds, effort.evaluations, lambda done: effort.tell(_progress(task, done, best)),
                     reserve=2.0 * _FINISH_EVALUATIONS[1])
@@ -115,8 +115,8 @@ def _progress(task: Task, done: int, best: Best) -> str:
     return f"evaluation {done}: best {figure}, found at {best.evaluation}"
 
 
-def _refuse_impossible(fine: DesignProblem, rng: np.random.Generator) -> None:
-    """C08 where a limit is broken at a standstill already, wherever the arm may stand."""
+def _refuse_impossible(fine: DesignProblem, rng: np.random.Generator, home: Array | None) -> None:
+    """C08 where a limit is broken at a standstill already: in `home`, or wherever the arm may stand."""
     least, where = np.inf, 0
     for _ in range(50):
         near = fine.nearness(fine.space.shrunk(fine.space.random(rng, *fine.around), 0.0))
@@ -126,8 +126,9 @@ def _refuse_impossible(fine: DesignProblem, rng: np.random.Generator) -> None:
             least, where = float(near.max()), int(near.argmax())
     limit = fine.arm.listed[where]
     place = f"the {limit.quantity} limit of joint {limit.joint}" if limit.joint else f"the limit of {limit.quantity}"
-    raise UsageError("C08", f"no motion keeps {place}, {limit.low:.4g} to {limit.high:.4g} {limit.unit}: at a standstill it is "
-                     f"exceeded already", where="limits", remedy="start elsewhere (--home), or correct that limit")
+    stands = "" if home is None else f" at home ({', '.join(f'{q:.4g}' for q in home)})"
+    raise UsageError("C08", f"no motion keeps {place}, {limit.low:.4g} to {limit.high:.4g} {limit.unit}: at a standstill{stands} "
+                     f"it is exceeded already", where="limits", remedy="start elsewhere (--home), or correct that limit")
 
 
 def _within(task: Task, finish: DesignProblem, x: Array) -> tuple[Array, float]:

@@ -137,8 +137,8 @@ def test_an_interruption_keeps_the_best() -> None:
 
 
 @pytest.mark.parametrize(("changes", "wishes", "named"), [
-    ({"torque": 0.5}, {"home": (0.0, 0.0, 0.0)}, "torque limit of joint 2"),
-    ({}, {"tip_box": (2.0, 3.0, 2.0, 3.0, 2.0, 3.0)}, "tip"),
+    ({"torque": 0.5}, {"home": (0.0, 0.0, 0.0)}, r"torque limit of joint 2.* at home \(0, 0, 0\)"),
+    ({}, {"tip_box": (2.0, 3.0, 2.0, 3.0, 2.0, 3.0)}, r"tip.* at home \(0, -1.571, "),
     ({"velocity": np.inf, "acceleration": np.inf}, {}, "no limit of speed"),
     ({"position": (1.0, 2.0)}, {"home": (0.0, 1.5, 1.5)}, "home of joint 1"),
     ({}, {"cond_max": 1.2}, "below 1.22474"),
