@@ -100,7 +100,8 @@ def _speed_unit(joint: JointResult) -> str:
 
 
 def _plain(law: str) -> str:
-    return law.replace("three_sigmoid", "three sigmoids").replace("stribeck", "Stribeck").replace("_", " ").replace("+", " + ")
+    return (law.replace("three_sigmoid", "three sigmoids").replace("stribeck", "Stribeck").replace("coulomb", "Coulomb")
+            .replace("_", " ").replace("+", " + "))
 
 
 def _called(name: str) -> str:
@@ -205,7 +206,7 @@ def _tables(joint: JointResult) -> tuple[Table, ...]:
              event.events) for event in joint.break_away), "Mean ± std of one event; reported, not part of the law."))
     if joint.unseen:
         tables.append(Table(("not shown by these logs", "what to record"), tuple(
-            (gap.what.replace("three_sigmoid.", ""), gap.record) for gap in joint.unseen),
+            (gap.what, gap.record) for gap in joint.unseen),
                             tones=tuple("attention" for _ in joint.unseen)))
     return tuple(tables)
 
@@ -223,7 +224,23 @@ def _ladder_words(joint: JointResult) -> tuple[str, ...]:
     if len(joint.ladder) == 1:
         return ("The law was given.",)
     return (f"Every law was fitted on one part and judged on {judge}; the simplest that is not measurably worse than the best was "
-            "taken.",)
+            "taken.", *_why_not_plainer(joint))
+
+
+def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
+    """What the best law with fewer numbers leaves more of what was held out."""
+    chosen = next(rung for rung in joint.ladder if rung.chosen)
+    plainer = [rung for rung in joint.ladder if rung.size < chosen.size and not rung.reason]
+    if not plainer or chosen.validate_rms <= 0.0:
+        return ()
+    best = min(plainer, key=lambda rung: rung.validate_rms)
+    more = 100.0 * (best.validate_rms / chosen.validate_rms - 1.0)
+    return (f"{_capital(_plain(chosen.law))}, with {chosen.size} numbers, and not {_plain(best.law)}, the best law with fewer "
+            f"({best.size}): that leaves {format_number(more, 2)} % more of what was held out (rms), more than chance allows.",)
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _plain_reason(reason: str) -> str:

@@ -11,11 +11,11 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
-from pipelines.model.effects import find_effect
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.friction.joint import JointFit, fractions
 from pipelines.model.friction.one_joint import gravity_names
 from pipelines.model.friction.several import SeveralFit
+from pipelines.model.friction.undecided import undecided
 
 __all__ = ["Event", "JointResult", "Posture", "Result", "Rung", "Series", "Validation", "Value", "joint_result", "several_results"]
 
@@ -165,8 +165,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, n
     nothing = np.zeros(0)
     series = Series(axis, ladder.chosen.fit.curve(axis), ladder.chosen.fit.curve_std(axis), *(nothing,) * 15)
     inertia = _inertia(found, arm, j, middle)
-    open_ = tuple(Missing(f"{law.name} cannot be told from {one.law.name}", find_effect(one.law.members[-1]).experiment)
-                  for one in ladder.rivals)
+    open_ = tuple(Missing(*words) for words in undecided(ladder, slowest, fastest, alone=False))
     return JointResult(j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
                        (Posture(tuple(map(float, middle)), inertia, {}),), Validation(None, None, "", False), rungs, ladder.by,
                        open_, (), None, (slowest, fastest), names, series)
