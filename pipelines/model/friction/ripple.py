@@ -27,7 +27,7 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["Along", "Ripple", "refitted", "ripple_of"]
 
 _EFFECT, _ORDER = "cogging", "order"
-_ROWS = 4000  # that are looked at: twenty for every order at least
+_ROWS = 4000  # that are looked at: more than ten for every order
 _AT_ONCE = 16  # orders: memory
 _FOLDS = 10
 _MOST = 8  # waves
@@ -36,7 +36,7 @@ _EACH = 0.05  # of what is left (mean square), the least that a further wave exp
 # joint goes with its angle too: up to .24 on a healthy arm. Cogging of 4 % of the torque came to .98, an outrunner's to .89.
 _TOLD = 0.5
 _SIDES = 0.1  # of the same, forth and back, slow and fast, each
-_WORTH = 0.01  # of the joint's torque (rms): a smaller ripple spoils no number by more
+_WORTH = 0.01  # of the joint's torque (rms): a smaller one is not worth a word
 _FEW = 100  # rows of one side, to be asked at all
 _POINTS = 2000  # of the travel
 _CLASSES, _A_CLASS = 360, 8  # of angle, at most; rows of one
