@@ -31,6 +31,7 @@ from pipelines.model.friction.findings import findings
 from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
 from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.methods import METHODS, by_method
+from pipelines.model.friction.misfit import misfits
 from pipelines.model.friction.result import JointResult, Result, joint_result, several_results
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
@@ -71,7 +72,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     together = [log for log in measured if log.role == "identify" and log.experiment in ("excitation", "free")]
     if not identify and together and settings.together:
         return _together(together, [log for log in measured if log.role == "validate" and log.experiment in ("excitation", "free")],
-                         settings, law)
+                         settings, law, inputs.label)
     if not identify:
         kinds = ", ".join(sorted({f"{o.log.experiment} ({o.log.role})" for o in inputs.logs})) or "none"
         raise NothingMatched("C06", f"no friction log of role identify; there are: {kinds}", where=inputs.label,
@@ -84,6 +85,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     found = tuple(check for joint in joints for check in findings(joint))
     robot = identify[0].robot
     results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method) for joint in joints)
+    found += misfits(results, inputs.label)
     arm = _arm(identify[0], joints)
     motions = tuple(pair for joint in joints for pair in joint.logs.identify)
     sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
@@ -99,7 +101,8 @@ def _of_one_robot(logs: Sequence[ExperimentLog], label: str) -> None:
                          remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
 
 
-def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], settings: Settings, law: Law | None) -> Result:
+def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], settings: Settings, law: Law | None,
+              label: str) -> Result:
     """No joint was driven alone: friction with the base parameters, from logs in which all move."""
     _of_one_robot((*identify, *validate), identify[0].name)
     how = Reconstruction(order=settings.order)
@@ -115,7 +118,8 @@ def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], sett
     model = arm.to_model(validity=validity(tuple(seen)), sources=sources,
                          notes=("friction and base parameters fitted together by rrrid fit-friction",))
     derived = tuple(_with_friction(pair, arm.friction_torque(pair[1].motion), settings) for pair in (*seen, *others))
-    return Result(identify[0].robot_name, several_results(found, arm, tuple(others)), "all joints at once", (*said, *said_too),
+    results = several_results(found, arm, tuple(others))
+    return Result(identify[0].robot_name, results, "all joints at once", (*said, *said_too, *misfits(results, label)),
                   model=model, derived=derived)
 
 

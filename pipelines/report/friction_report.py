@@ -9,9 +9,11 @@ import numpy as np
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.break_away import REST, WITHIN
 from pipelines.model.friction.laws import law_named
+from pipelines.model.friction.misfit import POOR
 from pipelines.model.friction.result import JointResult, Result, Value
 from pipelines.report.diagnosis_words import spoken
 from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
+from pipelines.report.friction_ripple import ripple_in_words, ripple_section
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number, format_unit, with_std
@@ -19,6 +21,7 @@ from pipelines.report.style import format_number, format_unit, with_std
 __all__ = ["friction_report"]
 
 _GOOD = 0.05  # of the speed error without friction: what the law has to leave
+_GOOD_TORQUE = 0.1  # of held-out torque, where nothing was simulated: the same
 _THIN = 0.01  # of the curve: a narrower band is hidden by the line
 
 
@@ -48,8 +51,8 @@ def _gravity(joint: JointResult) -> list[tuple[str, Value]]:
 
 
 def _well(joint: JointResult) -> bool:
-    if not joint.validation.by:
-        return True  # nothing was simulated
+    if not joint.validation.by:  # nothing was simulated
+        return joint.validation.torque_error is None or joint.validation.torque_error < _GOOD_TORQUE
     ratio = _ratio(joint)
     return ratio is not None and ratio <= _GOOD
 
@@ -57,12 +60,13 @@ def _well(joint: JointResult) -> bool:
 def _tone(result: Result) -> Tone:
     if any(check.gate for check in result.checks):
         return "bad"
-    return "good" if all(_well(joint) for joint in result.joints) and not any(j.unseen for j in result.joints) else "attention"
+    open_ = any(joint.unseen or joint.ripple for joint in result.joints)
+    return "good" if all(_well(joint) for joint in result.joints) and not open_ else "attention"
 
 
 def _verdict(result: Result) -> str:
     laws = ". ".join(_law_and_errors(joint) for joint in result.joints)
-    poor = [joint.name for joint in result.joints if not _well(joint)]
+    poor = [joint.name for joint in result.joints if joint.validation.by and not _well(joint)]
     open_ = [joint.name for joint in result.joints if joint.unseen]
     words = f"{laws}."
     if any(joint.validation.by and not joint.validation.held_out for joint in result.joints):
@@ -71,6 +75,7 @@ def _verdict(result: Result) -> str:
         words = f"{gates[0][:1].upper()}{gates[0][1:]}. {words}"
     if poor:
         words += f" The simulation of {', '.join(poor)} does not follow the measurement well."
+    words += "".join(f" {words}" for joint in result.joints if (words := ripple_in_words(joint)))
     if open_:
         words += f" What the logs of {', '.join(open_)} leave open is listed with what to record."
     return words
@@ -81,7 +86,10 @@ def _law_and_errors(joint: JointResult) -> str:
     judged = joint.validation
     words = f"{joint.name[:1].upper()}{joint.name[1:]}: {_plain(joint.law)}"
     if not judged.by:
-        return words
+        error = judged.torque_error
+        if error is None or error >= POOR:  # the finding says it
+            return words
+        return f"{words}, which leaves {format_number(100.0 * error, 2)} % of held-out torque (rms)"
     with_, without, unit = judged.velocity_error_with, judged.velocity_error_without, _speed_unit(joint)
     if with_ is None:
         beside = ", with friction and without" if without is None else f" ({_off(without, unit)} without friction)"
@@ -100,7 +108,8 @@ def _speed_unit(joint: JointResult) -> str:
 
 
 def _plain(law: str) -> str:
-    return law.replace("three_sigmoid", "three sigmoids").replace("stribeck", "Stribeck").replace("_", " ").replace("+", " + ")
+    return (law.replace("three_sigmoid", "three sigmoids").replace("stribeck", "Stribeck").replace("coulomb", "Coulomb")
+            .replace("_", " ").replace("+", " + "))
 
 
 def _called(name: str) -> str:
@@ -123,13 +132,14 @@ def _meaning(joint: JointResult, name: str) -> str:
 
 def _key_figures(result: Result) -> Table:
     rows = []
+    simulated = any(joint.validation.by for joint in result.joints)
     for joint in result.joints:
         gravity = ", ".join(with_std(value.value, value.std) for _, value in _gravity(joint))
-        ratio = _ratio(joint)
+        error = _ratio(joint) if simulated else joint.validation.torque_error
         rows.append((joint.name, _plain(joint.law), with_std(joint.inertia.value, joint.inertia.std), gravity,
-                     None if ratio is None else 100.0 * ratio))
-    return Table(("joint", "law", "inertia [kg m^2]", "gravity: sine, cosine [N m]", "speed error, friction in / left out [%]"),
-                 tuple(rows))
+                     None if error is None else 100.0 * error))
+    return Table(("joint", "law", "inertia [kg m^2]", "gravity: sine, cosine [N m]",
+                  "speed error, friction in / left out [%]" if simulated else "held-out torque that is left, rms [%]"), tuple(rows))
 
 
 def _summary(result: Result) -> Section:
@@ -165,7 +175,7 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
     simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion. Gravity is "
                                   "compensated at the measured position.", joint.series, revolute)
     alone = (Section(f"{joint.name}: simulation", _simulation_words(joint), (), (simulated, parts)),) if joint.validation.by else ()
-    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *alone,
+    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *ripple_section(joint), *alone,
             Section(f"{joint.name}: choice of the law", _ladder_words(joint), (_ladder(joint),)))
 
 
@@ -205,7 +215,7 @@ def _tables(joint: JointResult) -> tuple[Table, ...]:
              event.events) for event in joint.break_away), "Mean ± std of one event; reported, not part of the law."))
     if joint.unseen:
         tables.append(Table(("not shown by these logs", "what to record"), tuple(
-            (gap.what.replace("three_sigmoid.", ""), gap.record) for gap in joint.unseen),
+            (gap.what, gap.record) for gap in joint.unseen),
                             tones=tuple("attention" for _ in joint.unseen)))
     return tuple(tables)
 
@@ -223,7 +233,23 @@ def _ladder_words(joint: JointResult) -> tuple[str, ...]:
     if len(joint.ladder) == 1:
         return ("The law was given.",)
     return (f"Every law was fitted on one part and judged on {judge}; the simplest that is not measurably worse than the best was "
-            "taken.",)
+            "taken.", *_why_not_plainer(joint))
+
+
+def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
+    """What the best law with fewer numbers leaves more of what was held out."""
+    chosen = next(rung for rung in joint.ladder if rung.chosen)
+    plainer = [rung for rung in joint.ladder if rung.size < chosen.size and not rung.reason]
+    if not plainer or chosen.validate_rms <= 0.0:
+        return ()
+    best = min(plainer, key=lambda rung: rung.validate_rms)
+    more = 100.0 * (best.validate_rms / chosen.validate_rms - 1.0)
+    return (f"{_capital(_plain(chosen.law))}, with {chosen.size} numbers, and not {_plain(best.law)}, the best law with fewer "
+            f"({best.size}): that leaves {format_number(more, 2)} % more of what was held out (rms), more than chance allows.",)
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _plain_reason(reason: str) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.ladder import Ladder
+from pipelines.model.friction.undecided import undecided
 from pipelines.model.friction.weak_form import Stretch
 
 __all__ = ["Coverage", "Unseen", "coverage", "unseen"]
@@ -70,10 +71,14 @@ def unseen(covered: Coverage, ladder: Ladder) -> tuple[Unseen, ...]:
     elif min(covered.forth, covered.back) < _SPEEDS or covered.decades < _DECADES:
         found.append(Unseen(f"speeds cover {covered.decades:.1f} decades, {covered.forth} steps of five a decade forth and "
                             f"{covered.back} back", _WORDS))
-    vague = [number.name for number in ladder.chosen.fit.numbers if not number.known or number.std > _VAGUE * abs(number.value)]
+    vague = [_in_words(number.name) for number in ladder.chosen.fit.numbers
+             if not number.known or number.std > _VAGUE * abs(number.value)]
     if vague:
-        found.append(Unseen(f"{', '.join(vague)} of the chosen law {'are' if len(vague) > 1 else 'is'} hardly known", _WORDS))
-    for rival in ladder.rivals:
-        cause = rival.law.members[-1]
-        found.append(Unseen(f"{ladder.chosen.law.name} cannot be told from {rival.law.name}", find_effect(cause).experiment))
-    return tuple(found)
+        found.append(Unseen(f"hardly known: {'; '.join(vague)}", _WORDS))
+    return (*found, *(Unseen(*words) for words in undecided(ladder, covered.slowest, covered.fastest, alone=True)))
+
+
+def _in_words(number: str) -> str:
+    """"Stribeck friction, amplitude" for "stribeck.amplitude"."""
+    effect, _, quantity = number.partition(".")
+    return f"{find_effect(effect).title}, {quantity.replace('_', ' ')}"

@@ -20,7 +20,7 @@ from pipelines.model.friction.postures import nearest, posture_groups
 from pipelines.model.friction.weak_form import Stretch, Windows
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Equations", "LawEquations", "Predicted"]
+__all__ = ["Columned", "Equations", "LawEquations", "Predicted"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +33,15 @@ class Predicted:
     @property
     def residual(self) -> Array:
         return self.measured - self.model
+
+
+class Columned(Protocol):
+    """What rows are built of: a law, or another torque along the motion of the joint."""
+
+    @property
+    def pointwise(self) -> bool: ...
+
+    def columns(self, motion: Motion, arm: OneJoint, theta: Array) -> Array: ...
 
 
 class Equations(Protocol):
@@ -55,7 +64,7 @@ class Equations(Protocol):
     @property
     def fixed(self) -> Array: ...
 
-    def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array: ...
+    def build(self, law: Columned, arms: Sequence[OneJoint], theta: Array) -> Array: ...
 
     def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable: ...
 
@@ -118,7 +127,7 @@ class LawEquations:
         gravity = len(gravity_names(self.joint.revolute))
         return tuple(self.joint.carrying(float(part[0]), tuple(map(float, part[1:1 + gravity]))) for part in parts)
 
-    def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array:
+    def build(self, law: Columned, arms: Sequence[OneJoint], theta: Array) -> Array:
         """The law's columns (rows, amplitudes)."""
         parts = []
         for stretch, few, k in zip(self.stretches, self.few, self.groups, strict=True):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.fit.varpro import SeparableFit
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.break_away import BreakAway, break_away, held_at_least
 from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
@@ -21,6 +22,7 @@ from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.one_joint import OneJoint, gravity_columns
 from pipelines.model.friction.postures import alike
 from pipelines.model.friction.refine import refined
+from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
 from pipelines.model.friction.simulate import Simulated, simulate_joint
 from pipelines.model.friction.speed_map import SpeedMap, speed_map
 from pipelines.model.friction.weak_form import Stretch, stretches_of, swaying
@@ -75,6 +77,8 @@ class JointFit:
     break_away: tuple[BreakAway, ...]
     held: tuple[float, float] | None  # [N m] friction carried at rest, back and forth
     window: float  # [s]
+    ripple: Ripple | None
+    beside_ripple: SeparableFit | None  # the law and the rigid numbers, the rigid ones first, with the ripple known
 
 
 def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFit:
@@ -99,13 +103,15 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
     chosen = ladder.chosen.fit
     identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
     final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+    ripple = ripple_of(LawEquations.of(identify, arm), final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
     covered = coverage(identify)
     at_rest = [stretch for stretch in _stretches(logs.hold, logs.joint, window, beside)
                if any(alike(stretch.posture, posture) for posture in final.postures)]
     return JointFit(logs, final, ladder, identify, driven, covered, unseen(covered, ladder), speed_map(identify, final),
-                    break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window)
+                    break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window, ripple,
+                    None if ripple is None else refitted(LawEquations.of(identify, arm), final, ripple))
 
 
 def _swaying(logs: JointLogs) -> tuple[int, ...]:

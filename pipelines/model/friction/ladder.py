@@ -53,6 +53,7 @@ class Ladder:
     chosen: Tried
     best: Tried  # by the rows that judge
     by: str  # "logs" | "blocks"
+    torque: float  # [N m] rms of what was measured in the rows that judge
 
     def alike(self, one: Tried) -> bool:
         """Not measurably worse than the best."""
@@ -73,6 +74,11 @@ class Judge:
 
     identify: Equations
     validate: Equations | None
+
+    @property
+    def torque(self) -> float:
+        """Root mean square of what was measured in the rows that judge [N m]."""
+        return float(np.sqrt(np.mean(np.square((self.validate or self.identify).y))))
 
     def residual(self, fit: LawFit) -> Array:
         """What the law leaves (rows,) of rows that it was not fitted to [N m]."""
@@ -109,7 +115,7 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
     best = _best(tried)
     able = [one for one in tried if not one.reason and _alike(one.residual, best.residual)]
     chosen = min(able or [best], key=lambda one: (one.law.size, one.validate_rms))
-    return Ladder(tuple(tried), chosen, best, "logs" if judge.validate is not None else "blocks")
+    return Ladder(tuple(tried), chosen, best, "logs" if judge.validate is not None else "blocks", judge.torque)
 
 
 def _beside(judge: Judge, best: Tried, cause: str) -> tuple[Law, list[Array]]:

@@ -48,6 +48,11 @@ class Law:
         """Each at the only joint of the arm `OneJoint`."""
         return tuple(find_effect(name)(joint=1) for name in self.members)
 
+    @property
+    def title(self) -> str:
+        """In words; joined by "+" where several causes act."""
+        return " + ".join(find_effect(name).title for name in self.name.split("+"))
+
     @cached_property
     def places(self) -> tuple[Place, ...]:
         """The numbers of θ. One that may be zero, such as a damping, stays at its default: it has no logarithm. So does one that a

@@ -11,13 +11,16 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
-from pipelines.model.effects import find_effect
-from pipelines.model.estimation.logs import Motions
+from pipelines.model.estimation.logs import Fitted, Motions
 from pipelines.model.friction.joint import JointFit, fractions
+from pipelines.model.friction.ladder import Ladder
 from pipelines.model.friction.one_joint import gravity_names
+from pipelines.model.friction.ripple import Along, Ripple
 from pipelines.model.friction.several import SeveralFit
+from pipelines.model.friction.undecided import undecided
 
-__all__ = ["Event", "JointResult", "Posture", "Result", "Rung", "Series", "Validation", "Value", "joint_result", "several_results"]
+__all__ = ["Event", "JointResult", "Posture", "Result", "Rippled", "Rung", "Series", "Validation", "Value",
+           "joint_result", "several_results"]
 
 _POINTS = 1500  # of a figure
 _CURVE = 401
@@ -40,6 +43,7 @@ class Validation:
     velocity_error_without: float | None
     by: str  # the log
     held_out: bool
+    torque_error: float | None = None  # what the chosen law leaves of torque that was held out, over that torque, both rms
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,17 @@ class Missing:
 
     what: str
     record: str
+
+
+@dataclass(frozen=True)
+class Rippled:
+    """Torque that repeats along the turn of the joint: no law of friction holds it."""
+
+    rms: Value  # [N m] over the travel
+    share: float  # of what the law leaves of blocks held out (mean square)
+    orders: tuple[float, ...]  # [1/rev] waves in a turn, the largest first
+    inertia: Value  # of the joint, with the ripple known
+    along: Along
 
 
 @dataclass(frozen=True)
@@ -126,6 +141,7 @@ class JointResult:
     driven: tuple[float, float]  # [rad/s] slowest and fastest
     logs: tuple[str, ...]
     series: Series
+    ripple: Rippled | None = None
 
 
 @dataclass(frozen=True)
@@ -164,25 +180,26 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, n
     axis = np.concatenate([-side[:0:-1], side])
     nothing = np.zeros(0)
     series = Series(axis, ladder.chosen.fit.curve(axis), ladder.chosen.fit.curve_std(axis), *(nothing,) * 15)
-    inertia = _inertia(found, arm, j, middle)
-    open_ = tuple(Missing(f"{law.name} cannot be told from {one.law.name}", find_effect(one.law.members[-1]).experiment)
-                  for one in ladder.rivals)
+    inertia = _inertia(found.fitted, arm, j, middle)
+    ripple = _rippled(found.ripples[j], None if found.beside_ripples is None else _inertia(found.beside_ripples, arm, j, middle))
+    open_ = tuple(Missing(*words) for words in undecided(ladder, slowest, fastest, alone=False))
     return JointResult(j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
-                       (Posture(tuple(map(float, middle)), inertia, {}),), Validation(None, None, "", False), rungs, ladder.by,
-                       open_, (), None, (slowest, fastest), names, series)
+                       (Posture(tuple(map(float, middle)), inertia, {}),),
+                       Validation(None, None, "", False, _torque_error(ladder)), rungs, ladder.by, open_, (), None,
+                       (slowest, fastest), names, series, ripple)
 
 
-def _inertia(found: SeveralFit, arm: Arm, j: int, q: Array) -> Value:
+def _inertia(fitted: Fitted, arm: Arm, j: int, q: Array) -> Value:
     """D_jj at the middle posture."""
     push = np.zeros((1, arm.n_joints))
     push[0, j] = 1.0
     still = 0.0 * push
     row = (arm.body.regressor(q[None], still, push) - arm.body.regressor(q[None], still, still))[0, j]
-    estimate = found.fitted.estimate
+    estimate = fitted.estimate
     kept = list(estimate.columns.kept)
     spread = estimate.robust.covariance[:len(kept), :len(kept)]
     std = float(np.sqrt(row[kept] @ spread @ row[kept])) if np.isfinite(spread).all() else None
-    return Value(float(row @ arm.p), std, "kg m^2" if arm.robot.joints[j].revolute else "kg")
+    return Value(float(row[kept] @ estimate.beta[:len(kept)]), std, "kg m^2" if arm.robot.joints[j].revolute else "kg")
 
 
 def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
@@ -200,10 +217,30 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
     events = tuple(Event(event.direction, Value(event.torque, event.std, unit), event.events) for event in joint.break_away)
     return JointResult(
         joint.logs.joint, name, fit.law.name, method, parameters, postures[0].inertia, postures[0].gravity, postures,
-        Validation(errors[0], errors[1], driven.stretch.name, driven.judging), rungs, ladder.by,
+        Validation(errors[0], errors[1], driven.stretch.name, driven.judging, _torque_error(ladder)), rungs, ladder.by,
         tuple(Missing(gap.what, gap.record) for gap in joint.unseen), events, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
-        tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)), _series(joint))
+        tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)), _series(joint),
+        _rippled(joint.ripple, _beside_ripple(joint)))
+
+
+def _torque_error(ladder: Ladder) -> float | None:
+    return ladder.chosen.validate_rms / ladder.torque if ladder.torque > 0.0 else None
+
+
+def _rippled(ripple: Ripple | None, inertia: Value | None) -> Rippled | None:
+    if ripple is None or inertia is None:
+        return None
+    unit = "N m" if inertia.unit == "kg m^2" else "N"
+    return Rippled(Value(ripple.rms, ripple.std, unit), ripple.share, ripple.orders, inertia, ripple.along)
+
+
+def _beside_ripple(joint: JointFit) -> Value | None:
+    """J of the first posture with the ripple known."""
+    if joint.beside_ripple is None:
+        return None
+    return Value(float(joint.beside_ripple.beta[0]), float(np.sqrt(max(joint.beside_ripple.covariance[0, 0], 0.0))),
+                 "kg m^2" if joint.fit.joint.revolute else "kg")
 
 
 def _finite(value: float) -> float | None:

@@ -18,11 +18,12 @@ from pipelines.fit.varpro import Separable
 from pipelines.model.estimation.logs import Fitted, Motions, Recipe, equations_of, fit_logs, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns, LogEquations
-from pipelines.model.friction.equations import Predicted
+from pipelines.model.friction.equations import Columned, Predicted
 from pipelines.model.friction.ladder import Judge, Ladder, climb
 from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law
 from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.friction.ripple import Ripple, ripple_of
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.filters import LowPass, centre_samples, zero_phase
 
@@ -118,7 +119,7 @@ class RowEquations:
         del beta  # laws that ask for the load are not tried here
         return (OneJoint.of(self.row.logs[0].columns.body.robot, self.row.joint + 1),)
 
-    def build(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array:
+    def build(self, law: Columned, arms: Sequence[OneJoint], theta: Array) -> Array:
         """The law's columns (rows, amplitudes), centred, filtered and thinned out as the body's were."""
         return np.vstack([run.conditioned(law.columns(run.motion, arms[0], theta)) for run in self.row.runs])[::self.every]
 
@@ -140,6 +141,8 @@ class SeveralFit:
 
     ladders: tuple[Ladder, ...]
     fitted: Fitted
+    ripples: tuple[Ripple | None, ...]
+    beside_ripples: Fitted | None  # the same fit with every ripple known; None where there is none
 
 
 def fit_several(identify: Motions, validate: Motions, recipe: Recipe, law: Law | None = None) -> SeveralFit:
@@ -152,9 +155,12 @@ def fit_several(identify: Motions, validate: Motions, recipe: Recipe, law: Law |
     recipe = with_cutoff(recipe, identify)
     rows, others = (tuple(equations_of(part, recipe, columns)) if part else () for part in (identify, validate))
     laws = (law,) if law is not None else tuple(one for one in LADDER if one.pointwise and not one.sees_load)
-    ladders = tuple(climb(Judge(RowEquations(_Row(rows, j)), RowEquations(_Row(others, j)) if others else None), laws)
-                    for j in range(robot.n_joints))
+    own = [RowEquations(_Row(rows, j)) for j in range(robot.n_joints)]
+    ladders = tuple(climb(Judge(one, RowEquations(_Row(others, j)) if others else None), laws) for j, one in enumerate(own))
     placed = [replace(effect, joint=j + 1) for j, ladder in enumerate(ladders)
               for effect in ladder.chosen.fit.law.shaped(ladder.chosen.fit.theta)]
     everything = Columns(columns.body, columns.kept, (*placed, *columns.laws), columns.arm)
-    return SeveralFit(ladders, fit_logs(identify, everything, recipe))
+    ripples = tuple(ripple_of(one, ladder.chosen.fit) for one, ladder in zip(own, ladders, strict=True))
+    waves = tuple(replace(wave, joint=j + 1) for j, ripple in enumerate(ripples) if ripple is not None for wave in ripple.effects)
+    beside = fit_logs(identify, replace(everything, laws=(*everything.laws, *waves)), recipe) if waves else None
+    return SeveralFit(ladders, fit_logs(identify, everything, recipe), ripples, beside)

@@ -68,12 +68,17 @@ def torque_plan(rng: np.random.Generator, duration: float, truth: Truth) -> Arra
 
 
 def driven(torque: Array, friction: Friction, inertia: float = INERTIA, gravity: tuple[float, float] = (SINE, COSINE),
-           start: tuple[float, float] = (0.0, 0.0), parts: int = 10) -> Array:
-    """Position and speed (samples, 2) under held torque (samples,)."""
+           start: tuple[float, float] = (0.0, 0.0), parts: int = 10, more: Callable[[float, float], float] | None = None) -> Array:
+    """Position and speed (samples, 2) under held torque (samples,).
+
+    Args:
+        more: what else holds the joint back [N m], by position and speed.
+    """
     h, (q, v), (c, d), out = STEP / parts, start, gravity, np.empty((len(torque), 2))
 
     def rate(q: float, v: float, u: float) -> float:
-        return (u - c * math.sin(q) - d * math.cos(q) - friction(v)) / inertia
+        rest = 0.0 if more is None else more(q, v)
+        return (u - c * math.sin(q) - d * math.cos(q) - friction(v) - rest) / inertia
 
     for k, u in enumerate(torque.tolist()):
         out[k] = q, v

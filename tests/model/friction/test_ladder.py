@@ -64,7 +64,7 @@ def test_an_offset_is_not_told_from_asymmetric_friction_without_rest() -> None:
     """Always moving, an offset and friction that is larger one way are one column: both are named, and what to record."""
     chosen, rivals, words = climbed(plateaus((0.5, 1.0, 2.0, 4.0), lambda v: 1.2 * np.sign(v) + 0.12 * v + 0.1, False, 0.02))
     assert {chosen, *rivals} >= {"torque_offset", "asymmetric_friction"}
-    assert any("asymmetric_friction" in text and "old still" in text for text in words)
+    assert any("Asymmetric friction" in text and "old still" in text for text in words)
 
 
 def test_few_speeds_do_not_tell_stribeck_from_drag() -> None:
@@ -74,7 +74,7 @@ def test_few_speeds_do_not_tell_stribeck_from_drag() -> None:
 
     chosen, rivals, words = climbed(plateaus((0.2, 1.0, 3.0), drag, False, 0.02))
     assert {chosen, *rivals} >= {"stribeck", "quadratic_drag"}
-    assert any("stribeck" in text and "seven to ten constant speeds" in text for text in words)
+    assert any("Stribeck friction" in text and "seven to ten constant speeds" in text for text in words)
     assert any("decades" in text for text in words)
     chosen, rivals, _ = climbed(plateaus(tuple(np.geomspace(0.03, 5.0, 9).tolist()), drag, True, 0.02))
     assert chosen == "quadratic_drag"

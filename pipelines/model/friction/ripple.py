@@ -1,0 +1,257 @@
+"""What a friction fit leaves that repeats along the turn of the joint: cogging, which no law of friction knows.
+
+    r = F δ + Σ_k (a_k sin kq + b_k cos kq) + noise        F = ∂ŷ/∂(β, θ) of the fitted law
+
+Waves are chosen on some blocks of time and judged on the others. They have to explain a good part of what is left there, and
+some of it forth and back, slow and fast: friction turns with the motion, an acceleration that is wrong goes with the speed,
+cogging does neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.fit.varpro import SeparableFit, fit_separable
+from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import Effect
+from pipelines.model.friction.equations import Equations
+from pipelines.model.friction.law_fit import LawFit
+from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.rigid.body import Array, Motion
+
+__all__ = ["Along", "Ripple", "refitted", "ripple_of"]
+
+_EFFECT, _ORDER = "cogging", "order"
+_ROWS = 4000  # that are looked at: more than ten for every order
+_AT_ONCE = 16  # orders: memory
+_FOLDS = 10
+_MOST = 8  # waves
+_EACH = 0.05  # of what is left (mean square), the least that a further wave explains
+# Of what is left of blocks held out (mean square), the least: as much as all else together. What sways or gives way beside a
+# joint goes with its angle too: up to .24 on a healthy arm. Cogging of 4 % of the torque came to .98, an outrunner's to .89.
+_TOLD = 0.5
+_SIDES = 0.1  # of the same, forth and back, slow and fast, each
+_WORTH = 0.01  # of the joint's torque (rms): a smaller one is not worth a word
+_FEW = 100  # rows of one side, to be asked at all
+_POINTS = 2000  # of the travel
+_CLASSES, _A_CLASS = 360, 8  # of angle, at most; rows of one
+_RANK = 1e-5  # singular values of unit columns below it: two columns that are one
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """What the law leaves beside the waves that explain it, by angle. (points,); NaN where no row is."""
+
+    angle: Array  # [rad] middle of a class
+    forth: Array  # [N m] mean of the rows in it that move forth
+    back: Array
+    waves: Array  # [N m]
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """Torque along the turn of the joint that is the same at every speed and in both directions."""
+
+    rms: float  # [N m] over the travel
+    std: float  # of rms: the blocks left out one by one
+    share: float  # of what the law leaves of blocks held out (mean square), what the waves explain
+    orders: tuple[float, ...]  # [1/rev] of the waves, the largest first
+    along: Along
+    effects: tuple[Effect, ...]  # at the only joint of an arm of one
+
+
+@dataclass(frozen=True)
+class _State:
+    """Position and speed, as columns."""
+
+    pointwise: bool = True
+
+    def columns(self, motion: Motion, arm: OneJoint, theta: Array) -> Array:
+        return np.hstack([motion.q, motion.dq])
+
+
+@dataclass(frozen=True)
+class _Waves:
+    """Sine and cosine of several orders, as columns."""
+
+    shapes: tuple[Effect, ...]
+    pointwise: bool = True
+
+    def columns(self, motion: Motion, arm: OneJoint, theta: Array) -> Array:
+        """(samples, 2 × orders)"""
+        return np.concatenate(list(self.shapes[0].own_columns(self.shapes, motion, arm))).T
+
+
+@dataclass(frozen=True, eq=False)
+class _Normal:
+    """Normal equations AᵀA of rows A = [what the law can take, every wave, what it leaves], columns scaled alike for all."""
+
+    gram: Array
+    numbers: int  # of the law's
+
+    def places(self, chosen: Sequence[int]) -> npt.NDArray[np.intp]:
+        """Of the law's numbers, and of the sines and cosines of the chosen waves."""
+        waves = [self.numbers + 2 * k + part for k in chosen for part in (0, 1)]
+        return np.array([*range(self.numbers), *waves], dtype=np.intp)
+
+    def solution(self, chosen: Sequence[int]) -> Array:
+        """Least squares over those places."""
+        at = self.places(chosen)
+        return np.asarray(_inverse(self.gram[np.ix_(at, at)]) @ self.gram[at, -1])
+
+    def gains(self, chosen: Sequence[int]) -> Array:
+        """(orders,) share of what the law and the chosen waves leave (square), that each wave explains beside them.
+
+        With G the products of what of its two columns lies outside, and g theirs with the rest: gᵀ G⁻¹ g.
+        """
+        at, waves = self.places(chosen), slice(self.numbers, -1)
+        inner = _inverse(self.gram[np.ix_(at, at)])
+        across = self.gram[at, waves]
+        taken = inner @ across
+        pairs = (across.reshape(len(at), -1, 2), taken.reshape(len(at), -1, 2))
+        whole = self.gram[waves, waves].reshape(pairs[0].shape[1], 2, -1, 2)
+        own = np.einsum("kikj->kij", whole) - np.einsum("bki,bkj->kij", *pairs)
+        push = (self.gram[waves, -1] - taken.T @ self.gram[at, -1]).reshape(-1, 2)
+        left = self.gram[-1, -1] - self.gram[at, -1] @ inner @ self.gram[at, -1]
+        return np.asarray(np.einsum("ki,kij,kj->k", push, _inverse(own), push) / left) if left > 0.0 else np.zeros(len(push))
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Some of the fitted rows: what the law could still take, every wave, and what it leaves, in this order; scaled."""
+
+    columns: Array  # (rows, numbers + 2 × orders + 1)
+    scale: Array  # of the columns
+    numbers: int
+
+    @classmethod
+    def of(cls, fit: LawFit, waves: Array, every: int) -> _Rows:
+        slopes = fit.found.jacobian[::every]
+        columns = np.hstack([slopes, waves, fit.found.residual[::every, None]])
+        scale = np.linalg.norm(columns, axis=0)
+        scale = np.where(scale > 0.0, scale, 1.0)
+        return cls(columns / scale, scale, slopes.shape[1])
+
+    @cached_property
+    def parts(self) -> tuple[npt.NDArray[np.intp], ...]:
+        """Blocks of time."""
+        return tuple(np.array_split(np.arange(len(self.columns)), _FOLDS))
+
+    @cached_property
+    def whole(self) -> _Normal:
+        return _Normal(self.columns.T @ self.columns, self.numbers)
+
+    @cached_property
+    def others(self) -> tuple[_Normal, ...]:
+        """Of every block, the normal equations of all blocks but it."""
+        return tuple(_Normal(self.whole.gram - self.columns[part].T @ self.columns[part], self.numbers) for part in self.parts)
+
+    def amplitudes(self, normal: _Normal, chosen: Sequence[int]) -> Array:
+        """Of the chosen waves (2 × waves,) [N m], sine and cosine in turn."""
+        at = normal.places(chosen)
+        return np.asarray(normal.solution(chosen) / self.scale[at] * self.scale[-1])[self.numbers:]
+
+
+def _inverse(gram: Array) -> Array:
+    """Of symmetric matrices (…, k, k) of unit columns, over what they show."""
+    return np.asarray(np.linalg.pinv(gram, rcond=_RANK**2, hermitian=True), dtype=np.float64)
+
+
+def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
+    """Waves along the turn that the fitted rows show beyond chance, and large enough to matter; None where they do not.
+
+    Args:
+        equations: that `fit` was fitted to.
+    """
+    arms = equations.arms()
+    shapes = tuple(find_effect(_EFFECT)(joint=1).shapes(equations.nodes, arms[0]))
+    power = float(np.mean(np.square(equations.y)))
+    if fit.found.rms**2 <= _WORTH**2 * power:
+        return None
+    every = -(-len(equations.y) // _ROWS)
+    waves = [equations.build(_Waves(shapes[k:k + _AT_ONCE]), arms, fit.theta)[::every] for k in range(0, len(shapes), _AT_ONCE)]
+    rows = _Rows.of(fit, np.hstack(waves), every)
+    chosen = _chosen(rows.whole)
+    state = equations.build(_State(), arms, fit.theta)[::every]
+    share = _told(rows, state[:, 1]) if chosen else None
+    if share is None:
+        return None
+    high = np.hypot(*rows.amplitudes(rows.whole, chosen).reshape(-1, 2).T)
+    chosen = [chosen[k] for k in np.argsort(-high)]
+    effects = tuple(shapes[k] for k in chosen)
+    rms, std = _size(rows, chosen, effects, equations.nodes, arms[0])
+    if rms < _WORTH * np.sqrt(power):
+        return None
+    orders = tuple(effect.values(np.zeros(2))[_ORDER] for effect in effects)
+    return Ripple(rms, std, share, orders, _along(rows, chosen, state, effects, arms[0]), effects)
+
+
+def _chosen(normal: _Normal) -> list[int]:
+    """Waves one after the other, that which explains most first, as long as each explains a good part of the rest."""
+    chosen: list[int] = []
+    while len(chosen) < _MOST:
+        gains = normal.gains(chosen)
+        best = int(np.argmax(gains))
+        if gains[best] < _EACH or best in chosen:
+            break
+        chosen.append(best)
+    return chosen
+
+
+def _told(rows: _Rows, speed: Array) -> float | None:
+    """Share that waves chosen on the other blocks explain of blocks held out; None where it is too little, in all or on a side."""
+    before, after = np.empty(len(speed)), np.empty(len(speed))
+    for part, rest in zip(rows.parts, rows.others, strict=True):
+        here = rows.columns[part]
+        for into, chosen in ((before, []), (after, _chosen(rest))):
+            into[part] = here[:, -1] - here[:, rest.places(chosen)] @ rest.solution(chosen)
+    quick = np.abs(speed) > np.median(np.abs(speed))
+    sides = [side for side in (speed > 0.0, speed < 0.0, quick, ~quick) if side.sum() >= _FEW]
+    shares = [_share(before[side], after[side]) for side in sides]
+    whole = _share(before, after)
+    return whole if whole >= _TOLD and min(shares, default=0.0) >= _SIDES else None
+
+
+def _share(before: Array, after: Array) -> float:
+    return 1.0 - float(after @ after) / max(float(before @ before), 1e-300)
+
+
+def _size(rows: _Rows, chosen: Sequence[int], effects: tuple[Effect, ...], nodes: Motion, arm: OneJoint) -> tuple[float, float]:
+    """Root mean square over the travel [N m], and its standard deviation: Efron 1979, the jackknife over blocks of time."""
+    turn = _turn(np.linspace(float(nodes.q.min()), float(nodes.q.max()), _POINTS), effects, arm)
+    sizes = [float(np.std(turn @ rows.amplitudes(rest, chosen))) for rest in rows.others]
+    return float(np.std(turn @ rows.amplitudes(rows.whole, chosen))), float(np.sqrt(_FOLDS - 1.0) * np.std(sizes))
+
+
+def _turn(angle: Array, effects: tuple[Effect, ...], arm: OneJoint) -> Array:
+    """Sines and cosines (points, 2 × waves) at angles [rad]."""
+    still = np.zeros((len(angle), 1))
+    return _Waves(effects).columns(Motion(angle, angle[:, None], still, still), arm, still)
+
+
+def _along(rows: _Rows, chosen: Sequence[int], state: Array, effects: tuple[Effect, ...], arm: OneJoint) -> Along:
+    """Means by classes of angle, without what the law would take of them were the waves known."""
+    q, dq = state.T
+    solution = rows.whole.solution(chosen)
+    left = (rows.columns[:, -1] - rows.columns[:, :rows.numbers] @ solution[:rows.numbers]) * rows.scale[-1]
+    classes = int(np.clip(len(q) // _A_CLASS, 10, _CLASSES))
+    edges = np.linspace(float(q.min()), float(q.max()), classes + 1)
+    place = np.clip(np.searchsorted(edges, q, side="right") - 1, 0, classes - 1)
+    means = []
+    for side in (dq > 0.0, dq < 0.0):
+        count = np.bincount(place[side], minlength=classes)
+        means.append(np.where(count > 0, np.bincount(place[side], left[side], classes) / np.maximum(count, 1), np.nan))
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return Along(middle, means[0], means[1], _turn(middle, effects, arm) @ rows.amplitudes(rows.whole, chosen))
+
+
+def refitted(equations: Equations, fit: LawFit, ripple: Ripple) -> SeparableFit:
+    """The same law with the waves beside it: what the other numbers are where the ripple is known. Rigid numbers come first."""
+    waves = equations.build(_Waves(ripple.effects), equations.arms(), fit.theta)
+    problem = equations.problem(fit.law, equations.arms(fit.found.beta))
+    return fit_separable(replace(problem, fixed=np.hstack([problem.fixed, waves])), [fit.theta])
