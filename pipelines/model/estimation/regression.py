@@ -183,9 +183,7 @@ class LogEquations:
     @property
     def samples(self) -> int:
         """Moments that make equations of any joint."""
-        every, end = self.conditioning.decimation, int(self.held)
-        return int(sum(np.sum(~self.rows.out[run.start:run.stop][end:run.stop - run.start - end][-end % every::every])
-                       for run in self.runs))
+        return sum(len(self._moments(run)) for run in self.runs)
 
     @property
     def guard(self) -> int:
@@ -196,7 +194,14 @@ class LogEquations:
 
     def times(self) -> Array:
         """The time of every equation [s]."""
-        return np.concatenate([np.concatenate([t for t, *_ in self._pieces(run)]) for run in self.runs])
+        return np.asarray(self.found.motion.t[self.found.good.kept[np.concatenate([self._moments(run) for run in self.runs])]])
+
+    def _moments(self, run: slice) -> npt.NDArray[np.intp]:
+        """Samples of the mended log that make equations of any joint."""
+        end = int(self.held)
+        moments = np.arange(run.start, run.stop)[end:run.stop - run.start - end][-end % self.conditioning.decimation::
+                                                                                 self.conditioning.decimation]
+        return np.asarray(moments[~self.rows.out[moments]])
 
     def _of_run(self, run: slice) -> Iterator[Block]:
         for _, values, y, used in self._pieces(run):
