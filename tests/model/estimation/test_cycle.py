@@ -26,7 +26,7 @@ def equations(log: ExperimentLog, decimation: int | None = None) -> LogEquations
 
 
 def apart(one: LogEquations, cycle: Cycle) -> float:
-    """[rad] largest distance of a true posture from the mean of those with its phase, of equations a step of which is up to 0.02."""
+    """[rad] largest distance of a true posture from the mean of those with its phase."""
     q = motion_of(0)(one.times() + 3.0).q  # where `periodic` begins
     mean = np.zeros((cycle.count, 3))
     np.add.at(mean, cycle.phase, q)
@@ -36,7 +36,7 @@ def apart(one: LogEquations, cycle: Cycle) -> float:
 
 @pytest.mark.parametrize(("decimation", "gap", "most"), [(10, False, 1e-9), (7, False, 0.02), (10, True, 0.02)])
 def test_one_phase_is_one_posture(decimation: int, gap: bool, most: float) -> None:
-    """To rounding where the period is a whole number of equations, else to half a step; with a gap as well."""
+    """To rounding where the period is a whole number of equations, else to half a step of them, 0.02 rad at 3 rad/s."""
     log = periodic(0, 3)
     if gap:
         q = log.q.copy()
