@@ -1,7 +1,6 @@
 """Equations of a motion that repeats, turned so that what repeats stands in a few of them and noise alone in the others.
 
-    for block in Contrasted(logs, cycles): ...      noise 0: √M times the mean of periods, and what repeats nothing
-                                                    noise 1: contrasts between periods
+    for block in Contrasted(logs, cycles): ...      noise CONTRAST: between periods; MEAN: √M times their mean; or as it was
 
 An error of the model is the same in each of M periods, r_k(p) = e(p) + n_k(p) at phase p of period k: it is no independent
 error each time, and equations of one phase are a cluster (Liang & Zeger 1986, Biometrika 73, p. 13; Arellano 1987, Oxf. Bull.
@@ -11,8 +10,9 @@ Econ. Stat. 49, p. 431). An orthogonal turn over the periods of a phase, of Helm
 
 leaves the estimate as it is, white noise white and of the same strength, and both parts independent of each other. So each has
 a spectrum of its own, as an analysis of variance has a mean square between phases and one within: where nothing but noise is
-left both agree, and M periods are worth M; where the model lacks something they are worth one. Periods need not be alike: what a
-motion does differently each time is in the columns of the contrasts.
+left both agree, and M periods are worth M; where the model lacks something they are worth one. Beside a log that repeats nothing
+the mean has a spectrum of its own as well, for √M e is no error of that log. Periods need not be alike: what a motion does
+differently each time is in the columns of the contrasts.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ import numpy as np
 
 from pipelines.fit.equations import Array, Block, Flags, Indices
 
-__all__ = ["Contrasted", "Cycle"]
+__all__ = ["CONTRAST", "MEAN", "Contrasted", "Cycle"]
+
+CONTRAST, MEAN = 1, 2  # of `Block.noise`, whose 0 is that of equations which repeat nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +97,12 @@ class _Sum:
             sums[:, phase] += np.where(there, one, 0.0)
             seen[phase] += there
         if np.any(used):
-            yield self._block(rows, np.array(used), 1)
+            yield self._block(rows, np.array(used), CONTRAST)
 
     def mean(self) -> Block:
         """√n times the mean of the n equations of each phase."""
         rows = [sums / np.sqrt(np.maximum(seen, 1.0)) for sums, seen in zip(self.sums, self.seen, strict=True)]
-        return self._block(rows, self.seen > 0.0, 0)
+        return self._block(rows, self.seen > 0.0, MEAN)
 
     def _block(self, rows: list[Array], used: Flags, noise: int) -> Block:
         keep = np.flatnonzero(used.any(axis=0))
