@@ -109,15 +109,15 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     motions, said = _examined(identify, settings)
     judges, said_too = _examined(validate, settings)
     recipe = with_cutoff(recipe, motions)
-    means, floors = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
+    means, scatter = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
     fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
     judged = judge(fitted, means[len(motions):], settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
     logs = (*identify, *validate)
-    said_of_periods = [check for floor, log in zip(floors, logs, strict=True)
-                       for check in doubts(floor, log.source or log.name, settings.average)]
+    said_of_periods = [check for own, log in zip(scatter, logs, strict=True) if own is not None
+                       for check in doubts(own.floor, log.source or log.name, settings.average)]
     result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), doctor=(*said, *said_too, *said_of_periods),
-                     noise_floor=residuals(floors, fitted, judged, logs, settings.average))
+                     noise_floor=residuals(scatter, fitted, judged, logs, settings.average))
     return result if not settings.compare else replace(
         result, comparison=compare(fitted, judged, settings.blocks, settings.weighted),
         rigid_body_alone=_rigid_body_alone(fitted, means, settings))

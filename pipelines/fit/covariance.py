@@ -11,7 +11,8 @@ cross-spectrum S is estimated, far fewer numbers from the same samples, so that 
     M = 1/n Σ_f Σ_ij w_i w_j conj(a_i(f)) S_ij(f) a_j(f)ᵀ,   a(f) the Fourier transform of a channel's columns
 
 S is prewhitened by an autoregression of each channel (Andrews & Monahan 1992), then averaged over bands: an autoregression
-alone misses what a sharp filter does, averages alone smear a peak.
+alone misses what a sharp filter does, averages alone smear a peak. Blocks of another `noise` have an S of their own, and a
+part of M: so have the means of periods and the contrasts between them (`contrasts.py`).
 """
 
 from __future__ import annotations
@@ -45,9 +46,9 @@ class Robust:
     """The covariance of β, with what was learnt of the residual."""
 
     covariance: Array  # (k, k); infinite where β is not determined
-    white: bool  # whether the residual can pass for white and its channels for independent
+    white: bool  # whether the residual can pass for white of one strength and its channels for independent
     inflation: Array  # (k,) standard deviation over that of white noise
-    orders: tuple[int, ...]  # of each channel's autoregression
+    orders: tuple[int, ...]  # of each channel's autoregression, one noise after the other
 
     @property
     def std(self) -> Array:
@@ -75,17 +76,18 @@ def robust_covariance(equations: Iterable[Block], solution: Solution, longest: i
         longest: samples of the longest block (`Statistics.longest`).
     """
     length = _good_length(longest + longest // _PADDING + 1)
-    noise, alone = _noise(equations, solution, length)
+    noises, alone = _noises(equations, solution, length)
+    orders = tuple(order for noise in noises.values() for order in noise.orders)
     plain = np.diag(solution.covariance)
-    if noise.white:
-        return Robust(solution.covariance, True, np.ones(len(plain)), noise.orders)
+    if len(noises) == 1 and all(noise.white for noise in noises.values()):
+        return Robust(solution.covariance, True, np.ones(len(plain)), orders)
     meat = np.zeros_like(solution.bread)
     for transformed in (alone,) if alone is not None else (_transform(block, length) for block in equations):
-        meat += _meat(transformed, solution.weights, noise)
+        meat += _meat(transformed, solution.weights, noises[transformed.noise])
     covariance = solution.bread @ meat @ solution.bread
     inflation = np.sqrt(np.diag(covariance) / np.where(plain > 0.0, plain, 1.0))
     covariance[~solution.determined] = covariance[:, ~solution.determined] = np.inf
-    return Robust(covariance, False, np.where(solution.determined, inflation, 1.0), noise.orders)
+    return Robust(covariance, False, np.where(solution.determined, inflation, 1.0), orders)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +96,11 @@ class _Transformed:
 
     columns: tuple[Indices, ...]
     spectra: tuple[Complex, ...]  # of each channel (k_j, frequencies)
+    noise: int
 
 
 def _transform(block: Block, length: int) -> _Transformed:
-    return _Transformed(block.columns, tuple(np.fft.rfft(values, length, axis=1) for values in block.values))
+    return _Transformed(block.columns, tuple(np.fft.rfft(values, length, axis=1) for values in block.values), block.noise)
 
 
 def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
@@ -124,34 +127,44 @@ def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
     return meat
 
 
-def _noise(equations: Iterable[Block], solution: Solution, length: int) -> tuple[_Noise, _Transformed | None]:
-    """The residual's cross-spectrum; also the transformed block where there is only one."""
-    channels, samples, blocks = len(solution.sigma), 0, 0
-    counts = np.zeros(channels)
-    cross = np.zeros((channels, channels, length // 2 + 1), dtype=np.complex128)
-    leverage = np.zeros((channels, length // 2 + 1))
+class _Sums:
+    """What blocks of one noise add up to."""
+
+    def __init__(self, channels: int, bins: int) -> None:
+        self.samples, self.counts = 0, np.zeros(channels)
+        self.cross = np.zeros((channels, channels, bins), dtype=np.complex128)
+        self.leverage = np.zeros((channels, bins))
+
+
+def _noises(equations: Iterable[Block], solution: Solution, length: int) -> tuple[dict[int, _Noise], _Transformed | None]:
+    """The residual's cross-spectrum, of each noise; also the transformed block where there is only one."""
+    found, blocks, transformed = dict[int, _Sums](), 0, None
     for block in equations:
+        own = found.setdefault(block.noise, _Sums(block.channels, length // 2 + 1))
         spectrum = np.fft.rfft(block.residual(solution.beta), length, axis=1)
-        cross += spectrum[:, None] * np.conj(spectrum)
+        own.cross += spectrum[:, None] * np.conj(spectrum)
         transformed = _transform(block, length)
-        leverage += _leverage(transformed, solution)
-        samples, blocks, counts = samples + block.samples, blocks + 1, counts + block.counts
-    counts = np.maximum(counts, 1.0)
-    cross /= np.sqrt(counts[:, None] * counts)[:, :, None]  # equations left out have no noise
+        own.leverage += _leverage(transformed, solution)
+        own.samples, own.counts, blocks = own.samples + block.samples, own.counts + block.counts, blocks + 1
+    return {noise: _noise(own, solution, length) for noise, own in found.items()}, transformed if blocks == 1 else None
+
+
+def _noise(sums: _Sums, solution: Solution, length: int) -> _Noise:
+    samples, counts, channels = sums.samples, np.maximum(sums.counts, 1.0), len(sums.counts)
+    cross = sums.cross / np.sqrt(counts[:, None] * counts)[:, :, None]  # equations left out have no noise
     gamma = np.fft.irfft(cross[np.arange(channels), np.arange(channels)], length, axis=1)
     fits = [_autoregression(g, samples, min(_ORDER, samples // 20)) for g in gamma]
     shape = np.array([1.0 / np.fft.rfft(a, length) for a in fits])
     orders = tuple(len(a) - 1 for a in fits)
     edges = _edges(cross.shape[2], max(1, _BINS * length // max(samples, length)))
-    left = np.sqrt(1.0 - np.minimum(_mean(leverage / counts[:, None], edges), _MOST_TAKEN))
+    left = np.sqrt(1.0 - np.minimum(_mean(sums.leverage / counts[:, None], edges), _MOST_TAKEN))
     flat = cross / (shape[:, None] * np.conj(shape))
     mean = _mean(flat, edges) / (left[:, None] * left)
     together = _correlated(flat, mean, length, samples)
     if not together:
         mean[~np.eye(channels, dtype=bool)] = 0.0
-    noise = _Noise(len(solution.beta), length, shape, edges, _factor(mean.transpose(2, 0, 1)), orders,
-                   not any(orders) and not together)
-    return noise, transformed if blocks == 1 else None
+    return _Noise(len(solution.beta), length, shape, edges, _factor(mean.transpose(2, 0, 1)), orders,
+                  not any(orders) and not together)
 
 
 def _leverage(block: _Transformed, solution: Solution) -> Array:

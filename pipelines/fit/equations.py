@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "Block", "Chosen", "Indices", "rows_of", "split"]
+__all__ = ["Array", "Block", "Chosen", "Flags", "Indices", "rows_of", "split"]
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -31,6 +31,7 @@ class Block:
     values: tuple[Array, ...]  # of each channel, (k_j, samples): their columns, samples fastest
     y: tuple[Array, ...]  # of each channel, (samples,)
     used: tuple[Flags, ...] | None = None  # of each channel (samples,): equations left out are zero throughout; None: all count
+    noise: int = 0  # blocks with the same number have noise of the same spectrum
 
     @property
     def channels(self) -> int:
@@ -78,7 +79,8 @@ class Chosen:
             place[list(self.columns)] = np.arange(len(self.columns))
             kept = [place[index] >= 0 for index in block.columns]
             yield Block(len(self.columns), tuple(place[index][k] for index, k in zip(block.columns, kept, strict=True)),
-                        tuple(v if k.all() else v[k] for v, k in zip(block.values, kept, strict=True)), block.y, block.used)
+                        tuple(v if k.all() else v[k] for v, k in zip(block.values, kept, strict=True)), block.y, block.used,
+                        block.noise)
 
 
 def rows_of(table: Array, index: Indices) -> Array:
@@ -94,4 +96,4 @@ def split(equations: Iterable[Block], samples: int) -> Iterator[Block]:
         for first in range(0, block.samples, samples):
             part = slice(first, first + samples)
             yield Block(block.width, block.columns, tuple(v[:, part] for v in block.values),
-                        tuple(y[part] for y in block.y), block.used and tuple(used[part] for used in block.used))
+                        tuple(y[part] for y in block.y), block.used and tuple(used[part] for used in block.used), block.noise)

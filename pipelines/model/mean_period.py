@@ -113,20 +113,26 @@ def alike(mean: Reconstructed, how: Reconstruction) -> Reconstructed:
 
 
 def doubts(floor: NoiseFloor | None, where: object, averaged: bool = True) -> list[Check]:
-    """T10: periods that are not averaged though it was asked for, and what is left out of the mean."""
-    if floor is None or not averaged:
+    """T10: periods that are not averaged though it was asked for, and what is left out of the mean, or kept without one.
+
+    A start is motion like any other, and its equations hold; but somebody's hand on the arm is in no model. Either is said.
+    """
+    if floor is None:
         return []
-    if floor.unlike:
-        return [Check.of("T10", "warn", f"its periods are not averaged: {floor.unlike}", where=where,
-                         remedy="check the attribute period; look for a drift, a touch or a changed load; or say --no-average")]
-    found = []
+    found, mean = [], averaged and not floor.unlike
+    if averaged and floor.unlike:
+        found.append(Check.of("T10", "warn", f"its periods are not averaged: {floor.unlike}", where=where, remedy="check the "
+                              "attribute period; look for a drift, a touch or a changed load; or say --no-average"))
+    fate = "left out of their mean" if mean else "kept, for its periods are not averaged"
     if floor.left_out:
         left_out = ", ".join(map(str, floor.left_out))
-        found.append(Check.of("T10", "warn", f"period {left_out} differs from the {floor.periods} others and is left out of their "
-                              "mean", where=where, remedy="the first one often starts from rest; or somebody touched the arm"))
+        found.append(Check.of("T10", "warn", f"period {left_out} differs from the {floor.periods} others and is {fate}",
+                              where=where, remedy="the first one often starts from rest; or somebody touched the arm" if mean else
+                              "a start from rest does no harm there; if somebody touched the arm, cut that period out"))
     if floor.settling_time:
         found.append(Check.of("T10", "warn", f"the first {floor.settling_time:.2g} s of its periods, in which the motion settled, "
-                              "are left out of their mean", where=where, remedy="record a period more: the first then is left out"))
+                              f"are {fate}", where=where, remedy="record a period more: the first then is left out" if mean else
+                              "they do no harm to a fit of every sample"))
     return found
 
 

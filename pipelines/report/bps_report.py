@@ -8,6 +8,7 @@ import numpy as np
 
 from pipelines.model.estimation.balance import ALONE
 from pipelines.model.estimation.compare import Compared
+from pipelines.model.estimation.floor import Beside
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
 from pipelines.report.bps import convergence_figure, torque_figure
@@ -100,15 +101,21 @@ def _beside_noise(result: Result) -> str:
             f"{f' ({joint})' if several else ''}")
 
 
+def _periods_of(log: Beside) -> str:
+    """Which periods make the equations, and what is unlike the others: left out of a mean, else kept."""
+    fate = "left out" if log.averaged else "kept"
+    unlike = f"; period {', '.join(map(str, log.left_out))} differs and is {fate}" if log.left_out else ""
+    unlike += f"; its first {log.settling_time:.2g} s, in which the motion settled, are {fate}" if log.settling_time else ""
+    unlike += "; how long its motion took to settle is not known" if log.settling_time is None else ""
+    return (f"{log.log}: the mean of {log.periods} periods makes the equations{unlike}." if log.averaged else
+            f"{log.log}: its periods are not averaged, {log.why_not}{unlike}.")
+
+
 def _noise_section(result: Result) -> Section:
     """Residual and noise floor side by side, and which periods were averaged."""
     text, rows = [], []
     for log in result.noise_floor:
-        left_out = f"; period {', '.join(map(str, log.left_out))} differs and is left out" if log.left_out else ""
-        left_out += f"; its first {log.settling_time:.2g} s, in which the motion settled, are left out" if log.settling_time else ""
-        left_out += "; how long its motion took to settle is not known" if log.settling_time is None else ""
-        text.append(f"{log.log}: the mean of {log.periods} periods makes the equations{left_out}." if log.averaged else
-                    f"{log.log}: its periods are not averaged, {log.why_not}.")
+        text.append(_periods_of(log))
         rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.floor[j],
                   log.residual[j], log.ratio[j]) for j, name in enumerate(result.joints)]
     unit, position = _torque_unit(result), " or ".join(dict.fromkeys("m" if own == "N" else "rad" for own in result.torque_units))
@@ -119,8 +126,8 @@ def _noise_section(result: Result) -> Section:
     text.append("What differs from one period to the next is noise, which no model explains. A residual well above it is what "
                 "this model lacks; where it is no larger, more experiments help, not more model.")
     return Section("Residual beside the noise floor", tuple(text),
-                   (Table(columns, values, "Root mean squares. Noise floor: what is left of the noise of torque and motion in the "
-                                           "equations, where periods are averaged in their mean."),))
+                   (Table(columns, values, "Root mean squares, of the mean period: an error of the model is the same in all, noise "
+                                           "is not. Where periods are not alike, of every sample."),))
 
 
 def _key_figures(result: Result) -> Table:

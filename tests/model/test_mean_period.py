@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,10 @@ def test_of_two_periods_the_start_alone_is_left_out() -> None:
     assert elbow_error(log) < 2e-5
     (check,) = doubts(floor, "log")
     assert f"the first {floor.settling_time:.2g} s" in check.message
+    (kept,) = doubts(floor, "log", averaged=False)
+    assert kept.message == check.message.replace("left out of their mean", "kept, for its periods are not averaged")
+    drifts, start = doubts(replace(floor, unlike="they drift"), "log")
+    assert (drifts.message, start.message) == ("its periods are not averaged: they drift", kept.message)
 
 
 def test_where_a_lead_precedes_them_two_whole_periods_remain() -> None:

@@ -15,12 +15,14 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.fit.contrasts import Contrasted
 from pipelines.fit.convergence import Convergence, convergence
 from pipelines.fit.covariance import Robust, robust_covariance
 from pipelines.fit.equations import Block, split
 from pipelines.fit.identifiability import Unresolved, condition_number, typical_size, unresolved, visible
 from pipelines.fit.least_squares import Solution, fit
 from pipelines.fit.statistics import Statistics, gather, gather_growing
+from pipelines.model.estimation.cycle import cycle_of
 from pipelines.model.estimation.regression import Columns
 
 __all__ = ["Estimate", "Stacked", "estimate"]
@@ -36,21 +38,26 @@ class Stacked:
 
     def __init__(self, logs: Sequence[Iterable[Block]]) -> None:
         self.logs = logs
-        self._kept: list[Block] | None = []
+        self._kept: list[tuple[int, Block]] | None = []
 
     def __iter__(self) -> Iterator[Block]:
+        for _, block in self.numbered():
+            yield block
+
+    def numbered(self) -> Iterator[tuple[int, Block]]:
+        """Each block with the place of its log."""
         if self._kept:
             yield from self._kept
             return
         kept, size = [], 0
-        for log in self.logs:
+        for place, log in enumerate(self.logs):
             for block in log:
                 size += sum(v.nbytes for v in block.values)
                 if size <= _KEPT_IN_MEMORY:
-                    kept.append(block)
+                    kept.append((place, block))
                 else:
                     kept.clear()
-                yield block
+                yield place, block
         self._kept = kept if size <= _KEPT_IN_MEMORY else None
 
 
@@ -106,5 +113,6 @@ def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool =
     gram = gather(stacked)
     weights = None if weighted else np.ones(columns.body.robot.n_joints)
     fitted = fit(stacked, weights=weights, gram=gram)
-    robust = robust_covariance(stacked, fitted.solution, fitted.statistics.longest)
+    turned = Contrasted(stacked.numbered, tuple(map(cycle_of, logs)))
+    robust = robust_covariance(turned, fitted.solution, turned.longest(fitted.statistics.longest))
     return Estimate(columns, fitted.solution, robust, fitted.statistics, stacked)

@@ -1,7 +1,11 @@
 """What an estimate leaves unexplained, beside what differs from one period to the next: noise, which no model explains.
 
-    means, floors = averaged(motions, how, cutoff_hz)      mean periods instead of the logs that have them
-    beside = residuals(floors, fitted, judged, logs)       residual, floor and their ratio, joint by joint
+    means, scatter = averaged(motions, how, cutoff_hz)     mean periods instead of the logs that have them
+    beside = residuals(scatter, fitted, judged, logs)      residual, floor and their ratio, joint by joint
+
+Both are of the mean period, whichever way the equations of the fit came: an error of the model is the same in every period,
+noise falls with the root of their number, and beside the noise of a single sample the same error would look so much smaller.
+Only periods that are not alike have no mean; there it is every sample.
 """
 
 from __future__ import annotations
@@ -11,20 +15,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.fit.least_squares import errors
 from pipelines.fit.statistics import gather
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.estimation.conditioning import cutoff_at
-from pipelines.model.estimation.logs import Fitted, Judged, Motions
+from pipelines.model.estimation.logs import Fitted, Judged, Motions, equations_of
 from pipelines.model.estimation.regression import LogEquations
-from pipelines.model.mean_period import NoiseFloor, mean_period, noise_floor
+from pipelines.model.mean_period import NoiseFloor, mean_period
 from pipelines.model.motion import Reconstructed, Reconstruction, noise_response
 
-__all__ = ["Beside", "Floors", "averaged", "residuals"]
+__all__ = ["Beside", "Scatter", "averaged", "residuals"]
 
 _SEED = 20040509
 _DRAWS = 3  # of the noise of positions: their mean power is known to a few per cent
-Floors = tuple[NoiseFloor | None, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """What differs between the periods of a log, and their mean, whether or not a fit takes it."""
+
+    floor: NoiseFloor
+    mean: tuple[ExperimentLog, Reconstructed] | None  # None: the periods are not alike
 
 
 @dataclass(frozen=True)
@@ -40,50 +52,56 @@ class Beside:
     position: Array  # [rad] standard deviation of one sample of one period
     torque: Array  # [N m]
     torque_low_pass: Array  # [N m] what the low-pass over equations leaves of it
-    motion: Array  # [N m] what the noise of the positions does to the torque that the model asks for, in the equations
-    floor: Array  # [N m] that noise leaves in the equations: torque's, over the root of the periods averaged, and motion's
-    residual: Array  # [N m] root mean square of what the estimate leaves in the equations
+    motion: Array  # [N m] what the noise of the positions does to the torque that the model asks for, in the mean period
+    floor: Array  # [N m] that noise leaves in the mean period: torque's, over the root of their number, and motion's
+    residual: Array  # [N m] root mean square of what the estimate leaves in the mean period; where there is none, in every sample
     ratio: Array  # residual over floor: 1 where the model explains all that repeats
     settling_time: float | None = None  # [s] left out at the start of the first period compared; None: not known
 
 
-def averaged(motions: Motions, how: Reconstruction, cutoff_hz: float | None) -> tuple[Motions, Floors]:
-    """The logs and motions that equations come from, and the noise floor of each log that has two periods or more."""
-    chosen, floors = [], []
-    for log, found in motions:
-        floor, mean = _of(log, found, how, cutoff_hz)
-        chosen.append((log, found) if mean is None else mean)
-        floors.append(floor)
-    return tuple(chosen), tuple(floors)
+def averaged(motions: Motions, how: Reconstruction, cutoff_hz: float | None) -> tuple[Motions, tuple[Scatter | None, ...]]:
+    """The logs and motions that equations come from, and the scatter of each log that has two periods or more."""
+    found = tuple(_scatter(log, motion, cutoff_hz) for log, motion in motions)
+    return tuple(own if not how.average or scatter is None or scatter.mean is None else scatter.mean
+                 for own, scatter in zip(motions, found, strict=True)), found
 
 
-def _of(log: ExperimentLog, found: Reconstructed, how: Reconstruction,
-        cutoff_hz: float | None) -> tuple[NoiseFloor | None, tuple[ExperimentLog, Reconstructed] | None]:
+def _scatter(log: ExperimentLog, found: Reconstructed, cutoff_hz: float | None) -> Scatter | None:
     if log.period is None:
-        return None, None
-    cutoff_hz = cutoff_at(cutoff_hz, 1.0 / log.sample_time)
-    if how.average:
-        return mean_period(log, found, cutoff_hz)
-    return noise_floor(log, found, cutoff_hz), None
+        return None
+    floor, mean = mean_period(log, found, cutoff_at(cutoff_hz, 1.0 / log.sample_time))
+    return None if floor is None else Scatter(floor, mean)
 
 
-def residuals(floors: Floors, fitted: Fitted, judged: Judged, logs: Sequence[ExperimentLog], asked: bool) -> tuple[Beside, ...]:
-    """Every periodic log's noise beside the residual of its equations; `floors` of `logs`, those fitted before those that judge."""
+def residuals(scatter: Sequence[Scatter | None], fitted: Fitted, judged: Judged, logs: Sequence[ExperimentLog],
+              asked: bool) -> tuple[Beside, ...]:
+    """Every periodic log's noise beside the residual of its mean; `scatter` of `logs`, those fitted before those that judge."""
     equations = [*(one for one in fitted.estimate.equations.logs if isinstance(one, LogEquations)), *judged.equations]
     sources = [log for log, _ in (*fitted.motions, *judged.motions)]
-    return tuple(_beside(floor, one, log, source, fitted, asked)
-                 for floor, one, log, source in zip(floors, equations, logs, sources, strict=True) if floor is not None)
+    return tuple(_beside(own, one, log, source, fitted, asked)
+                 for own, one, log, source in zip(scatter, equations, logs, sources, strict=True) if own is not None)
 
 
-def _beside(noise: NoiseFloor, one: LogEquations, log: ExperimentLog, source: ExperimentLog, fitted: Fitted,
+def _beside(scatter: Scatter, used: LogEquations, log: ExperimentLog, source: ExperimentLog, fitted: Fitted,
             asked: bool) -> Beside:
+    noise, one = scatter.floor, _of_mean(scatter, used, fitted)
     residual = errors(gather(one), fitted.estimate.beta).rms / np.sqrt(one.repeats)
     motion = _of_motion(one, noise, source, fitted)
     floor = np.hypot(noise.torque_low_pass / np.sqrt(one.repeats), motion)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = residual / floor
-    return Beside(log.name, log.role, noise.periods, one.repeats > 1, noise.unlike if asked else "not asked for", noise.left_out,
+    return Beside(log.name, log.role, noise.periods, used.repeats > 1, noise.unlike if asked else "not asked for", noise.left_out,
                   noise.position, noise.torque, noise.torque_low_pass, motion, floor, residual, ratio, noise.settling_time)
+
+
+def _of_mean(scatter: Scatter, used: LogEquations, fitted: Fitted) -> LogEquations:
+    """The equations of the mean period, as a fit to it has them; those used where there are none."""
+    if scatter.mean is None or used.found.mean is not None:
+        return used
+    try:
+        return equations_of((scatter.mean,), fitted.recipe, used.columns)[0]
+    except InputRejected:  # what is spoilt in one period touches all of the mean
+        return used
 
 
 def _of_motion(one: LogEquations, noise: NoiseFloor, log: ExperimentLog, fitted: Fitted) -> Array:

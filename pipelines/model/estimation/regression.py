@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.fit.contrasts import MEAN
 from pipelines.fit.equations import Block
 from pipelines.log.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
@@ -183,9 +184,7 @@ class LogEquations:
     @property
     def samples(self) -> int:
         """Moments that make equations of any joint."""
-        every, end = self.conditioning.decimation, int(self.held)
-        return int(sum(np.sum(~self.rows.out[run.start:run.stop][end:run.stop - run.start - end][-end % every::every])
-                       for run in self.runs))
+        return sum(len(self._moments(run)) for run in self.runs)
 
     @property
     def guard(self) -> int:
@@ -196,12 +195,19 @@ class LogEquations:
 
     def times(self) -> Array:
         """The time of every equation [s]."""
-        return np.concatenate([np.concatenate([t for t, *_ in self._pieces(run)]) for run in self.runs])
+        return np.asarray(self.found.motion.t[self.found.good.kept[np.concatenate([self._moments(run) for run in self.runs])]])
+
+    def _moments(self, run: slice) -> npt.NDArray[np.intp]:
+        """Samples of the mended log that make equations of any joint."""
+        end = int(self.held)
+        moments = np.arange(run.start, run.stop)[end:run.stop - run.start - end][-end % self.conditioning.decimation::
+                                                                                 self.conditioning.decimation]
+        return np.asarray(moments[~self.rows.out[moments]])
 
     def _of_run(self, run: slice) -> Iterator[Block]:
         for _, values, y, used in self._pieces(run):
             if len(y[0]):
-                yield Block(len(self.columns.names), self._places, values, y, used)
+                yield Block(len(self.columns.names), self._places, values, y, used, 0 if self.found.mean is None else MEAN)
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.intp], ...]:

@@ -1,0 +1,153 @@
+"""A motion that repeats: what is told of the estimate holds, whether its residual repeats as well or is noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import helmert
+
+from pipelines.fit.contrasts import CONTRAST, MEAN, Contrasted, Cycle
+from pipelines.fit.covariance import robust_covariance
+from pipelines.fit.equations import Array, Block
+from pipelines.fit.least_squares import fit, solve
+from pipelines.fit.statistics import gather
+from tests.fit.problems import CHANNELS, SIGMA, Problem, autoregressive, problem, white
+
+PERIODS, PHASES, SEEDS = 4, 2500, 200
+
+
+def turned(blocks: list[Block], phase: Array | None = None, phases: int = PHASES) -> Contrasted:
+    """The blocks of one log that repeats every `phases` samples."""
+    where = np.arange(sum(block.samples for block in blocks)) % phases if phase is None else phase
+    return Contrasted(lambda: ((0, block) for block in blocks), (Cycle(where, phases),))
+
+
+def repeating(unlike: float = 0.0) -> Problem:
+    """Four periods of five seconds; `unlike`, a part of the columns that is another in each."""
+    one = problem(samples=PHASES)
+    Y = np.tile(one.Y, (PERIODS, 1, 1))
+    return Problem(Y + unlike * problem(seed=3, samples=len(Y)).Y * (Y != 0.0), one.beta)
+
+
+def scores(repeats: float, noise: float, memory: float = 0.95, unlike: float = 0.0) -> tuple[Array, Array]:
+    """Errors over standard deviations (seeds, parameters): by phases, and as if every period were news."""
+    one, own, pooled = repeating(unlike), [], []
+    for seed in range(SEEDS):
+        rng = np.random.default_rng(seed)
+        lacks = np.tile(autoregressive(rng, PHASES, memory), (PERIODS, 1))
+        blocks = one.blocks(one.clean + repeats * lacks + noise * autoregressive(rng, len(one.Y), memory))
+        fitted = fit(blocks)
+        off = fitted.solution.beta - one.beta
+        own.append(off / robust_covariance(turned(blocks), fitted.solution, PHASES).std)
+        pooled.append(off / robust_covariance(blocks, fitted.solution, fitted.statistics.longest).std)
+    return np.array(own), np.array(pooled)
+
+
+def covered(z: Array) -> float:
+    return float(np.mean(np.abs(z) < 2.0))
+
+
+@pytest.mark.parametrize(("repeats", "noise", "memory", "unlike"), [
+    pytest.param(0.0, 1.0, 0.95, 0.0, id="noise alone"),
+    pytest.param(1.0, 0.1, 0.95, 0.0, id="it repeats"),
+    *(pytest.param(*other, id=name, marks=pytest.mark.slow) for name, other in {
+        "both": (1.0, 1.0, 0.95, 0.0), "white noise alone": (0.0, 1.0, 0.0, 0.0), "white, repeats": (1.0, 0.1, 0.0, 0.0),
+        "noise, periods unlike": (0.0, 1.0, 0.95, 1.0), "both, periods unlike": (1.0, 1.0, 0.95, 1.0)}.items())])
+def test_truth_lies_within_two_standard_deviations(repeats: float, noise: float, memory: float, unlike: float) -> None:
+    """In 92-98 % of all cases, of noise alone as well as of an error that is the same in every period."""
+    z, _ = scores(repeats, noise, memory, unlike)
+    assert 0.92 <= covered(z) <= 0.98
+    assert 0.9 < z.std() < 1.1
+
+
+def test_what_repeats_is_no_news() -> None:
+    """What the turn is for: four periods taken for independent tell deviations smaller by 2 than the scatter is."""
+    z, pooled = scores(1.0, 0.1)
+    assert pooled.std() / z.std() == pytest.approx(np.sqrt(PERIODS), rel=0.1)
+    assert covered(pooled) < 0.7
+
+
+def test_against_the_covariance_of_a_known_error() -> None:
+    """An AR(1) error in each of four periods and white noise beside it: C (M² Āᵀ V Ā + M σ² ĀᵀĀ) C, to some per cent."""
+    memory, phases, noise = 0.9, 20_000, 2.0
+    period = problem(samples=phases)
+    rng = np.random.default_rng(0)
+    y = np.tile(period.clean + autoregressive(rng, phases, memory), (PERIODS, 1)) + noise * white(rng, PERIODS * phases)
+    blocks = Problem(np.tile(period.Y, (PERIODS, 1, 1)), period.beta).blocks(y, phases)
+    found = solve(gather(blocks), weights=1 / SIGMA**2)
+    robust = robust_covariance(turned(blocks, phases=phases), found, phases)
+    meat = np.zeros_like(found.bread)
+    for j in range(CHANNELS):
+        a = period.Y[:, j] / SIGMA[j]
+        meat += PERIODS * noise**2 * a.T @ a
+        for lag in range(120):
+            product = PERIODS**2 * memory**lag / (1 - memory**2) * a[lag:].T @ a[:phases - lag]
+            meat += product if lag == 0 else product + product.T
+    exact = np.sqrt(np.diag(found.bread @ meat @ found.bread))
+    np.testing.assert_allclose(robust.std, exact, rtol=0.1)
+
+
+def test_contrasts_are_those_of_helmert() -> None:
+    """Phase by phase the equations times the orthogonal matrix that SciPy has, its first row the mean."""
+    one = problem(samples=4 * 50)
+    y = one.clean + white(np.random.default_rng(0), 200)
+    out = list(turned(one.blocks(y, 70), phases=50))
+    whole = np.einsum("km,mpj->kpj", helmert(4, full=True), y.reshape(4, 50, CHANNELS))
+    means = [block for block in out if block.noise == MEAN]
+    assert len(means) == 1
+    np.testing.assert_allclose(np.array(means[0].y).T, whole[0], atol=1e-12)
+    rest = np.concatenate([np.array(block.y) for block in out if block.noise == CONTRAST], axis=1)
+    np.testing.assert_allclose(np.abs(rest.T), np.abs(whole[1:].reshape(-1, CHANNELS)), atol=1e-12)
+
+
+def test_a_turn_changes_no_estimate() -> None:
+    """Gaps, equations left out of one channel, a phase that comes twice, a period cut short: the products stay what they were."""
+    one, rng = problem(samples=430), np.random.default_rng(1)
+    y = one.clean + white(rng, 430)
+    phase = np.delete(np.arange(431) % 100, 40)
+    phase[250] = phase[249]
+    blocks = []
+    for block in one.blocks(y, 110):
+        used = tuple(rng.random((CHANNELS, block.samples)) > 0.2)
+        blocks.append(Block(block.width, block.columns, tuple(v * u for v, u in zip(block.values, used, strict=True)),
+                            tuple(v * u for v, u in zip(block.y, used, strict=True)), used))
+    before, after = gather(blocks), gather(turned(blocks, phase, 100))
+    np.testing.assert_allclose(after.gram, before.gram, atol=1e-10 * before.gram.max())
+    np.testing.assert_array_equal(after.counts, before.counts)
+
+
+def test_what_repeats_nothing_passes_as_it_is() -> None:
+    one = problem(samples=300)
+    blocks = one.blocks(one.clean, 150)
+    both = Contrasted(lambda: enumerate(blocks), (None, Cycle(np.arange(150) % 50, 50)))
+    out = list(both)
+    assert out[0] is blocks[0]
+    assert [block.noise for block in out[1:]] == [CONTRAST, CONTRAST, MEAN]
+    assert both.longest(150) == 150
+
+
+def test_logs_of_one_period_beside_one_of_several() -> None:
+    """An error in each: what is told of both together holds, as it does where the log of several gives its mean alone.
+
+    With one spectrum for all, that log would seem to be as near to the truth as its weight says.
+    """
+    one, logs = problem(samples=PHASES), 3
+    told: dict[str, list[Array]] = {"every sample": [], "mean": [], "one spectrum": []}
+    for seed in range(SEEDS // 2):
+        rng = np.random.default_rng(seed)
+        single = [one.blocks(one.clean + autoregressive(rng, PHASES))[0] for _ in range(logs)]
+        y = np.tile(one.clean + autoregressive(rng, PHASES), (PERIODS, 1)) + 0.05 * white(rng, PERIODS * PHASES)
+        several = repeating().blocks(y)
+        every = list(Contrasted(lambda several=several: ((0, block) for block in several),  # type: ignore[misc]
+                                (Cycle(np.arange(len(y)) % PHASES, PHASES),)))
+        ways = {"every sample": [*single, *every], "mean": [*single, *(block for block in every if block.noise == MEAN)]}
+        ways["one spectrum"] = [replace(block, noise=0) for block in ways["mean"]]
+        for way, blocks in ways.items():
+            found = fit(blocks).solution
+            told[way].append((found.beta - one.beta) / robust_covariance(blocks, found, PHASES).std)
+    z = {way: float(np.std(scores)) for way, scores in told.items()}
+    assert 0.9 < z["every sample"] < 1.1
+    assert 0.9 < z["mean"] < 1.1
+    assert z["one spectrum"] > 1.2
