@@ -21,6 +21,7 @@ __all__ = ["draw_proof", "draw_proof_in_time", "proof_figures"]
 _TURNING = Units()
 _LITTLE = 0.3  # of the means without the finding: less is little
 _MUCH = 0.8  # more is most of them
+_DRAWN = {False: "means in bins", True: "amplitudes in the log that shows most of it"}
 
 
 def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterator[Figure]:
@@ -29,7 +30,7 @@ def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterato
     if proof is None:
         return
     torque = units.at(proof.joint).torque
-    over = f"Residual of joint {proof.joint} over {proof.against}, {'amplitudes' if _in_waves(proof) else 'means in bins'}"
+    over = f"Residual of joint {proof.joint} over {proof.against}, {_DRAWN[_in_waves(proof)]}"
     yield Figure(f"proof-{number}", f"{over}: {_shown(proof, torque)}.",
                  lambda drawing: draw_proof(drawing.subplots(), proof, torque), (6.0, 3.2))
     yield Figure(f"proof-{number}-in-time", f"The same residual of joint {proof.joint} where the finding shows most, over time.",
@@ -38,7 +39,9 @@ def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterato
 
 def _shown(proof: Proof, torque: str) -> str:
     """What the drawn means say: how large they are without and with the finding, and whether that is little."""
-    before, after = (float(np.sqrt(np.nanmean(np.square(means)))) for means in (proof.before, proof.after))
+    # Squared amplitudes add up to the mean square of the residual, squared means of bins are averaged.
+    over = np.nansum if _in_waves(proof) else np.nanmean
+    before, after = (float(np.sqrt(over(np.square(shown)))) for shown in (proof.before, proof.after))
     sizes = f"{format_number(before, 2)} {torque} rms without the finding, {format_number(after, 2)} {torque} with it"
     if after <= _LITTLE * before:
         return f"{sizes}; what is left without it follows what it predicts"

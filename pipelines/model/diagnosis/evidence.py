@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.calibration import Floors
-from pipelines.model.diagnosis.data import Data
+from pipelines.model.diagnosis.data import Data, LogData
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Curve, Evidence, Proof, Spectrum
 from pipelines.model.diagnosis.signals import binned, signals
@@ -90,7 +90,11 @@ def _spectra(data: Data, left: Array, joint: int, floor: Floors | None) -> list[
 def _frequency(data: Data, left: Array, joint: int) -> tuple[Array, Array] | None:
     """Frequencies [Hz] and amplitudes [N m] of bins, of the longest log."""
     parts = [(one, x[joint]) for one, x in zip(data.logs, data.split(left), strict=True)]
-    one, x = max(parts, key=lambda part: len(part[1]))
+    return _amplitudes(*max(parts, key=lambda part: len(part[1])))
+
+
+def _amplitudes(one: LogData, x: Array) -> tuple[Array, Array] | None:
+    """Frequencies [Hz] and amplitudes of bins, whose squares add up to the mean square of x (rows,); None of too short a log."""
     if len(x) < 64:
         return None
     step = float(np.median(np.diff(one.t)))
@@ -139,14 +143,22 @@ def proof(before: Refined, after: Refined, joint: int | None) -> Proof:
     best = other if every[other] >= _AS_MUCH * every[best] else best
     t, rows = _stretch(data, shown, parts[2])
     if every[best] < _TELLS * float(parts[2] @ parts[2]):
-        lines = [line for x in (before.left, after.left, predicted) if (line := _frequency(data, x, shown)) is not None]
-        if len(lines) == len(parts):
-            (x, without), (_, left), (_, alone) = lines
-            return Proof(shown + 1, "frequency", "Hz", x, without, left, alone, np.zeros(len(x)), t,
-                         *(x[rows] for x in parts))
+        lines = _lines(data, shown, (before.left, after.left, predicted))
+        if lines:
+            (hertz, without), (_, left), (_, alone) = lines
+            return Proof(shown + 1, "frequency", "Hz", hertz, without, left, alone, np.zeros(len(hertz)), t,
+                         *(part[rows] for part in parts))
     b, a, p = (binned(best.values, x, _FINE) for x in parts)
     return Proof(shown + 1, best.name, best.unit, b.x, b.mean, a.mean, p.mean, b.spread / np.sqrt(b.count), t,
-                 *(x[rows] for x in parts))
+                 *(part[rows] for part in parts))
+
+
+def _lines(data: Data, joint: int, three: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
+    """Frequencies and amplitudes of each of the three, of the log that shows most of the last; empty of too short a one."""
+    split = [list(data.split(x)) for x in three]
+    place = max(range(len(data.logs)), key=lambda k: float(np.sum(np.square(split[2][k][joint]))))
+    found = [_amplitudes(data.logs[place], parts[place][joint]) for parts in split]
+    return [one for one in found if one is not None]
 
 
 def _stretch(data: Data, joint: int, predicted: Array) -> tuple[Array, slice]:

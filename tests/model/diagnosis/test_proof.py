@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from pipelines.model.diagnosis.evidence import proof
 from pipelines.model.diagnosis.exact import Exact
@@ -14,8 +16,10 @@ from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.report.diagnosis_proof import proof_figures
 from tests.model.diagnosis.test_through import turned
 from tests.model.diagnosis.test_whole_orders import searched
+from tests.report.test_diagnosis_words import found
 
 _RINGS = 20.0  # [Hz]
 
@@ -45,3 +49,7 @@ def test_what_rings_is_shown_over_frequency() -> None:
         assert abs(shown.x[np.argmax(line)] - _RINGS) < 2.0
     beside = np.abs(shown.x - _RINGS) < 2.0
     assert shown.after[beside].max() < 0.2 * shown.before[beside].max()
+    caption = next(proof_figures(1, replace(found("base_resonance"), proof=shown))).caption
+    size = re.search(r"amplitudes in the log .*: ([0-9.]+) N m rms without", caption)
+    assert size is not None
+    assert float(size[1]) == pytest.approx(float(before.rms[0]), rel=0.1)
