@@ -66,8 +66,9 @@ def diagnosis_report(result: Result) -> Report:
 
 
 def _tone(result: Result) -> Tone:
-    """What machines in order have as well is no fault of this one, unless it has changed."""
-    ordinary = result.question != "what has changed" and all(find_effect(one.cause).ordinary for one in result.findings)
+    """What machines in order have as well is no fault of this one, unless it has changed, or may be something else."""
+    causes = [one.cause for finding in result.findings for one in (finding, *finding.rivals)]
+    ordinary = result.question != "what has changed" and all(find_effect(cause).ordinary for cause in causes)
     return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
 
 

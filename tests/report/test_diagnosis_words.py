@@ -139,12 +139,19 @@ def test_a_change_is_told_in_figures_that_show_its_sign() -> None:
     assert [row[4:] for row in rows] == [(0.0487, 0.0474), (0.213, 0.0156)]
 
 
-@pytest.mark.parametrize(("causes", "question", "tone"), [
-    (("stribeck", "presliding"), "what is wrong", "attention"), (("stribeck", "cogging"), "what is wrong", "bad"),
-    (("stribeck",), "what has changed", "bad")])
-def test_what_machines_in_order_have_is_no_problem_unless_it_has_changed(causes: tuple[str, ...], question: str, tone: str) -> None:
-    """No technician needs to look after a machine for the hump of its friction; where it is new he does."""
-    there = NOTHING | {"verdict": "cause", "question": question, "findings": tuple(found(cause) for cause in causes)}
+@pytest.mark.parametrize(("causes", "rivals", "question", "tone"), [
+    (("stribeck", "presliding"), (), "what is wrong", "attention"),
+    (("stribeck", "cogging"), (), "what is wrong", "bad"),
+    (("presliding",), ("stribeck",), "what is wrong", "attention"),
+    (("presliding",), ("backlash",), "what is wrong", "bad"),
+    (("stribeck",), (), "what has changed", "bad")])
+def test_what_machines_in_order_have_is_no_problem(causes: tuple[str, ...], rivals: tuple[str, ...], question: str,
+                                                   tone: str) -> None:
+    """No technician needs to look after a machine for the hump of its friction; where it is new he does, or where it may be a gap.
+    """
+    near = tuple(Rival(cause, 2, 0.9) for cause in rivals)
+    findings = tuple(replace(found(cause), rivals=near) for cause in causes)
+    there = NOTHING | {"verdict": "cause", "question": question, "findings": findings}
     assert diagnosis_report(Result(**there)).tone == tone
 
 
