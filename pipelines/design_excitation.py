@@ -28,7 +28,7 @@ from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.allowed import refuse_strange
-from pipelines.model.excitation.apart import Pair, judged_again, told_apart
+from pipelines.model.excitation.apart import Pair, judged_again, refuse_hidden, told_apart
 from pipelines.model.excitation.bounds import parse_bounds
 from pipelines.model.excitation.design import Design, Effort, design
 from pipelines.model.excitation.doubts import doubts
@@ -197,6 +197,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     task = plan_task(given.robot, given.arm, wishes, told, bounds)
     if settings.purpose != "excitation":
         return replace(_plans(task, settings, given), robot_from=given.why)
+    if pair is not None:
+        refuse_hidden(task, pair, settings.seed)
     after, apart = tuple(log.name for log in logs), None
     share = 1.0 if pair is None else 0.5
     found = design(task, Effort(share * settings.seconds, settings.evaluations, given.tell), settings.seed)

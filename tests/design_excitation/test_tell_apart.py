@@ -23,8 +23,8 @@ NOISE = 0.05  # [N m] rms
 
 
 def designed(out: Path, *causes: str, **more: object) -> Outcome[Result]:
-    settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=150, tell_apart=causes,
-                                          **{"rehearse": False, **more})  # type: ignore[arg-type]
+    settings = design_excitation.Settings(robot="rrr", harmonics=(8,), tell_apart=causes,
+                                          **{"evaluations": 150, "rehearse": False, **more})  # type: ignore[arg-type]
     return run_stage(design_excitation.STAGE, Request((), out=out, no_report=True), settings)
 
 
@@ -105,6 +105,23 @@ def test_what_is_said_of_them_is_of_the_motion_that_is_left(tmp_path: Path, monk
     result = designed(tmp_path / "out", "spring:2", "torque_offset:2", rehearse=True).result
     assert result.apart is not None
     assert result.apart.after.condition_number == pytest.approx(result.condition_number, rel=1e-3)
+
+
+def test_a_wave_is_told_from_a_spring(tmp_path: Path) -> None:
+    """Of a wave of no given order gravity has the first one: that one nobody has found, and the others can be told."""
+    found = designed(tmp_path / "out", "spring:2", "cogging:2", evaluations=20).result.apart
+    assert found is not None
+    assert min(found.after.visibility) > 0.01
+    assert 0.0 < found.after.similarity < 1.0
+
+
+def test_what_shows_in_no_motion_is_named_before_the_search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rotor inertia at joint 1 of this arm is a part of its base parameters, however it moves."""
+    monkeypatch.setattr(design_excitation, "design", None)
+    with pytest.raises(UsageError, match=": rotor_inertia:1 shows in no motion") as told:
+        designed(tmp_path / "out", "spring:2", "rotor_inertia:1")
+    assert told.value.code == "RRID-C02"
+    assert not (tmp_path / "out").exists()
 
 
 def test_limits_and_ceiling_are_kept(both: dict[str, Outcome[Result]]) -> None:

@@ -1,13 +1,15 @@
 """Change a design until it tells two causes apart: the largest angle between what the nominal model cannot take up of either.
 
     pair = Pair(a, b)
+    refuse_hidden(task, pair, seed)
     found = told_apart(task, designed, pair, seed, evaluations or seconds)
     found.before.similarity, found.after.similarity
 
 With c⊥ = c - Q Qᵀ c the part of a cause's columns that rigid body and friction cannot imitate, weighted by the noise, cause A is as
 similar to B as the length of A⊥ within the span of B⊥ beside its whole length, root mean square over A's columns. Of the two
 directions the smaller one counts: where B can be all that A can, a bit of it besides shows B, and else the one with fewer numbers
-wins. Causes with non-linear numbers are taken in a few of their shapes, and the pair that is most alike counts.
+wins. Causes with non-linear numbers are taken in a few of their shapes, and the pair that is most alike counts. A shape that the
+nominal model takes up whole, a wave that gravity has for instance, shows in no motion: it is none that anybody has found.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from pipelines.model.excitation.problem import DesignProblem, grams_of
 from pipelines.model.excitation.task import Task
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Alike", "Apart", "Pair", "alike", "judged_again", "told_apart"]
+__all__ = ["Alike", "Apart", "Pair", "alike", "judged_again", "refuse_hidden", "told_apart"]
 
 _SHARPNESS = 200.0  # [s/rad] of Coulomb friction
 _SHAPES = 4  # of a cause
@@ -67,23 +69,37 @@ class Apart:
     evaluations: int
 
 
-def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluations: int | None, seed: int,
-               tell: Callable[[str], None]) -> tuple[Design, Apart]:
-    """`designed`, changed step by step for the better, its ceiling on the condition number kept.
+def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
+    """Before anything is designed.
 
     Raises:
-        UsageError: C02, no model of the arm predicts its torque, or one of the causes shows in no motion.
+        UsageError: C02, no model of the arm predicts its torque, or a cause shows in no motion.
     """
-    arm = task.arm
-    if arm is None:
+    if task.arm is None:
         raise UsageError("C02", "what a cause looks like depends on the torque, and neither a model nor the links are known",
                          where="--tell-apart", remedy="name a model: --model model.json")
+    problem, rng = landscape(task), np.random.default_rng([seed, 9])
+    seen = _judged(task, task.arm, problem, problem.start(rng), pair)
+    hidden = [name for name, eta in zip(_names(pair), seen.visibility, strict=True) if eta < _RANK]
+    if hidden:
+        which = f"{' and '.join(hidden)} {'show' if len(hidden) > 1 else 'shows'}"
+        raise UsageError("C02", f"{which} in no motion: the base parameters take it up", where="--tell-apart",
+                         remedy="see what diagnose says of it under not_testable")
+
+
+def _names(pair: Pair) -> tuple[str, str]:
+    one, other = (each.name if each.joint is None else f"{each.name}:{each.joint}" for each in (pair.first, pair.second))
+    return one, other
+
+
+def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluations: int | None, seed: int,
+               tell: Callable[[str], None]) -> tuple[Design, Apart]:
+    """`designed`, changed step by step for the better, its ceiling on the condition number kept."""
+    arm = task.arm
+    assert arm is not None  # `refuse_hidden`
     problem = landscape(task)
     x = problem.space.point(designed.trajectory.series)
     now = before = _judged(task, arm, problem, x, pair)
-    if min(before.visibility) < _RANK:
-        raise UsageError("C02", "one of the two shows in no motion: the base parameters take it up", where="--tell-apart",
-                         remedy="see what diagnose says of it under not_testable")
     wanted = task.problem.goal.ceiling or np.inf
     ceiling = max(wanted, before.condition_number)  # where the plain design did not reach it, this one is no worse
     rng, size, done, until = np.random.default_rng([seed, 9]), _FIRST, 0, time.process_time() + seconds
@@ -104,8 +120,7 @@ def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluat
     after = finished(task, landscape(task, 1, FINISH), x, designed.evaluations + done, designed.evaluations + done, stopped,
                      now.condition_number <= wanted)
     last = alike(task, arm, after.trajectory.series.samples(problem.samples), pair)
-    names = tuple(one.name if one.joint is None else f"{one.name}:{one.joint}" for one in (pair.first, pair.second))
-    return after, Apart((names[0], names[1]), before, last, done)
+    return after, Apart(_names(pair), before, last, done)
 
 
 def judged_again(task: Task, found: Design, pair: Pair, apart: Apart) -> Apart:
@@ -131,6 +146,7 @@ def alike(task: Task, arm: Arm, motion: Array, pair: Pair) -> Alike:
     tables = [[_apart(one.columns(seen, arm).transpose(2, 1, 0) * weight[:, None], basis)
                for one in _shapes(effect, start, seen, arm)]
               for effect, start in zip((pair.first, pair.second), pair.starts, strict=True)]
+    tables = [[one for one in table if one[1] >= _RANK] or table for table in tables]
     most = max(min(_imitated(a, b), _imitated(b, a)) for a, _ in tables[0] for b, _ in tables[1])
     eta = tuple(min(share for _, share in table) for table in tables)
     return Alike(most, (eta[0], eta[1]), condition)
