@@ -1,4 +1,4 @@
-"""Load a robot from a file, its URDF embedded, or by the name of one that is shipped."""
+"""Load a robot from a file, its URDF embedded, from a log, or by the name of one that is shipped."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.errors import UsageError
+from pipelines.log.files import ENDINGS, open_log
 from pipelines.log.robot import Joint, RobotDescription, parse_robot
 from pipelines.log.shipped import shipped
 from pipelines.log.text import read_small_text
@@ -20,12 +21,15 @@ _HERE, _SHIPPED = "robot.toml", "rrr"  # where none is named
 
 
 def load_robot(source: str | Path) -> RobotDescription:
-    """Read a robot from a TOML file, a URDF file, or by the bare name of one that is shipped.
+    """Read a robot from a TOML file, a URDF file, or a log, which has that of its arm; or by the bare name of one that is shipped.
 
     Raises:
         UsageError: no such robot, or the file is not a robot description.
+        InputRejected: a log that cannot be read.
     """
     path = _file_of(source)
+    if path.suffix.lower() in ENDINGS:
+        return open_log(path).log.robot
     if path.suffix.lower() in _URDF:
         return _from_urdf(path)
     text = read_small_text(path, what="a robot description (TOML) or a URDF")
@@ -35,7 +39,7 @@ def load_robot(source: str | Path) -> RobotDescription:
 def robot_sources(source: str | Path) -> tuple[Path, ...]:
     """The files that `load_robot(source)` reads: the description, and the URDF it names."""
     path = _file_of(source)
-    if path.suffix.lower() in _URDF:
+    if path.suffix.lower() in (*_URDF, *ENDINGS):
         return (path,)
     urdf = _urdf_named(_table_of(read_small_text(path)))
     return (path,) if urdf is None else (path, path.parent / urdf)

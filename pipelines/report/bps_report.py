@@ -90,14 +90,15 @@ def _verdict(result: Result) -> str:
 
 
 def _beside_noise(result: Result) -> str:
-    """"the residual is at most 1.1 times what differs from one period to the next", of the fitted logs; empty without periods."""
+    """"the residual of the fitted logs is at most 1.1 times what the noise between periods leaves"; empty without periods."""
     ratios = [(float(ratio), result.joints[j]) for log in result.noise_floor if log.role == "identify"
               for j, ratio in enumerate(log.ratio) if math.isfinite(ratio)]
     if not ratios:
         return ""
     worst, joint = max(ratios)
     several = len(result.joints) > 1
-    return (f"the residual is {'at most ' if several else ''}{worst:.2g} times what the noise between periods leaves"
+    return (f"the residual of the fitted logs is {'at most ' if several else ''}{worst:.2g} times what the noise between periods "
+            f"leaves"
             f"{f' ({joint})' if several else ''}")
 
 

@@ -65,13 +65,20 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     if one.rivals:
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
+        pair = " ".join(cause_at(some.cause, some.joint) for some in (one, one.rivals[0]))
+        text.append(f"Or let \"rrrid design-excitation LOG --tell-apart {pair}\" design the motion")
     return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
                    figures=tuple(proof_figures(number, one, units)))
 
 
-def numbers_section(number: int, one: Finding, units: Units = _TURNING) -> Section:
-    """What was identified and what it gains, joint by joint: behind the figure that proves it."""
-    beside = "the findings before it" if one.origin in ("residual", "reversals") else "all other findings"
+def numbers_section(number: int, one: Finding, units: Units = _TURNING, every: Sequence[Finding] = ()) -> Section:
+    """What was identified and what it gains, joint by joint: behind the figure that proves it.
+
+    Args:
+        every: findings of the report; what frequency responses name is taken out before a residual is searched.
+    """
+    taken = " and what frequency responses name" if any(other.origin == "frequency responses" for other in every) else ""
+    beside = f"the findings before it{taken}" if one.origin in ("residual", "reversals") else "all other findings"
     return Section(f"{number}. In numbers", (), (_numbers(one), gain_table(
         one.gain, f"Gain on held-out time, root mean square, beside {beside}.", units)))
 
@@ -105,7 +112,7 @@ def _share(one: Finding, nominal: ResidualRms, floor: str) -> str:
     """Of what all joints leave above the floor; and of its own joint, where a larger one beside it hides the share."""
     whole = f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above {floor}"
     own = _own_share(one, nominal)
-    if not own > _HIDDEN * one.explained:
+    if len(nominal.identify) == 1 or not own > _HIDDEN * one.explained:
         return whole
     return f"{whole} at all joints together, and {format_number(100.0 * own, 2)} % of that of joint {one.joint}, held out"
 

@@ -55,7 +55,7 @@ def diagnosis_report(result: Result) -> Report:
     nominal, now = replace(result.residual_rms, floor=floor), result.unmoved_rms or result.residual_rms
     found = [section for number, one in enumerate(result.findings, 1)
              for section in (finding_section(number, one, nominal, units=units, beside=result.findings),
-                             numbers_section(number, one, units))]
+                             numbers_section(number, one, units, result.findings))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),

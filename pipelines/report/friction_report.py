@@ -70,7 +70,7 @@ def _verdict(result: Result) -> str:
     open_ = [joint.name for joint in result.joints if joint.unseen]
     words = f"{laws}."
     if any(joint.validation.by and not joint.validation.held_out for joint in result.joints):
-        words += " Simulated were logs that were fitted too, for none has role validate."
+        words += " Simulated were logs that were fitted too, for no friction log has role validate."
     if gates := [check.message for check in result.checks if check.gate]:
         words = f"{gates[0][:1].upper()}{gates[0][1:]}. {words}"
     if poor:

@@ -18,7 +18,7 @@ __all__ = ["design_excitation"]
 def design_excitation(
     common: Common,
     name: Annotated[str | None, typer.Argument(metavar="ROBOT", show_default=False,
-                                               help="A description, a URDF or a shipped name. [robot.toml here, else rrr]")] = None,
+                                               help="Description, URDF, log or shipped name. [robot.toml here, else rrr]")] = None,
     purpose: Annotated[str | None, typer.Option("--for", help="excitation, friction, frf or hold. [excitation]")] = None,
     criterion: Annotated[str | None, typer.Option(help="default (A with condition 3), condition, frobenius, E, D or A.")] = None,
     cond_max: Annotated[float | None, typer.Option(help="Ceiling on the condition number. [default: 3]")] = None,

@@ -147,3 +147,12 @@ def test_what_cannot_be_told_apart_is_refused(causes: tuple[str, ...], more: dic
     with pytest.raises(UsageError) as refused:
         designed(tmp_path / "out", *causes, **more)
     assert words in str(refused.value)
+
+
+def test_a_log_names_the_robot_that_it_is_of(both: dict[str, Outcome[Result]], tmp_path: Path) -> None:
+    """What was imported is described nowhere else."""
+    plan = both["plain"].folder / "trajectory.h5"
+    settings = design_excitation.Settings(robot=str(plan), purpose="hold", rehearse=False)
+    found = run_stage(design_excitation.STAGE, Request((), out=tmp_path / "out", no_report=True), settings)
+    log = open_log(next((found.folder / "logs").glob("*.h5"))).log
+    assert log.robot == open_log(plan).log.robot
