@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,6 +22,7 @@ def drag(v: float) -> float:
     return float(1.2 * np.sign(v) + 0.12 * v + 0.03 * v * abs(v))
 
 
+@lru_cache(maxsize=1)
 def told() -> list[str]:
     """Of a joint that was driven at three speeds only: drag or a hump."""
     stretch = plateaus(_SPEEDS, drag, False, 0.02)
