@@ -247,7 +247,7 @@ def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
     plain = min(plainer, key=lambda rung: rung.validate_rms)
     best = min([rung for rung in joint.ladder if not rung.reason] or [chosen], key=lambda rung: rung.validate_rms)
     more = format_number(100.0 * (plain.validate_rms / best.validate_rms - 1.0), 2)  # than the best: what chance was asked of
-    than = "" if best is chosen else f" than {_plain(best.law)} does, the best of all"
+    than = "" if best is chosen else f" than {_plain(best.law)}, the best of all"
     return (f"{_capital(_plain(chosen.law))}, with {chosen.size} numbers, and not {_plain(plain.law)}, the best law with fewer "
             f"({plain.size}): that leaves {more} % more of what was held out (rms){than}, more than chance allows.",)
 

@@ -11,7 +11,8 @@ import pytest
 from pipelines import fit_friction, import_log
 from pipelines.fit_friction import Settings
 from pipelines.log.files import Opened, open_log
-from pipelines.model.friction.result import Result
+from pipelines.model.friction.misfit import misfits
+from pipelines.model.friction.result import Result, Value
 from pipelines.stage import Inputs, Request, run_stage
 
 _TORQUE_CONSTANT = 0.0551  # N m/A of the outrunner
@@ -125,3 +126,35 @@ def test_half_of_the_torque_left_is_no_good_fit(outrunner: Result) -> None:
     for error, tone in ((0.05, "good"), (0.3, "attention"), (None, "attention")):
         judged = replace(joint, ripple=None, validation=replace(joint.validation, torque_error=error))
         assert fit_friction.report(replace(outrunner, joints=(judged,), checks=())).tone == tone
+
+
+def test_an_inertia_of_unknown_uncertainty_is_not_seen(outrunner: Result) -> None:
+    (joint,) = outrunner.joints
+    assert joint.ripple is not None
+    ripple = replace(joint.ripple, inertia=Value(1.0, None, "kg m^2"))
+    (check,) = (check for check in misfits((replace(joint, ripple=ripple),), "logs") if not check.gate)
+    assert "these logs do not show it" in check.message
+
+
+def test_inertias_of_two_methods_are_not_compared(outrunner: Result) -> None:
+    """Where another method found the inertia, the one beside the ripple is not known: nothing is said of either."""
+    (joint,) = outrunner.joints
+    assert joint.ripple is not None
+    other = replace(joint, method="ekf", ripple=replace(joint.ripple, inertia=None))
+    messages = [check.message for check in misfits((other,), "logs") if not check.gate]
+    told = fit_friction.report(replace(outrunner, joints=(other,)))
+    words = " ".join(words for section in told.sections for words in section.text)
+    assert "angle alone" in words
+    assert len(messages) == 1
+    assert "The inertia" not in words + messages[0]
+
+
+def test_a_slide_is_told_in_its_own_units(outrunner: Result) -> None:
+    """7 waves in 2π m are a wave every 900 mm."""
+    (joint,) = outrunner.joints
+    assert joint.ripple is not None
+    ripple = replace(joint.ripple, rms=replace(joint.ripple.rms, unit="N"), inertia=Value(1.0, 0.01, "kg"))
+    slide = replace(joint, inertia=Value(1.0, 0.01, "kg"), ripple=ripple)
+    (check,) = (check for check in misfits((slide,), "logs") if not check.gate)
+    assert "N rms of the torque" not in check.message
+    assert "depends on its position alone, mostly a wave every 900 mm" in check.message

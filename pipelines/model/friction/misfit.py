@@ -44,10 +44,10 @@ def _rippling(joint: JointResult, where: str) -> Check | None:
     ripple = joint.ripple
     if ripple is None:
         return None
-    inertia = inertia_in_words(joint, ripple, _written)
-    return Check.of("D19", "warn", f"{plain_number(ripple.rms.value)} {ripple.rms.unit} rms of the torque of joint {joint.joint} "
+    inertia, torque = inertia_in_words(joint, ripple, _written), "torque" if joint.revolute else "force"
+    return Check.of("D19", "warn", f"{plain_number(ripple.rms.value)} {ripple.rms.unit} rms of the {torque} of joint {joint.joint} "
                     f"{depends_in_words(joint, ripple)}: {100.0 * ripple.share:.0f} % of what friction and inertia leave (mean "
-                    f"square){inertia and '. '}{inertia}", where=where, remedy=NAMED)
+                    f"square){inertia and f'. {inertia}'}", where=where, remedy=NAMED)
 
 
 def depends_in_words(joint: JointResult, ripple: Rippled) -> str:

@@ -91,10 +91,10 @@ class Missing:
 class Rippled:
     """Torque that depends on the angle of the joint alone: no law of friction holds it."""
 
-    rms: Value  # [N m] what it explains of what the law leaves
+    rms: Value  # [N m], of a slide [N]: rms of what it explains of what the law leaves
     share: float  # of what the law leaves of blocks held out (mean square)
-    orders: tuple[float, ...]  # [1/rev] waves in a turn, of a slide in 2π m, the largest first
-    inertia: Value | None  # of the joint, with the ripple known; None where the law was fitted by another method
+    orders: tuple[float, ...]  # [1/rev] waves in a turn, of a slide [1/(2π m)] in 2π m; the largest first
+    inertia: Value | None  # of the joint, with the ripple known; null where the law was fitted by another method
     along: Along
 
 

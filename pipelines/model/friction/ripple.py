@@ -45,10 +45,10 @@ _RANK = 1e-5  # singular values of unit columns below it: two columns that are o
 class Along:
     """What the law leaves beside the waves that explain it, by angle, without gravity. (points,); NaN where no row is."""
 
-    angle: Array  # [rad] middle of a class
-    forth: Array  # [N m] mean of the rows in it that move forth
-    back: Array
-    waves: Array  # [N m]
+    angle: Array  # [rad], of a slide [m]: middle of a class
+    forth: Array  # [N m], of a slide [N]: mean of the rows in it that move forth
+    back: Array  # the same of rows that move back
+    waves: Array  # [N m], of a slide [N]: those that were fitted
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ def _size(rows: _Rows, chosen: Sequence[int]) -> tuple[float, float]:
 
     def size(normal: _Normal) -> float:
         own = rows.amplitudes(normal, chosen) * scale
-        return float(np.sqrt(max(own @ outside @ own, 0.0) / len(rows.columns)))
+        return float(np.sqrt(max(float(own @ outside @ own), 0.0) / len(rows.columns)))
 
     rest = rows.columns[:, -1] - rows.columns[:, rows.whole.places(chosen)] @ rows.whole.solution(chosen)
     white = rows.scale[-1] * float(np.linalg.norm(rest)) / len(rows.columns)
