@@ -54,7 +54,8 @@ def test_how_much_worse_is_told_beside_the_law_that_chance_was_asked_of(result: 
     """A law is refused because it is measurably worse than the best, which need not be the one that was taken."""
     (joint,) = result.joints
     ladder = tuple(Rung(law, size, 0.01, left, alike, chosen, "") for law, size, left, alike, chosen in (
-        ("coulomb+viscous", 3, 0.0150, False, False), ("stribeck", 5, 0.0101, True, True), ("three_sigmoid", 7, 0.0100, True, False)))
+        ("coulomb+viscous", 3, 0.0150, False, False), ("stribeck", 5, 0.0101, True, True),
+        ("three_sigmoid", 7, 0.0100, True, False)))
     told = fit_friction.report(replace(result, joints=(replace(joint, ladder=ladder, law="stribeck"),)))
     words = next(" ".join(section.text) for section in told.sections if section.title.endswith(": choice of the law"))
     assert "that leaves 50 % more of what was held out (rms) than three sigmoids, the best of all, more than chance" in words
