@@ -52,7 +52,7 @@ def _gravity(joint: JointResult) -> list[tuple[str, Value]]:
 
 def _well(joint: JointResult) -> bool:
     if not joint.validation.by:  # nothing was simulated
-        return joint.validation.torque_error is None or joint.validation.torque_error < _GOOD_TORQUE
+        return joint.moved and joint.validation.torque_error is not None and joint.validation.torque_error < _GOOD_TORQUE
     ratio = _ratio(joint)
     return ratio is not None and ratio <= _GOOD
 
@@ -84,7 +84,9 @@ def _verdict(result: Result) -> str:
 def _law_and_errors(joint: JointResult) -> str:
     """The law, and how far the simulated speed is off with it and without."""
     judged = joint.validation
-    words = f"{joint.name[:1].upper()}{joint.name[1:]}: {_plain(joint.law)}"
+    if not joint.moved:
+        return f"{_capital(joint.name)} does not move in these logs, and they show nothing of it"
+    words = f"{_capital(joint.name)}: {_plain(joint.law)}"
     if not judged.by:
         error = judged.torque_error
         if error is None or error >= POOR:  # the finding says it
@@ -104,7 +106,7 @@ def _off(error: float | None, unit: str) -> str:
 
 
 def _speed_unit(joint: JointResult) -> str:
-    return "rad/s" if joint.inertia.unit == "kg m^2" else "m/s"
+    return "rad/s" if joint.revolute else "m/s"
 
 
 def _plain(law: str) -> str:
@@ -167,7 +169,7 @@ def _summary(result: Result) -> Section:
 
 
 def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
-    revolute = joint.inertia.unit == "kg m^2"
+    revolute = joint.revolute
     curve = curve_figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law, {_band(joint)}; the points pair torques at equal "
                          "position and opposite speed and know of no law.", joint.series, revolute)
     parts = fraction_figure(f"fractions-{joint.joint}", f"{joint.name}: torque of {joint.validation.by} and its fractions in the "
@@ -182,7 +184,7 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
 def _band(joint: JointResult) -> str:
     """In words how wide the band about the curve is."""
     width, height = 2.0 * float(np.max(joint.series.band)), float(np.max(np.abs(joint.series.curve)))
-    unit = "N m" if joint.inertia.unit == "kg m^2" else "N"
+    unit = "N m" if joint.revolute else "N"
     if not np.isfinite(width) or height <= 0.0:
         return "its band is not known"
     hidden = ", narrower than the line" if width < _THIN * height else ""
@@ -240,12 +242,14 @@ def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
     """What the best law with fewer numbers leaves more of what was held out."""
     chosen = next(rung for rung in joint.ladder if rung.chosen)
     plainer = [rung for rung in joint.ladder if rung.size < chosen.size and not rung.reason]
-    if not plainer or chosen.validate_rms <= 0.0:
+    if not plainer or min(rung.validate_rms for rung in joint.ladder) <= 0.0:
         return ()
-    best = min(plainer, key=lambda rung: rung.validate_rms)
-    more = 100.0 * (best.validate_rms / chosen.validate_rms - 1.0)
-    return (f"{_capital(_plain(chosen.law))}, with {chosen.size} numbers, and not {_plain(best.law)}, the best law with fewer "
-            f"({best.size}): that leaves {format_number(more, 2)} % more of what was held out (rms), more than chance allows.",)
+    plain = min(plainer, key=lambda rung: rung.validate_rms)
+    best = min([rung for rung in joint.ladder if not rung.reason] or [chosen], key=lambda rung: rung.validate_rms)
+    more = format_number(100.0 * (plain.validate_rms / best.validate_rms - 1.0), 2)  # than the best: what chance was asked of
+    than = "" if best is chosen else f" than {_plain(best.law)}, the best of all"
+    return (f"{_capital(_plain(chosen.law))}, with {chosen.size} numbers, and not {_plain(plain.law)}, the best law with fewer "
+            f"({plain.size}): that leaves {more} % more of what was held out (rms){than}, more than chance allows.",)
 
 
 def _capital(words: str) -> str:

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.fit.varpro import Separable
 from pipelines.model.friction.law_fit import LawFit
@@ -70,6 +71,9 @@ class Equations(Protocol):
 
     def thinned(self, rows: int) -> Equations: ...
 
+    @property
+    def rows(self) -> npt.NDArray[np.intp]: ...
+
     def predicted(self, fit: LawFit) -> Predicted: ...
 
 
@@ -113,6 +117,13 @@ class LawEquations:
     def thinned(self, rows: int) -> LawEquations:
         """About so many rows, for a scan."""
         return replace(self, every=max(1, len(self.y) // rows))
+
+    @property
+    def rows(self) -> npt.NDArray[np.intp]:
+        """Which of all rows of the stretches these are."""
+        count = [len(stretch.torque) for stretch in self.stretches]
+        first = np.cumsum([0, *count[:-1]])
+        return np.concatenate([np.arange(k, k + n, self.every) for k, n in zip(first, count, strict=True)])
 
     @cached_property
     def groups(self) -> tuple[int, ...]:

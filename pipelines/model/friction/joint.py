@@ -125,10 +125,10 @@ def _stretches(seen: Sequence[Seen], joint: int, window: float, beside: tuple[in
 
 
 def with_fit(joint: JointFit, fit: LawFit) -> JointFit:
-    """The same with numbers from another method, judged again."""
+    """The same with numbers from another method, judged again. What a ripple does to its inertia that method does not say."""
     stretch = joint.driven.stretch
     driven = replace(joint.driven, with_friction=simulate_joint(stretch, fit), without=simulate_joint(stretch, fit, friction=False))
-    return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit))
+    return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit), beside_ripple=None)
 
 
 def fractions(joint: JointFit) -> tuple[Array, Array, Array]:

@@ -1,17 +1,24 @@
-"""What a fit leaves that no law of friction holds, as findings: a ripple along the turn, or most of the torque."""
+"""What a fit leaves that no law of friction holds, as findings: a torque of the joint's angle, or most of the torque."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from pipelines.errors import Check
 from pipelines.model.friction.result import JointResult, Rippled, Value
+from pipelines.model.friction.words import plain_number
 
-__all__ = ["POOR", "inertia_in_words", "misfits", "waves_in_words"]
+__all__ = ["NAMED", "POOR", "depends_in_words", "inertia_in_words", "misfits"]
 
 POOR = 0.5  # of torque that was held out (rms): more than that left is no model
 _SEEN = 2.0  # standard deviations: an inertia that is less is not seen
+NAMED = "let 'rrrid diagnose' say what makes it: a motor that cogs, a spring, a cable, a stop"
+_TOLD_APART = 0.9  # of a wave along the travel, that two of them differ by at least
+_SEVERAL = 4.0  # waves along the travel: fewer beside others like it are a bend
+_MOST = 0.5  # of all waves (mean square), that the largest is where it is named beside others like it
 _MOVED = 0.1  # of the inertia: less is within what a fit is good for
 
 
@@ -26,7 +33,7 @@ def misfits(joints: Sequence[JointResult], where: str) -> tuple[Check, ...]:
 
 def _unexplained(joint: JointResult, where: str) -> Check | None:
     error = joint.validation.torque_error
-    if joint.validation.by or error is None or error < POOR:
+    if joint.validation.by or not joint.moved or error is None or error < POOR:
         return None
     return Check.of("D19", "warn", f"rigid body and friction leave {100.0 * error:.0f} % of the held-out torque of joint "
                     f"{joint.joint} (rms): neither this inertia nor this friction describes it", where=where, gate=True,
@@ -37,33 +44,53 @@ def _rippling(joint: JointResult, where: str) -> Check | None:
     ripple = joint.ripple
     if ripple is None:
         return None
-    along, waves = "turn" if _turns(joint) else "travel", waves_in_words(ripple, _turns(joint))
-    return Check.of("D19", "warn", f"{ripple.rms.value:.2g} {ripple.rms.unit} rms of the torque of joint {joint.joint} repeats "
-                    f"along its {along}, {waves}, at all speeds and both ways: {100.0 * ripple.share:.0f} % of what friction and "
-                    f"inertia leave (mean square), most likely cogging. {inertia_in_words(joint, ripple, _written)}", where=where,
-                    remedy=f"'rrrid diagnose' names it; 'rrrid extend --with cogging:{joint.joint}' takes it into the model")
+    inertia, torque = inertia_in_words(joint, ripple, _written), "torque" if joint.revolute else "force"
+    return Check.of("D19", "warn", f"{plain_number(ripple.rms.value)} {ripple.rms.unit} rms of the {torque} of joint {joint.joint} "
+                    f"{depends_in_words(joint, ripple)}: {100.0 * ripple.share:.0f} % of what friction and inertia leave (mean "
+                    f"square){inertia and f'. {inertia}'}", where=where, remedy=NAMED)
 
 
-def _turns(joint: JointResult) -> bool:
-    return joint.inertia.unit == "kg m^2"
+def depends_in_words(joint: JointResult, ripple: Rippled) -> str:
+    """Of what, and how it is known to be no friction; of waves only where they are told apart from a bend."""
+    return (f"depends on its {'angle' if joint.revolute else 'position'} alone{_waves_in_words(joint, ripple)}, "
+            "the same at all speeds and both ways")
 
 
-def waves_in_words(ripple: Rippled, turning: bool) -> str:
-    """Of the largest wave: orders of a slide count waves in 2π metres."""
-    order = ripple.orders[0]
-    size = f"about {order:.2g} waves a turn" if turning else f"a wave every {2000.0 * math.pi / order:.2g} mm"
-    return f"mostly {size}" if len(ripple.orders) > 1 else size
+def _waves_in_words(joint: JointResult, ripple: Rippled) -> str:
+    """The largest wave; empty for a bend: where others are too near for the travel to tell them apart, and it is few or not most.
+
+    Orders of a slide count waves in 2π metres.
+    """
+    order, *others = ripple.orders
+    apart = 2.0 * math.pi / max(float(np.ptp(ripple.along.angle)), 1e-12)
+    near = min((abs(other - order) for other in others), default=math.inf) < _TOLD_APART * apart
+    if near and (order < _SEVERAL * apart or _share_of(order, ripple) < _MOST):
+        return ""
+    length = f"a wave every {plain_number(2000.0 * math.pi / order)} mm"
+    size = f"about {plain_number(order)} waves a turn" if joint.revolute else length
+    return f", mostly {size}" if others else f", {size}"
+
+
+def _share_of(order: float, ripple: Rippled) -> float:
+    """What one wave is of all of them (mean square)."""
+    whole = ripple.along.waves - np.mean(ripple.along.waves)
+    angle = order * ripple.along.angle
+    one = np.stack([np.sin(angle), np.cos(angle), np.ones_like(angle)], axis=1)
+    left = whole - one @ np.linalg.lstsq(one, whole, rcond=None)[0]
+    return 1.0 - float(left @ left) / max(float(whole @ whole), 1e-300)
 
 
 def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value], str]) -> str:
-    """What the ripple does to the inertia, and whether that is to be used.
+    """What the ripple does to the inertia, and whether that is to be used; empty where only one of the two is known.
 
     Args:
         shown: a value with its uncertainty and unit, in writing.
     """
     without, with_ = joint.inertia, ripple.inertia
+    if with_ is None:
+        return ""
     words = f"The inertia {shown(without)} is fitted without it; with it the same logs give {shown(with_)}"
-    if with_.value <= _SEEN * (with_.std or 0.0):
+    if with_.std is None or with_.value <= _SEEN * with_.std:
         return f"{words}: these logs do not show it, and neither is to be relied on"
     moved = abs(with_.value - without.value) > _MOVED * with_.value
     return f"{words}: do not rely on the first" if moved else words

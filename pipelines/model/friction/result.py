@@ -18,12 +18,14 @@ from pipelines.model.friction.one_joint import gravity_names
 from pipelines.model.friction.ripple import Along, Ripple
 from pipelines.model.friction.several import SeveralFit
 from pipelines.model.friction.undecided import undecided
+from pipelines.model.friction.weak_form import moved
 
 __all__ = ["Event", "JointResult", "Posture", "Result", "Rippled", "Rung", "Series", "Validation", "Value",
            "joint_result", "several_results"]
 
 _POINTS = 1500  # of a figure
 _CURVE = 401
+_DRIVE = "record it while it is driven through its range, its brake released"
 
 
 @dataclass(frozen=True)
@@ -87,12 +89,12 @@ class Missing:
 
 @dataclass(frozen=True)
 class Rippled:
-    """Torque that repeats along the turn of the joint: no law of friction holds it."""
+    """Torque that depends on the angle of the joint alone: no law of friction holds it."""
 
-    rms: Value  # [N m] over the travel
+    rms: Value  # [N m], of a slide [N]: rms of what it explains of what the law leaves
     share: float  # of what the law leaves of blocks held out (mean square)
-    orders: tuple[float, ...]  # [1/rev] waves in a turn, the largest first
-    inertia: Value  # of the joint, with the ripple known
+    orders: tuple[float, ...]  # [1/rev] waves in a turn, of a slide [1/(2π m)] in 2π m; the largest first
+    inertia: Value | None  # of the joint, with the ripple known; null where the law was fitted by another method
     along: Along
 
 
@@ -142,6 +144,12 @@ class JointResult:
     logs: tuple[str, ...]
     series: Series
     ripple: Rippled | None = None
+    moved: bool = True  # whether the logs move it at all
+
+    @property
+    def revolute(self) -> bool:
+        """Whether it turns; else it slides."""
+        return self.inertia.unit == "kg m^2"
 
 
 @dataclass(frozen=True)
@@ -163,10 +171,12 @@ def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[Joi
     dq = np.concatenate([motion.motion.dq[motion.good.kept[motion.good.fit]] for _, motion in motions])
     middle = np.median(q, axis=0)
     names = tuple(log.name for log, _ in (*motions, *validate))
-    return tuple(_several(found, arm, j, middle, np.abs(dq[:, j]), names) for j in range(arm.n_joints))
+    moves = moved([motion for _, motion in motions]).tolist()
+    return tuple(_several(found, arm, j, middle, np.abs(dq[:, j]), names, moves[j]) for j in range(arm.n_joints))
 
 
-def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, names: tuple[str, ...]) -> JointResult:
+def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, names: tuple[str, ...],
+             moves: bool) -> JointResult:
     ladder = found.ladders[j]
     law, first = ladder.chosen.law, f":{j + 1}:"
     known = {key.replace(first, "."): value for key, value in arm.parameters.items() if first in key}
@@ -181,12 +191,14 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, n
     nothing = np.zeros(0)
     series = Series(axis, ladder.chosen.fit.curve(axis), ladder.chosen.fit.curve_std(axis), *(nothing,) * 15)
     inertia = _inertia(found.fitted, arm, j, middle)
-    ripple = _rippled(found.ripples[j], None if found.beside_ripples is None else _inertia(found.beside_ripples, arm, j, middle))
-    open_ = tuple(Missing(*words) for words in undecided(ladder, slowest, fastest, alone=False))
+    ripple = _rippled(found.ripples[j], None if found.beside_ripples is None else _inertia(found.beside_ripples, arm, j, middle),
+                      arm.robot.joints[j].revolute)
+    open_ = (tuple(Missing(*words) for words in undecided(ladder, slowest, fastest, alone=False)) if moves else
+             (Missing("the joint does not move in these logs: neither its inertia nor its friction is shown", _DRIVE),))
     return JointResult(j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
                        (Posture(tuple(map(float, middle)), inertia, {}),),
                        Validation(None, None, "", False, _torque_error(ladder)), rungs, ladder.by, open_, (), None,
-                       (slowest, fastest), names, series, ripple)
+                       (slowest, fastest), names, series, ripple if moves else None, moves)
 
 
 def _inertia(fitted: Fitted, arm: Arm, j: int, q: Array) -> Value:
@@ -221,17 +233,17 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
         tuple(Missing(gap.what, gap.record) for gap in joint.unseen), events, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)), _series(joint),
-        _rippled(joint.ripple, _beside_ripple(joint)))
+        _rippled(joint.ripple, _beside_ripple(joint), fit.joint.revolute))
 
 
 def _torque_error(ladder: Ladder) -> float | None:
     return ladder.chosen.validate_rms / ladder.torque if ladder.torque > 0.0 else None
 
 
-def _rippled(ripple: Ripple | None, inertia: Value | None) -> Rippled | None:
-    if ripple is None or inertia is None:
+def _rippled(ripple: Ripple | None, inertia: Value | None, revolute: bool) -> Rippled | None:
+    if ripple is None:
         return None
-    unit = "N m" if inertia.unit == "kg m^2" else "N"
+    unit = "N m" if revolute else "N"
     return Rippled(Value(ripple.rms, ripple.std, unit), ripple.share, ripple.orders, inertia, ripple.along)
 
 

@@ -1,10 +1,10 @@
-"""What a friction fit leaves that repeats along the turn of the joint: cogging, which no law of friction knows.
+"""What a friction fit leaves that is a torque of the joint's angle, which no law of friction knows.
 
     r = F δ + Σ_k (a_k sin kq + b_k cos kq) + noise        F = ∂ŷ/∂(β, θ) of the fitted law
 
 Waves are chosen on some blocks of time and judged on the others. They have to explain a good part of what is left there, and
-some of it forth and back, slow and fast: friction turns with the motion, an acceleration that is wrong goes with the speed,
-cogging does neither.
+some of it forth and back, slow and fast: friction turns with the motion, an acceleration that is wrong goes with the speed, a
+torque of the angle does neither. Magnets, teeth, a spring, a stop: what makes it is not asked here.
 """
 
 from __future__ import annotations
@@ -17,17 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.varpro import SeparableFit, fit_separable
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import Effect
 from pipelines.model.friction.equations import Equations
 from pipelines.model.friction.law_fit import LawFit
-from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.friction.one_joint import OneJoint, gravity_columns
+from pipelines.model.friction.waves import Waves, orders_along
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Along", "Ripple", "refitted", "ripple_of"]
 
-_EFFECT, _ORDER = "cogging", "order"
-_ROWS = 4000  # that are looked at: more than ten for every order
+_ROWS = 4000  # that are looked at, or up to twice as many: more than ten for every order
 _AT_ONCE = 16  # orders: memory
 _FOLDS = 10
 _MOST = 8  # waves
@@ -37,32 +35,35 @@ _EACH = 0.05  # of what is left (mean square), the least that a further wave exp
 _TOLD = 0.5
 _SIDES = 0.1  # of the same, forth and back, slow and fast, each
 _WORTH = 0.01  # of the joint's torque (rms): a smaller one is not worth a word
-_FEW = 100  # rows of one side, to be asked at all
-_POINTS = 2000  # of the travel
+_FEW = 100  # rows that each side has at least: a side that was not driven says nothing
+_SURE = 3.0  # standard deviations of a size, that it has to be
 _CLASSES, _A_CLASS = 360, 8  # of angle, at most; rows of one
 _RANK = 1e-5  # singular values of unit columns below it: two columns that are one
 
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """What the law leaves beside the waves that explain it, by angle. (points,); NaN where no row is."""
+    """What the law leaves beside the waves that explain it, by angle, without gravity. (points,); NaN where no row is."""
 
-    angle: Array  # [rad] middle of a class
-    forth: Array  # [N m] mean of the rows in it that move forth
-    back: Array
-    waves: Array  # [N m]
+    angle: Array  # [rad], of a slide [m]: middle of a class
+    forth: Array  # [N m], of a slide [N]: mean of the rows in it that move forth
+    back: Array  # the same of rows that move back
+    waves: Array  # [N m], of a slide [N]: those that were fitted
 
 
 @dataclass(frozen=True)
 class Ripple:
-    """Torque along the turn of the joint that is the same at every speed and in both directions."""
+    """Torque of the joint's angle that is the same at every speed and in both directions."""
 
-    rms: float  # [N m] over the travel
+    rms: float  # [N m] over the rows, without what the law would take of it
     std: float  # of rms: the blocks left out one by one
     share: float  # of what the law leaves of blocks held out (mean square), what the waves explain
     orders: tuple[float, ...]  # [1/rev] of the waves, the largest first
     along: Along
-    effects: tuple[Effect, ...]  # at the only joint of an arm of one
+
+    @property
+    def waves(self) -> Waves:
+        return Waves(self.orders)
 
 
 @dataclass(frozen=True)
@@ -73,18 +74,6 @@ class _State:
 
     def columns(self, motion: Motion, arm: OneJoint, theta: Array) -> Array:
         return np.hstack([motion.q, motion.dq])
-
-
-@dataclass(frozen=True)
-class _Waves:
-    """Sine and cosine of several orders, as columns."""
-
-    shapes: tuple[Effect, ...]
-    pointwise: bool = True
-
-    def columns(self, motion: Motion, arm: OneJoint, theta: Array) -> Array:
-        """(samples, 2 × orders)"""
-        return np.concatenate(list(self.shapes[0].own_columns(self.shapes, motion, arm))).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +87,16 @@ class _Normal:
         """Of the law's numbers, and of the sines and cosines of the chosen waves."""
         waves = [self.numbers + 2 * k + part for k in chosen for part in (0, 1)]
         return np.array([*range(self.numbers), *waves], dtype=np.intp)
+
+    def outside(self, chosen: Sequence[int]) -> Array:
+        """Products of the chosen waves' columns, each without what the law's columns take of it.
+
+        With W the waves and F the law's: Wᵀ W - Wᵀ F (Fᵀ F)⁻¹ Fᵀ W.
+        """
+        at = self.places(chosen)
+        law, waves = at[:self.numbers], at[self.numbers:]
+        across = self.gram[np.ix_(law, waves)]
+        return np.asarray(self.gram[np.ix_(waves, waves)] - across.T @ _inverse(self.gram[np.ix_(law, law)]) @ across)
 
     def solution(self, chosen: Sequence[int]) -> Array:
         """Least squares over those places."""
@@ -130,9 +129,8 @@ class _Rows:
     numbers: int
 
     @classmethod
-    def of(cls, fit: LawFit, waves: Array, every: int) -> _Rows:
-        slopes = fit.found.jacobian[::every]
-        columns = np.hstack([slopes, waves, fit.found.residual[::every, None]])
+    def of(cls, slopes: Array, waves: Array, left: Array) -> _Rows:
+        columns = np.hstack([slopes, waves, left[:, None]])
         scale = np.linalg.norm(columns, axis=0)
         scale = np.where(scale > 0.0, scale, 1.0)
         return cls(columns / scale, scale, slopes.shape[1])
@@ -168,27 +166,29 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
     Args:
         equations: that `fit` was fitted to.
     """
-    arms = equations.arms()
-    shapes = tuple(find_effect(_EFFECT)(joint=1).shapes(equations.nodes, arms[0]))
     power = float(np.mean(np.square(equations.y)))
     if fit.found.rms**2 <= _WORTH**2 * power:
         return None
-    every = -(-len(equations.y) // _ROWS)
-    waves = [equations.build(_Waves(shapes[k:k + _AT_ONCE]), arms, fit.theta)[::every] for k in range(0, len(shapes), _AT_ONCE)]
-    rows = _Rows.of(fit, np.hstack(waves), every)
+    few, arms = equations.thinned(_ROWS), equations.arms()
+    every = Waves(orders_along(equations.nodes.q[:, 0], arms[0].revolute))
+    parts = [few.build(every.some(part), arms, fit.theta) for part in _batches(len(every.orders))]
+    rows = _Rows.of(fit.found.jacobian[few.rows], np.hstack(parts), fit.found.residual[few.rows])
+    state = few.build(_State(), arms, fit.theta)
     chosen = _chosen(rows.whole)
-    state = equations.build(_State(), arms, fit.theta)[::every]
     share = _told(rows, state[:, 1]) if chosen else None
     if share is None:
         return None
     high = np.hypot(*rows.amplitudes(rows.whole, chosen).reshape(-1, 2).T)
     chosen = [chosen[k] for k in np.argsort(-high)]
-    effects = tuple(shapes[k] for k in chosen)
-    rms, std = _size(rows, chosen, effects, equations.nodes, arms[0])
-    if rms < _WORTH * np.sqrt(power):
+    rms, std = _size(rows, chosen)
+    if rms < max(_WORTH * np.sqrt(power), _SURE * std):
         return None
-    orders = tuple(effect.values(np.zeros(2))[_ORDER] for effect in effects)
-    return Ripple(rms, std, share, orders, _along(rows, chosen, state, effects, arms[0]), effects)
+    waves = every.some(chosen)
+    return Ripple(rms, std, share, waves.orders, _along(rows, chosen, state, waves, arms[0]))
+
+
+def _batches(count: int) -> list[range]:
+    return [range(k, min(k + _AT_ONCE, count)) for k in range(0, count, _AT_ONCE)]
 
 
 def _chosen(normal: _Normal) -> list[int]:
@@ -205,53 +205,67 @@ def _chosen(normal: _Normal) -> list[int]:
 
 def _told(rows: _Rows, speed: Array) -> float | None:
     """Share that waves chosen on the other blocks explain of blocks held out; None where it is too little, in all or on a side."""
+    quick = np.abs(speed) > np.median(np.abs(speed))
+    sides = (speed > 0.0, speed < 0.0, quick, ~quick)
+    if min(int(side.sum()) for side in sides) < _FEW:  # of a joint that goes one way friction is a torque of its angle too
+        return None
     before, after = np.empty(len(speed)), np.empty(len(speed))
     for part, rest in zip(rows.parts, rows.others, strict=True):
         here = rows.columns[part]
         for into, chosen in ((before, []), (after, _chosen(rest))):
             into[part] = here[:, -1] - here[:, rest.places(chosen)] @ rest.solution(chosen)
-    quick = np.abs(speed) > np.median(np.abs(speed))
-    sides = [side for side in (speed > 0.0, speed < 0.0, quick, ~quick) if side.sum() >= _FEW]
-    shares = [_share(before[side], after[side]) for side in sides]
     whole = _share(before, after)
-    return whole if whole >= _TOLD and min(shares, default=0.0) >= _SIDES else None
+    return whole if whole >= _TOLD and min(_share(before[side], after[side]) for side in sides) >= _SIDES else None
 
 
 def _share(before: Array, after: Array) -> float:
     return 1.0 - float(after @ after) / max(float(before @ before), 1e-300)
 
 
-def _size(rows: _Rows, chosen: Sequence[int], effects: tuple[Effect, ...], nodes: Motion, arm: OneJoint) -> tuple[float, float]:
-    """Root mean square over the travel [N m], and its standard deviation: Efron 1979, the jackknife over blocks of time."""
-    turn = _turn(np.linspace(float(nodes.q.min()), float(nodes.q.max()), _POINTS), effects, arm)
-    sizes = [float(np.std(turn @ rows.amplitudes(rest, chosen))) for rest in rows.others]
-    return float(np.std(turn @ rows.amplitudes(rows.whole, chosen))), float(np.sqrt(_FOLDS - 1.0) * np.std(sizes))
+def _size(rows: _Rows, chosen: Sequence[int]) -> tuple[float, float]:
+    """Root mean square over the rows of what of the waves lies outside the law [N m], and its standard deviation.
+
+    Waves and law cancel where they are nearly one, a slow wave and gravity, and either alone is as large as it pleases: what lies
+    outside is what the waves explain, and never more than is left. Efron 1979, the jackknife over blocks of time; at least what
+    white noise as large as the rest would make.
+    """
+    outside = rows.whole.outside(chosen)
+    scale = rows.scale[rows.whole.places(chosen)][rows.numbers:]
+
+    def size(normal: _Normal) -> float:
+        own = rows.amplitudes(normal, chosen) * scale
+        return float(np.sqrt(max(float(own @ outside @ own), 0.0) / len(rows.columns)))
+
+    rest = rows.columns[:, -1] - rows.columns[:, rows.whole.places(chosen)] @ rows.whole.solution(chosen)
+    white = rows.scale[-1] * float(np.linalg.norm(rest)) / len(rows.columns)
+    jackknife = float(np.sqrt(_FOLDS - 1.0) * np.std([size(others) for others in rows.others]))
+    return size(rows.whole), max(jackknife, white)
 
 
-def _turn(angle: Array, effects: tuple[Effect, ...], arm: OneJoint) -> Array:
-    """Sines and cosines (points, 2 × waves) at angles [rad]."""
-    still = np.zeros((len(angle), 1))
-    return _Waves(effects).columns(Motion(angle, angle[:, None], still, still), arm, still)
+def _along(rows: _Rows, chosen: Sequence[int], state: Array, waves: Waves, arm: OneJoint) -> Along:
+    """Means by classes of angle, without what the law would take of them were the waves known.
 
-
-def _along(rows: _Rows, chosen: Sequence[int], state: Array, effects: tuple[Effect, ...], arm: OneJoint) -> Along:
-    """Means by classes of angle, without what the law would take of them were the waves known."""
+    What of the waves gravity could be, a + c sin q + c' cos q, no row tells from it: that is taken out of all.
+    """
     q, dq = state.T
     solution = rows.whole.solution(chosen)
     left = (rows.columns[:, -1] - rows.columns[:, :rows.numbers] @ solution[:rows.numbers]) * rows.scale[-1]
     classes = int(np.clip(len(q) // _A_CLASS, 10, _CLASSES))
     edges = np.linspace(float(q.min()), float(q.max()), classes + 1)
+    middle = 0.5 * (edges[1:] + edges[:-1])
     place = np.clip(np.searchsorted(edges, q, side="right") - 1, 0, classes - 1)
+    whole = waves.at(middle) @ rows.amplitudes(rows.whole, chosen)
+    weight = np.hstack([np.ones((classes, 1)), gravity_columns(middle, arm.revolute)])
+    taken = weight @ np.linalg.lstsq(weight, whole, rcond=None)[0]
     means = []
     for side in (dq > 0.0, dq < 0.0):
         count = np.bincount(place[side], minlength=classes)
-        means.append(np.where(count > 0, np.bincount(place[side], left[side], classes) / np.maximum(count, 1), np.nan))
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    return Along(middle, means[0], means[1], _turn(middle, effects, arm) @ rows.amplitudes(rows.whole, chosen))
+        means.append(np.where(count > 0, np.bincount(place[side], left[side], classes) / np.maximum(count, 1), np.nan) - taken)
+    return Along(middle, means[0], means[1], whole - taken)
 
 
 def refitted(equations: Equations, fit: LawFit, ripple: Ripple) -> SeparableFit:
     """The same law with the waves beside it: what the other numbers are where the ripple is known. Rigid numbers come first."""
-    waves = equations.build(_Waves(ripple.effects), equations.arms(), fit.theta)
+    waves = equations.build(ripple.waves, equations.arms(), fit.theta)
     problem = equations.problem(fit.law, equations.arms(fit.found.beta))
     return fit_separable(replace(problem, fixed=np.hstack([problem.fixed, waves])), [fit.theta])

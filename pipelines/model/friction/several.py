@@ -130,6 +130,11 @@ class RowEquations:
     def thinned(self, rows: int) -> RowEquations:
         return replace(self, every=max(1, len(self.y) // rows))
 
+    @property
+    def rows(self) -> npt.NDArray[np.intp]:
+        """Which of all rows these are."""
+        return np.arange(0, len(self.row.blocks[1]), self.every)
+
     def predicted(self, fit: LawFit) -> Predicted:
         law = self.build(fit.law, self.arms(), fit.theta) @ fit.amplitudes
         return Predicted(self.y, self.fixed @ fit.found.beta[:self.width] + law)
@@ -161,6 +166,6 @@ def fit_several(identify: Motions, validate: Motions, recipe: Recipe, law: Law |
               for effect in ladder.chosen.fit.law.shaped(ladder.chosen.fit.theta)]
     everything = Columns(columns.body, columns.kept, (*placed, *columns.laws), columns.arm)
     ripples = tuple(ripple_of(one, ladder.chosen.fit) for one, ladder in zip(own, ladders, strict=True))
-    waves = tuple(replace(wave, joint=j + 1) for j, ripple in enumerate(ripples) if ripple is not None for wave in ripple.effects)
+    waves = tuple(wave for j, ripple in enumerate(ripples) if ripple is not None for wave in ripple.waves.alone(j + 1))
     beside = fit_logs(identify, replace(everything, laws=(*everything.laws, *waves)), recipe) if waves else None
     return SeveralFit(ladders, fit_logs(identify, everything, recipe), ripples, beside)

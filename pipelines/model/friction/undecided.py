@@ -11,6 +11,7 @@ import numpy as np
 
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.ladder import Ladder, Tried
+from pipelines.model.friction.words import plain_number
 from pipelines.model.rigid.body import Array
 
 __all__ = ["undecided"]
@@ -38,9 +39,11 @@ def _why(ladder: Ladder, rival: Tried) -> str:
     sizes = f"{chosen.law.size} numbers against {rival.law.size}"
     held_out = "held-out logs" if ladder.by == "logs" else "held-out blocks"
     if not ladder.alike(rival):
-        more = 100.0 * (rival.validate_rms / chosen.validate_rms - 1.0)
+        best = ladder.best  # what chance was asked of, ladder.py
+        more = plain_number(100.0 * (rival.validate_rms / best.validate_rms - 1.0))
+        than = "" if best is chosen else f" than {best.law.title}, the best of all"
         return (f"of what was fitted both leave as much; the first, {sizes}, is taken because of the {held_out} the second leaves "
-                f"{more:.2g} % more (rms), which is more than chance")
+                f"{more} % more (rms){than}, which is more than chance")
     if chosen.law.size < rival.law.size:
         return f"nothing tells them apart, and the first is taken for it is plainer, {sizes}"
     return f"nothing tells them apart, and the first, {sizes}, is taken for it leaves a little less of the {held_out}"
@@ -52,10 +55,10 @@ def _apart(chosen: Tried, rival: Tried, speed: Array, alone: bool) -> str:
     most = int(np.argmax(np.abs(one - other)))
     torque, rate, inertia = ("N m", "rad/s", "kg m²") if chosen.fit.joint.revolute else ("N", "m/s", "kg")
     share = 100.0 * abs(float(one[most] - other[most])) / max(abs(float(one[most])), 1e-300)
-    words = (f"what the choice changes: the curve by at most {abs(float(one[most] - other[most])):.2g} {torque}, at "
-             f"{abs(float(speed[most])):.2g} {rate} ({share:.2g} % of the friction there)")
+    words = (f"what the choice changes: the curve by at most {plain_number(float(abs(one[most] - other[most])))} {torque}, at "
+             f"{plain_number(float(abs(speed[most])))} {rate} ({plain_number(share)} % of the friction there)")
     if not alone:
         return words
     moved = abs(chosen.fit.inertia - rival.fit.inertia)
     hidden = moved < float(chosen.fit.std[0])
-    return f"{words}; the inertia by {'less than its uncertainty' if hidden else f'{moved:.2g} {inertia}'}"
+    return f"{words}; the inertia by {'less than its uncertainty' if hidden else f'{plain_number(moved)} {inertia}'}"

@@ -29,11 +29,12 @@ from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_jerk
 
-__all__ = ["Stretch", "Windows", "stretches_of", "swaying"]
+__all__ = ["Stretch", "Windows", "moved", "stretches_of", "swaying"]
 
 _MOTIONLESS = ("edges", "kept", "impulse", "length", "torque")
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
 _SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
+_FAST = 3.0  # standard deviations of a speed: what is slower (rms) may stand still
 _FEWEST = 10  # windows of a stretch that is worth using
 _SHORTEST = 4  # samples of a window
 _KINKED = 2  # order of a smoother for motion whose acceleration jumps
@@ -177,6 +178,19 @@ def swaying(found: Reconstructed, joint: int, resolution: Array) -> tuple[int, .
     q = found.motion.q[found.good.kept[found.good.fit]]
     moved = np.ptp(q, axis=0) > _SWAY * resolution
     return tuple(int(k) + 1 for k in np.flatnonzero(moved) if k != joint - 1)
+
+
+def moved(seen: Sequence[Reconstructed]) -> npt.NDArray[np.bool_]:
+    """(joints,) whether any log moves a joint further than its encoder's steps, and faster than noise alone would have it."""
+    found = []
+    for one in seen:
+        rows = one.good.kept[one.good.fit]
+        moves = np.ptp(one.motion.q[rows], axis=0) > _SWAY * encoder_resolution(one.good)
+        if one.std is not None:
+            speed = np.sqrt(np.nanmean(np.square(one.motion.dq[rows]), axis=0))
+            moves &= speed > _FAST * np.nanmedian(one.std[1][rows], axis=0)
+        found.append(moves)
+    return np.asarray(np.any(found, axis=0))
 
 
 def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: float,

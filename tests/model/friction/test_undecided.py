@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import numpy as np
+import pytest
 
 from pipelines.model.friction.coverage import coverage
 from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.ladder import Judge, climb
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.friction.undecided import undecided
+from pipelines.model.friction.words import plain_number
 from tests.model.friction.one_joint import JOINT, recorded
 from tests.model.friction.test_ladder import plateaus
 
@@ -21,6 +24,7 @@ def drag(v: float) -> float:
     return float(1.2 * np.sign(v) + 0.12 * v + 0.03 * v * abs(v))
 
 
+@lru_cache(maxsize=1)
 def told() -> list[str]:
     """Of a joint that was driven at three speeds only: drag or a hump."""
     stretch = plateaus(_SPEEDS, drag, False, 0.02)
@@ -45,3 +49,8 @@ def test_laws_that_agree_where_the_joint_was_driven_differ_in_between() -> None:
 def test_no_law_is_called_by_its_key() -> None:
     assert told()
     assert not any("_" in words for words in told())
+
+
+@pytest.mark.parametrize(("value", "said"), [(120.3, "120"), (18.153, "18"), (1234.5, "1200"), (0.000213, "0.00021"), (0.0, "0")])
+def test_numbers_in_sentences_have_no_powers_of_ten(value: float, said: str) -> None:
+    assert plain_number(value) == said
