@@ -131,7 +131,7 @@ class _Sums:
     """What blocks of one noise add up to."""
 
     def __init__(self, channels: int, bins: int) -> None:
-        self.samples, self.counts = 0, np.zeros(channels)
+        self.samples, self.longest, self.counts = 0, 0, np.zeros(channels)
         self.cross = np.zeros((channels, channels, bins), dtype=np.complex128)
         self.leverage = np.zeros((channels, bins))
 
@@ -145,7 +145,8 @@ def _noises(equations: Iterable[Block], solution: Solution, length: int) -> tupl
         own.cross += spectrum[:, None] * np.conj(spectrum)
         transformed = _transform(block, length)
         own.leverage += _leverage(transformed, solution)
-        own.samples, own.counts, blocks = own.samples + block.samples, own.counts + block.counts, blocks + 1
+        own.samples, own.longest = own.samples + block.samples, max(own.longest, block.samples)
+        own.counts, blocks = own.counts + block.counts, blocks + 1
     return {noise: _noise(own, solution, length) for noise, own in found.items()}, transformed if blocks == 1 else None
 
 
@@ -153,7 +154,8 @@ def _noise(sums: _Sums, solution: Solution, length: int) -> _Noise:
     samples, counts, channels = sums.samples, np.maximum(sums.counts, 1.0), len(sums.counts)
     cross = sums.cross / np.sqrt(counts[:, None] * counts)[:, :, None]  # equations left out have no noise
     gamma = np.fft.irfft(cross[np.arange(channels), np.arange(channels)], length, axis=1)
-    fits = [_autoregression(g, samples, min(_ORDER, samples // 20)) for g in gamma]
+    most = min(_ORDER, samples // 20, sums.longest // 2)  # what is further apart than a block is long, no block tells
+    fits = [_autoregression(g, samples, most) for g in gamma]
     shape = np.array([1.0 / np.fft.rfft(a, length) for a in fits])
     orders = tuple(len(a) - 1 for a in fits)
     edges = _edges(cross.shape[2], max(1, _BINS * length // max(samples, length)))
@@ -228,7 +230,8 @@ def _correlated(flat: Complex, mean: Complex, length: int, samples: int) -> bool
     Of channels that are independent, coherence over n frequencies exceeds c with probability exp(-n c) at most.
     """
     apart = ~np.eye(len(flat), dtype=bool)
-    covariance = np.fft.irfft(flat[apart], length, axis=1)[:, [*range(_LAGS), *range(-_LAGS, 0)]]
+    lags = min(_LAGS, length // 2)
+    covariance = np.fft.irfft(flat[apart], length, axis=1)[:, [*range(lags), *range(-lags, 0)]]
     power = np.einsum("jjf->jf", flat).real.mean(axis=1)
     if np.any(np.abs(covariance) * np.sqrt(samples) > _CROSS * np.sqrt(power[:, None] * power)[apart][:, None]):
         return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,6 +70,17 @@ def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     np.testing.assert_allclose(every.ratio, mean.ratio, rtol=0.02)
     said = [bps_report(found).verdict.partition("the residual is ")[2].partition(" times")[0] for found in both]
     assert said[0] == said[1] != ""
+
+
+@pytest.mark.parametrize("period", [0.2, 0.01])
+def test_a_wrong_period_is_told_and_changes_no_estimate(period: float) -> None:
+    """T10 where a mean was asked for; and in either way what a log without a period gives."""
+    log = periodic(0, 3)
+    none = estimated(replace(log, period=None))
+    for average in (True, False):
+        found = estimated(replace(log, period=period), average=average)
+        assert any(check.message.startswith("its periods are not averaged") for check in found.doctor if check.code == "RRID-T10") is average
+        np.testing.assert_allclose(std_of(found), std_of(none), rtol=1e-9)
 
 
 def test_a_touch_that_is_kept_is_named() -> None:

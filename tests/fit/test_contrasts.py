@@ -118,6 +118,15 @@ def test_a_turn_changes_no_estimate() -> None:
     np.testing.assert_array_equal(after.counts, before.counts)
 
 
+@pytest.mark.parametrize("phases", [2, 9, 30])
+def test_a_period_of_few_equations_is_no_obstacle(phases: int) -> None:
+    """No autoregression looks further back than a block is long; noise that remembers for ten periods asks it to."""
+    one = problem(samples=2000)
+    blocks = one.blocks(one.clean + autoregressive(np.random.default_rng(0), 2000, 0.99))
+    solution = fit(blocks).solution
+    assert np.isfinite(robust_covariance(turned(blocks, phases=phases), solution, phases).std).all()
+
+
 def test_what_repeats_nothing_passes_as_it_is() -> None:
     one = problem(samples=300)
     blocks = one.blocks(one.clean, 150)

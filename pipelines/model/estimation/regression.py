@@ -195,7 +195,15 @@ class LogEquations:
 
     def times(self) -> Array:
         """The time of every equation [s]."""
-        return np.asarray(self.found.motion.t[self.found.good.kept[np.concatenate([self._moments(run) for run in self.runs])]])
+        return np.asarray(self.found.motion.t[self._rows_of_motion])
+
+    def postures(self) -> Array:
+        """(samples, joints) the position at every equation [rad or m]."""
+        return np.asarray(self.found.motion.q[self._rows_of_motion])
+
+    @property
+    def _rows_of_motion(self) -> npt.NDArray[np.intp]:
+        return np.asarray(self.found.good.kept[np.concatenate([self._moments(run) for run in self.runs])])
 
     def _moments(self, run: slice) -> npt.NDArray[np.intp]:
         """Samples of the mended log that make equations of any joint."""
