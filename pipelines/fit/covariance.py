@@ -122,7 +122,7 @@ def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
             mixed = np.zeros((len(used), bins), dtype=np.complex128)
             for j in felt:
                 mixed[np.searchsorted(used, block.columns[j])] += block.spectra[j] * factors[j]
-        real = mixed.view(np.float64)
+        real = np.ascontiguousarray(mixed).view(np.float64)  # of columns stored with samples slowest it is not
         meat[np.ix_(used, used)] += real @ real.T
     return meat
 
