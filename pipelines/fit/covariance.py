@@ -54,6 +54,12 @@ class Robust:
     def std(self) -> Array:
         return np.sqrt(np.diag(self.covariance))
 
+    def at_least(self, other: Robust) -> Robust:
+        """The same, no parameter surer than `other` has it: D C D with D = diag(max(1, std_other / std)), positive as C is."""
+        known = np.isfinite(self.std) & (self.std > 0.0)
+        wider = np.where(known, np.maximum(1.0, other.std / np.where(known, self.std, 1.0)), 1.0)
+        return Robust(wider[:, None] * self.covariance * wider, self.white and other.white, self.inflation * wider, self.orders)
+
 
 @dataclass(frozen=True, eq=False)
 class _Noise:

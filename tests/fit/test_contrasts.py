@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import helmert
 
 from pipelines.fit.contrasts import CONTRAST, MEAN, Contrasted, Cycle
-from pipelines.fit.covariance import robust_covariance
+from pipelines.fit.covariance import Robust, robust_covariance
 from pipelines.fit.equations import Array, Block
 from pipelines.fit.least_squares import fit, solve
 from pipelines.fit.statistics import gather
@@ -60,6 +60,40 @@ def test_truth_lies_within_two_standard_deviations(repeats: float, noise: float,
     z, _ = scores(repeats, noise, memory, unlike)
     assert 0.92 <= covered(z) <= 0.98
     assert 0.9 < z.std() < 1.1
+
+
+@pytest.mark.parametrize(("phases", "periods", "memory"), [
+    pytest.param(500, 8, 0.95, id="half a second"),
+    pytest.param(400, 10, 0.8, id="400 phases"),
+    pytest.param(1000, 5, 0.99, id="a memory of 100", marks=pytest.mark.slow),
+    pytest.param(200, 20, 0.95, id="200 phases", marks=pytest.mark.slow)])
+def test_noise_that_remembers_long_beside_a_period(phases: int, periods: int, memory: float) -> None:
+    """Columns that jump from the end of a period to its beginning: turned alone would tell too little, and the larger holds."""
+    period, alone, larger = problem(samples=phases), [], []
+    one = Problem(np.tile(period.Y, (periods, 1, 1)), period.beta)
+    for seed in range(SEEDS // 2):
+        blocks = one.blocks(one.clean + autoregressive(np.random.default_rng(seed), len(one.Y), memory))
+        solution = fit(blocks).solution
+        every = robust_covariance(blocks, solution, len(one.Y))
+        own = robust_covariance(turned(blocks, phases=phases), solution, phases)
+        alone.append((solution.beta - one.beta) / own.std)
+        larger.append((solution.beta - one.beta) / own.at_least(every).std)
+    assert np.std(alone) > 1.03
+    assert 0.9 < np.std(larger) < 1.1
+    assert covered(np.array(larger)) >= 0.92
+
+
+def test_the_larger_of_two_is_a_covariance() -> None:
+    """Deviations of the one or the other, correlations those of the first, what nothing shows infinite."""
+    rng = np.random.default_rng(0)
+    one, other = (Robust(x @ x.T, False, np.ones(4), ()) for x in rng.standard_normal((2, 4, 6)))
+    one.covariance[3] = one.covariance[:, 3] = other.covariance[3] = other.covariance[:, 3] = np.inf
+    both = one.at_least(other)
+    np.testing.assert_allclose(both.std, np.maximum(one.std, other.std))
+    assert not np.array_equal(both.std, one.std)
+    correlation = [x.covariance[:3, :3] / x.std[:3] / x.std[:3, None] for x in (one, both)]
+    np.testing.assert_allclose(correlation[0], correlation[1])
+    np.testing.assert_allclose(both.inflation, np.append(both.std[:3] / one.std[:3], 1.0))
 
 
 def test_what_repeats_is_no_news() -> None:
