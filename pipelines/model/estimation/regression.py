@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.fit.contrasts import MEAN
+from pipelines.fit.contrasts import of_mean
 from pipelines.fit.equations import Block
 from pipelines.log.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
@@ -215,7 +215,8 @@ class LogEquations:
     def _of_run(self, run: slice) -> Iterator[Block]:
         for _, values, y, used in self._pieces(run):
             if len(y[0]):
-                yield Block(len(self.columns.names), self._places, values, y, used, 0 if self.found.mean is None else MEAN)
+                noise = 0 if self.found.mean is None else of_mean(self.repeats)
+                yield Block(len(self.columns.names), self._places, values, y, used, noise)
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.intp], ...]:
