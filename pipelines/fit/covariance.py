@@ -164,7 +164,7 @@ def _noise(sums: _Sums, solution: Solution, length: int) -> _Noise:
     fits = [_autoregression(g, samples, most) for g in gamma]
     shape = np.array([1.0 / np.fft.rfft(a, length) for a in fits])
     orders = tuple(len(a) - 1 for a in fits)
-    edges = _edges(cross.shape[2], max(1, _BINS * length // max(samples, length)))
+    edges = _edges(cross.shape[2], max(1, _BINS * length // samples))  # n samples have n / 2 frequencies of their own
     left = np.sqrt(1.0 - np.minimum(_mean(sums.leverage / counts[:, None], edges), _MOST_TAKEN))
     flat = cross / (shape[:, None] * np.conj(shape))
     mean = _mean(flat, edges) / (left[:, None] * left)
