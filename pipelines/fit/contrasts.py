@@ -15,9 +15,10 @@ periods, or of none, have another: √M e is as strong as M is great. Periods ne
 each time is in the columns of the contrasts.
 
 The limit: noise that is not white runs on from the end of a period into the next, and so from a contrast to the mean and to the
-contrast after it. Taken for independent they tell too little where noise remembers for more than some hundredths of a period:
-standard deviations 1.4 times too small at a twenty-fifth, 2 times at a tenth, where columns jump from one period to the next.
-`Robust.at_least` sets that right by what the periods tell in the order of time.
+contrast after it. Taken for independent they tell too little where noise remembers long beside a period and columns jump from
+its end to its beginning: standard deviations 1.4 times too small at a twenty-fifth of one of 8 periods, 2 times at a tenth of
+one of 20. `Robust.at_least` sets that right by what the periods tell in the order of time. An error that repeats, remembers as
+long and meets such jumps stays that much beyond what is told: one short period says little of its own spectrum.
 
 Memory: one period of columns and its transform, however many there are; so it grows with the period, not with the log.
 """

@@ -13,6 +13,8 @@ cross-spectrum S is estimated, far fewer numbers from the same samples, so that 
 S is prewhitened by an autoregression of each channel (Andrews & Monahan 1992), then averaged over bands: an autoregression
 alone misses what a sharp filter does, averages alone smear a peak. Blocks of another `noise` have an S of their own, and a
 part of M: so have the means of periods and the contrasts between them (`contrasts.py`).
+
+Memory: the transform of one block, every block padded to the longest; of a motion that repeats that is a period.
 """
 
 from __future__ import annotations

@@ -4,6 +4,9 @@
     found.convergence()                     how the parameters settled
 
 Kostić et al. 2004, eq. (12)-(15): the equations of all logs stacked, joints weighted by their own residual.
+
+Memory is constant in the samples, but for logs whose motion repeats: the covariance holds a period of equations of each, one
+log after the other, so it grows with the period. A kept set of equations is `_KEPT_IN_MEMORY` at most.
 """
 
 from __future__ import annotations

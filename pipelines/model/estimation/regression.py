@@ -1,7 +1,8 @@
 """The equations a fit takes from a log: τ = Y β, everything in them averaged, filtered and thinned out alike.
 
     model = nominal_columns(body, laws)                 which columns: rigid body, friction laws at every joint
-    for block in LogEquations(model, motion, ...):      iterate as often as needed; memory constant in the samples
+    for block in LogEquations(model, motion, ...):      iterate as often as needed; memory constant in the samples;
+                                                        the covariance of a motion that repeats holds a period
 
 Kostić et al. 2004, eq. (12)-(14). A held command acts from its sample to the next, so that beside states at t_k it comes
 half a sample late: ½ (τ_k + τ_{k-1}) is centred, and the same average is taken of every column. The low-pass is
