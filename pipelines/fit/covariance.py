@@ -13,6 +13,8 @@ cross-spectrum S is estimated, far fewer numbers from the same samples, so that 
 S is prewhitened by an autoregression of each channel (Andrews & Monahan 1992), then averaged over bands: an autoregression
 alone misses what a sharp filter does, averages alone smear a peak. Blocks of another `noise` have an S of their own, and a
 part of M: so have the means of periods and the contrasts between them (`contrasts.py`).
+
+Memory: the transform of one block, every block padded to the longest; of a motion that repeats that is a period.
 """
 
 from __future__ import annotations
@@ -53,6 +55,12 @@ class Robust:
     @property
     def std(self) -> Array:
         return np.sqrt(np.diag(self.covariance))
+
+    def at_least(self, other: Robust) -> Robust:
+        """The same, no parameter surer than `other` has it: D C D with D = diag(max(1, std_other / std)), positive as C is."""
+        known = np.isfinite(self.std) & (self.std > 0.0)
+        wider = np.where(known, np.maximum(1.0, other.std / np.where(known, self.std, 1.0)), 1.0)
+        return Robust(wider[:, None] * self.covariance * wider, self.white and other.white, self.inflation * wider, self.orders)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +130,7 @@ def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
             mixed = np.zeros((len(used), bins), dtype=np.complex128)
             for j in felt:
                 mixed[np.searchsorted(used, block.columns[j])] += block.spectra[j] * factors[j]
-        real = mixed.view(np.float64)
+        real = np.ascontiguousarray(mixed).view(np.float64)  # of columns stored with samples slowest it is not
         meat[np.ix_(used, used)] += real @ real.T
     return meat
 
@@ -131,7 +139,7 @@ class _Sums:
     """What blocks of one noise add up to."""
 
     def __init__(self, channels: int, bins: int) -> None:
-        self.samples, self.counts = 0, np.zeros(channels)
+        self.samples, self.longest, self.counts = 0, 0, np.zeros(channels)
         self.cross = np.zeros((channels, channels, bins), dtype=np.complex128)
         self.leverage = np.zeros((channels, bins))
 
@@ -145,7 +153,8 @@ def _noises(equations: Iterable[Block], solution: Solution, length: int) -> tupl
         own.cross += spectrum[:, None] * np.conj(spectrum)
         transformed = _transform(block, length)
         own.leverage += _leverage(transformed, solution)
-        own.samples, own.counts, blocks = own.samples + block.samples, own.counts + block.counts, blocks + 1
+        own.samples, own.longest = own.samples + block.samples, max(own.longest, block.samples)
+        own.counts, blocks = own.counts + block.counts, blocks + 1
     return {noise: _noise(own, solution, length) for noise, own in found.items()}, transformed if blocks == 1 else None
 
 
@@ -153,10 +162,11 @@ def _noise(sums: _Sums, solution: Solution, length: int) -> _Noise:
     samples, counts, channels = sums.samples, np.maximum(sums.counts, 1.0), len(sums.counts)
     cross = sums.cross / np.sqrt(counts[:, None] * counts)[:, :, None]  # equations left out have no noise
     gamma = np.fft.irfft(cross[np.arange(channels), np.arange(channels)], length, axis=1)
-    fits = [_autoregression(g, samples, min(_ORDER, samples // 20)) for g in gamma]
+    most = min(_ORDER, samples // 20, sums.longest // 2)  # what is further apart than a block is long, no block tells
+    fits = [_autoregression(g, samples, most) for g in gamma]
     shape = np.array([1.0 / np.fft.rfft(a, length) for a in fits])
     orders = tuple(len(a) - 1 for a in fits)
-    edges = _edges(cross.shape[2], max(1, _BINS * length // max(samples, length)))
+    edges = _edges(cross.shape[2], max(1, _BINS * length // samples))  # n samples have n / 2 frequencies of their own
     left = np.sqrt(1.0 - np.minimum(_mean(sums.leverage / counts[:, None], edges), _MOST_TAKEN))
     flat = cross / (shape[:, None] * np.conj(shape))
     mean = _mean(flat, edges) / (left[:, None] * left)
@@ -228,7 +238,8 @@ def _correlated(flat: Complex, mean: Complex, length: int, samples: int) -> bool
     Of channels that are independent, coherence over n frequencies exceeds c with probability exp(-n c) at most.
     """
     apart = ~np.eye(len(flat), dtype=bool)
-    covariance = np.fft.irfft(flat[apart], length, axis=1)[:, [*range(_LAGS), *range(-_LAGS, 0)]]
+    lags = min(_LAGS, length // 2)
+    covariance = np.fft.irfft(flat[apart], length, axis=1)[:, [*range(lags), *range(-lags, 0)]]
     power = np.einsum("jjf->jf", flat).real.mean(axis=1)
     if np.any(np.abs(covariance) * np.sqrt(samples) > _CROSS * np.sqrt(power[:, None] * power)[apart][:, None]):
         return True

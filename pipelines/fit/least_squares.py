@@ -6,6 +6,7 @@
 
 Kostić et al. 2004, eq. (12)-(15), with every channel weighted by its own residual. Normal equations with unit columns;
 where their condition number exceeds 1e4 the stream is read again into triangular factors, which lose half as many digits.
+The covariance of a motion that repeats needs more: a period at once (`contrasts.py`).
 """
 
 from __future__ import annotations

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from pipelines.report.bps_report import bps_report
 from tests.estimate_bps.test_periods import deviation, estimated, of_periods, only, std_of
 from tests.model.estimation.experiments import periodic
 
-PERIODS, REPLICAS = 4, 8
+PERIODS, REPLICAS, FEW = 4, 8, 3
 Spoil = Callable[[Array, Array], None]
 
 
@@ -29,19 +31,22 @@ def cogging(seed: int) -> Spoil:
     return spoil
 
 
-def replicas(spoil: Callable[[int], Spoil | None], average: bool) -> list[Result]:
-    return [estimated(periodic(seed, PERIODS, spoil=spoil(seed)), average=average) for seed in range(REPLICAS)]
+def replicas(spoil: Callable[[int], Spoil | None], average: bool, arms: int = REPLICAS) -> list[Result]:
+    return [estimated(periodic(seed, PERIODS, spoil=spoil(seed)), average=average) for seed in range(arms)]
 
 
 def spread(found: list[Result]) -> Array:
     return np.asarray(np.sqrt(np.mean([std_of(one) ** 2 for one in found], axis=0)))
 
 
-@pytest.mark.parametrize("spoil", [cogging, pytest.param(lambda seed: None, id="noise alone")])
-def test_the_scatter_is_what_is_told(spoil: Callable[[int], Spoil | None]) -> None:
-    """Over eight arms, whether their torque ripples or is what the model says: with every period taken for news, ripple would
-    leave errors of two standard deviations."""
-    z = np.array([deviation(found) for found in replicas(spoil, False)])
+@pytest.mark.parametrize(("spoil", "arms"), [
+    pytest.param(cogging, FEW, id="cogging"),
+    pytest.param(cogging, REPLICAS, id="cogging, eight arms", marks=pytest.mark.slow),
+    pytest.param(lambda seed: None, REPLICAS, id="noise alone, eight arms", marks=pytest.mark.slow)])
+def test_the_scatter_is_what_is_told(spoil: Callable[[int], Spoil | None], arms: int) -> None:
+    """Whether their torque ripples or is what the model says: with every period taken for news, ripple would leave errors of
+    two standard deviations."""
+    z = np.array([deviation(found) for found in replicas(spoil, False, arms)])
     assert 0.75 < np.sqrt(np.mean(z**2)) < 1.3
     assert np.mean(np.abs(z) < 2.0) > 0.9
 
@@ -69,6 +74,19 @@ def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     np.testing.assert_allclose(every.ratio, mean.ratio, rtol=0.02)
     said = [bps_report(found).verdict.partition("the residual of the fitted logs is ")[2].partition(" times")[0] for found in both]
     assert said[0] == said[1] != ""
+
+
+@pytest.mark.parametrize(("periods", "averages"), [
+    ((0.2,), (True,)), pytest.param((0.2, 0.1, 0.01, 7.3), (True, False), marks=pytest.mark.slow)])
+def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float], averages: Sequence[bool]) -> None:
+    """T10 where a mean was asked for; and in either way what a log without a period gives."""
+    log = periodic(0, 2)
+    none = estimated(replace(log, period=None))
+    for period, average in product(periods, averages):
+        found = estimated(replace(log, period=period), average=average)
+        said = [check for check in found.doctor if check.message.startswith("its periods are not averaged")]
+        assert [check.code for check in said] == ["RRID-T10"] * average
+        np.testing.assert_allclose(std_of(found), std_of(none), rtol=1e-9)
 
 
 def test_a_touch_that_is_kept_is_named() -> None:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy.linalg import helmert
 
-from pipelines.fit.contrasts import CONTRAST, MEAN, Contrasted, Cycle
-from pipelines.fit.covariance import robust_covariance
+from pipelines.fit.contrasts import CONTRAST, MEAN, Contrasted, Cycle, of_mean
+from pipelines.fit.covariance import Robust, robust_covariance
 from pipelines.fit.equations import Array, Block
 from pipelines.fit.least_squares import fit, solve
 from pipelines.fit.statistics import gather
 from tests.fit.problems import CHANNELS, SIGMA, Problem, autoregressive, problem, white
 
-PERIODS, PHASES, SEEDS = 4, 2500, 200
+PERIODS, PHASES = 4, 2500
+SEEDS, MORE = 50, 200  # of every run; of the long campaigns
 
 
 def turned(blocks: list[Block], phase: Array | None = None, phases: int = PHASES) -> Contrasted:
@@ -31,17 +33,19 @@ def repeating(unlike: float = 0.0) -> Problem:
     return Problem(Y + unlike * problem(seed=3, samples=len(Y)).Y * (Y != 0.0), one.beta)
 
 
-def scores(repeats: float, noise: float, memory: float = 0.95, unlike: float = 0.0) -> tuple[Array, Array]:
+@lru_cache(maxsize=1)
+def scores(seeds: int, repeats: float, noise: float, memory: float, unlike: float) -> tuple[Array, Array]:
     """Errors over standard deviations (seeds, parameters): by phases, and as if every period were news."""
     one, own, pooled = repeating(unlike), [], []
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         rng = np.random.default_rng(seed)
         lacks = np.tile(autoregressive(rng, PHASES, memory), (PERIODS, 1))
         blocks = one.blocks(one.clean + repeats * lacks + noise * autoregressive(rng, len(one.Y), memory))
         fitted = fit(blocks)
         off = fitted.solution.beta - one.beta
-        own.append(off / robust_covariance(turned(blocks), fitted.solution, PHASES).std)
-        pooled.append(off / robust_covariance(blocks, fitted.solution, fitted.statistics.longest).std)
+        every = robust_covariance(blocks, fitted.solution, fitted.statistics.longest)
+        own.append(off / robust_covariance(turned(blocks), fitted.solution, PHASES).at_least(every).std)
+        pooled.append(off / every.std)
     return np.array(own), np.array(pooled)
 
 
@@ -49,22 +53,58 @@ def covered(z: Array) -> float:
     return float(np.mean(np.abs(z) < 2.0))
 
 
-@pytest.mark.parametrize(("repeats", "noise", "memory", "unlike"), [
-    pytest.param(0.0, 1.0, 0.95, 0.0, id="noise alone"),
-    pytest.param(1.0, 0.1, 0.95, 0.0, id="it repeats"),
-    *(pytest.param(*other, id=name, marks=pytest.mark.slow) for name, other in {
+@pytest.mark.parametrize(("seeds", "repeats", "noise", "memory", "unlike"), [
+    pytest.param(SEEDS, 0.0, 1.0, 0.95, 0.0, id="noise alone"),
+    pytest.param(SEEDS, 1.0, 0.1, 0.95, 0.0, id="it repeats"),
+    *(pytest.param(MORE, *other, id=f"{name}, {MORE}", marks=pytest.mark.slow) for name, other in {
+        "noise alone": (0.0, 1.0, 0.95, 0.0), "it repeats": (1.0, 0.1, 0.95, 0.0),
         "both": (1.0, 1.0, 0.95, 0.0), "white noise alone": (0.0, 1.0, 0.0, 0.0), "white, repeats": (1.0, 0.1, 0.0, 0.0),
         "noise, periods unlike": (0.0, 1.0, 0.95, 1.0), "both, periods unlike": (1.0, 1.0, 0.95, 1.0)}.items())])
-def test_truth_lies_within_two_standard_deviations(repeats: float, noise: float, memory: float, unlike: float) -> None:
+def test_truth_lies_within_two_standard_deviations(seeds: int, repeats: float, noise: float, memory: float,
+                                                   unlike: float) -> None:
     """In 92-98 % of all cases, of noise alone as well as of an error that is the same in every period."""
-    z, _ = scores(repeats, noise, memory, unlike)
+    z, _ = scores(seeds, repeats, noise, memory, unlike)
     assert 0.92 <= covered(z) <= 0.98
     assert 0.9 < z.std() < 1.1
 
 
+@pytest.mark.parametrize(("phases", "periods", "memory"), [
+    pytest.param(500, 8, 0.95, id="half a second"),
+    pytest.param(400, 10, 0.8, id="400 phases"),
+    pytest.param(1000, 5, 0.99, id="a memory of 100", marks=pytest.mark.slow),
+    pytest.param(200, 20, 0.95, id="200 phases", marks=pytest.mark.slow)])
+def test_noise_that_remembers_long_beside_a_period(phases: int, periods: int, memory: float) -> None:
+    """Columns that jump from the end of a period to its beginning: turned alone would tell too little, and the larger holds."""
+    period, alone, larger = problem(samples=phases), [], []
+    one = Problem(np.tile(period.Y, (periods, 1, 1)), period.beta)
+    for seed in range(SEEDS):
+        blocks = one.blocks(one.clean + autoregressive(np.random.default_rng(seed), len(one.Y), memory))
+        solution = fit(blocks).solution
+        every = robust_covariance(blocks, solution, len(one.Y))
+        own = robust_covariance(turned(blocks, phases=phases), solution, phases)
+        alone.append((solution.beta - one.beta) / own.std)
+        larger.append((solution.beta - one.beta) / own.at_least(every).std)
+    assert np.std(alone) > 1.03
+    assert 0.9 < np.std(larger) < 1.1
+    assert covered(np.array(larger)) >= 0.92
+
+
+def test_the_larger_of_two_is_a_covariance() -> None:
+    """Deviations of the one or the other, correlations those of the first, what nothing shows infinite."""
+    rng = np.random.default_rng(0)
+    one, other = (Robust(x @ x.T, False, np.ones(4), ()) for x in rng.standard_normal((2, 4, 6)))
+    one.covariance[3] = one.covariance[:, 3] = other.covariance[3] = other.covariance[:, 3] = np.inf
+    both = one.at_least(other)
+    np.testing.assert_allclose(both.std, np.maximum(one.std, other.std))
+    assert not np.array_equal(both.std, one.std)
+    correlation = [x.covariance[:3, :3] / x.std[:3] / x.std[:3, None] for x in (one, both)]
+    np.testing.assert_allclose(correlation[0], correlation[1])
+    np.testing.assert_allclose(both.inflation, np.append(both.std[:3] / one.std[:3], 1.0))
+
+
 def test_what_repeats_is_no_news() -> None:
     """What the turn is for: four periods taken for independent tell deviations smaller by 2 than the scatter is."""
-    z, pooled = scores(1.0, 0.1)
+    z, pooled = scores(SEEDS, 1.0, 0.1, 0.95, 0.0)
     assert pooled.std() / z.std() == pytest.approx(np.sqrt(PERIODS), rel=0.1)
     assert covered(pooled) < 0.7
 
@@ -95,7 +135,7 @@ def test_contrasts_are_those_of_helmert() -> None:
     y = one.clean + white(np.random.default_rng(0), 200)
     out = list(turned(one.blocks(y, 70), phases=50))
     whole = np.einsum("km,mpj->kpj", helmert(4, full=True), y.reshape(4, 50, CHANNELS))
-    means = [block for block in out if block.noise == MEAN]
+    means = [block for block in out if block.noise == of_mean(4)]
     assert len(means) == 1
     np.testing.assert_allclose(np.array(means[0].y).T, whole[0], atol=1e-12)
     rest = np.concatenate([np.array(block.y) for block in out if block.noise == CONTRAST], axis=1)
@@ -118,36 +158,63 @@ def test_a_turn_changes_no_estimate() -> None:
     np.testing.assert_array_equal(after.counts, before.counts)
 
 
+@pytest.mark.parametrize("phases", [2, 9, 30])
+def test_a_period_of_few_equations_is_no_obstacle(phases: int) -> None:
+    """No autoregression looks further back than a block is long; noise that remembers for ten periods asks it to."""
+    one = problem(samples=600)
+    blocks = one.blocks(one.clean + autoregressive(np.random.default_rng(0), 600, 0.99))
+    solution = fit(blocks).solution
+    assert np.isfinite(robust_covariance(turned(blocks, phases=phases), solution, phases).std).all()
+
+
 def test_what_repeats_nothing_passes_as_it_is() -> None:
     one = problem(samples=300)
     blocks = one.blocks(one.clean, 150)
     both = Contrasted(lambda: enumerate(blocks), (None, Cycle(np.arange(150) % 50, 50)))
     out = list(both)
     assert out[0] is blocks[0]
-    assert [block.noise for block in out[1:]] == [CONTRAST, CONTRAST, MEAN]
+    assert [block.noise for block in out[1:]] == [CONTRAST, CONTRAST, of_mean(3)]
     assert both.longest(150) == 150
 
 
-def test_logs_of_one_period_beside_one_of_several() -> None:
+@pytest.mark.parametrize(("way", "seeds"), [
+    ("mean", SEEDS // 2), *(pytest.param(way, MORE // 2, marks=pytest.mark.slow) for way in ("mean", "every sample"))])
+def test_logs_of_one_period_beside_one_of_several(way: str, seeds: int) -> None:
     """An error in each: what is told of both together holds, as it does where the log of several gives its mean alone.
 
     With one spectrum for all, that log would seem to be as near to the truth as its weight says.
     """
     one, logs = problem(samples=PHASES), 3
-    told: dict[str, list[Array]] = {"every sample": [], "mean": [], "one spectrum": []}
-    for seed in range(SEEDS // 2):
+    told: dict[str, list[Array]] = {"its own": [], "one spectrum": []}
+    for seed in range(seeds):
         rng = np.random.default_rng(seed)
         single = [one.blocks(one.clean + autoregressive(rng, PHASES))[0] for _ in range(logs)]
         y = np.tile(one.clean + autoregressive(rng, PHASES), (PERIODS, 1)) + 0.05 * white(rng, PERIODS * PHASES)
-        several = repeating().blocks(y)
-        every = list(Contrasted(lambda several=several: ((0, block) for block in several),  # type: ignore[misc]
-                                (Cycle(np.arange(len(y)) % PHASES, PHASES),)))
-        ways = {"every sample": [*single, *every], "mean": [*single, *(block for block in every if block.noise == MEAN)]}
-        ways["one spectrum"] = [replace(block, noise=0) for block in ways["mean"]]
-        for way, blocks in ways.items():
-            found = fit(blocks).solution
-            told[way].append((found.beta - one.beta) / robust_covariance(blocks, found, PHASES).std)
-    z = {way: float(np.std(scores)) for way, scores in told.items()}
-    assert 0.9 < z["every sample"] < 1.1
-    assert 0.9 < z["mean"] < 1.1
+        turn = turned(repeating().blocks(y))
+        blocks = [*single, *(block for block in turn if way == "every sample" or block.noise == of_mean(PERIODS))]
+        found = fit(blocks).solution
+        for spectrum, used in {"its own": blocks, "one spectrum": [replace(block, noise=0) for block in blocks]}.items():
+            told[spectrum].append((found.beta - one.beta) / robust_covariance(used, found, PHASES).std)
+    z = {spectrum: float(np.std(scores)) for spectrum, scores in told.items()}
+    assert 0.9 < z["its own"] < 1.1
     assert z["one spectrum"] > 1.2
+
+
+def test_logs_of_two_periods_beside_one_of_thirty() -> None:
+    """√M times the same error: one spectrum of all means would be that of none of them."""
+    counts = (2, 2, 30)
+    one = problem(samples=PHASES)
+    told: dict[str, list[Array]] = {"each": [], "one spectrum": []}
+    for seed in range(SEEDS):
+        rng = np.random.default_rng(seed)
+        blocks = []
+        for count in counts:
+            noise = autoregressive(rng, PHASES) + 0.05 / np.sqrt(count) * white(rng, PHASES)
+            (mean,) = Problem(np.sqrt(count) * one.Y, one.beta).blocks(np.sqrt(count) * (one.clean + noise))
+            blocks.append(replace(mean, noise=of_mean(count)))
+        found = fit(blocks).solution
+        for way, used in {"each": blocks, "one spectrum": [replace(block, noise=MEAN) for block in blocks]}.items():
+            told[way].append((found.beta - one.beta) / robust_covariance(used, found, PHASES).std)
+    z = {way: float(np.std(scores)) for way, scores in told.items()}
+    assert 0.9 < z["each"] < 1.1
+    assert z["one spectrum"] > 1.4

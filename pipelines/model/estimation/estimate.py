@@ -4,6 +4,9 @@
     found.convergence()                     how the parameters settled
 
 Kostić et al. 2004, eq. (12)-(15): the equations of all logs stacked, joints weighted by their own residual.
+
+Memory is constant in the samples, but for logs whose motion repeats: the covariance holds a period of equations of each, one
+log after the other, so it grows with the period. A kept set of equations is `_KEPT_IN_MEMORY` at most.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from pipelines.fit.convergence import Convergence, convergence
 from pipelines.fit.covariance import Robust, robust_covariance
 from pipelines.fit.equations import Block, split
 from pipelines.fit.identifiability import Unresolved, condition_number, typical_size, unresolved, visible
-from pipelines.fit.least_squares import Solution, fit
+from pipelines.fit.least_squares import Fit, Solution, fit
 from pipelines.fit.statistics import Statistics, gather, gather_growing
 from pipelines.model.estimation.cycle import cycle_of
 from pipelines.model.estimation.regression import Columns
@@ -113,6 +116,18 @@ def estimate(logs: Sequence[Iterable[Block]], columns: Columns, weighted: bool =
     gram = gather(stacked)
     weights = None if weighted else np.ones(columns.body.robot.n_joints)
     fitted = fit(stacked, weights=weights, gram=gram)
-    turned = Contrasted(stacked.numbered, tuple(map(cycle_of, logs)))
-    robust = robust_covariance(turned, fitted.solution, turned.longest(fitted.statistics.longest))
-    return Estimate(columns, fitted.solution, robust, fitted.statistics, stacked)
+    return Estimate(columns, fitted.solution, _robust(stacked, fitted), fitted.statistics, stacked)
+
+
+def _robust(stacked: Stacked, fitted: Fit) -> Robust:
+    """The covariance; where a motion repeats, no smaller than that of its periods one after the other.
+
+    Turned by phases it knows what repeats, but takes a period for all that its noise remembers; in the order of time it is the
+    other way round. Each tells too little where the other holds, and where both hold they agree.
+    """
+    every = robust_covariance(stacked, fitted.solution, fitted.statistics.longest)
+    cycles = tuple(map(cycle_of, stacked.logs))
+    if all(cycle is None for cycle in cycles):
+        return every
+    turned = Contrasted(stacked.numbered, cycles)
+    return robust_covariance(turned, fitted.solution, turned.longest(fitted.statistics.longest)).at_least(every)

@@ -1,7 +1,8 @@
 """The equations a fit takes from a log: τ = Y β, everything in them averaged, filtered and thinned out alike.
 
     model = nominal_columns(body, laws)                 which columns: rigid body, friction laws at every joint
-    for block in LogEquations(model, motion, ...):      iterate as often as needed; memory constant in the samples
+    for block in LogEquations(model, motion, ...):      iterate as often as needed; memory constant in the samples;
+                                                        the covariance of a motion that repeats holds a period
 
 Kostić et al. 2004, eq. (12)-(14). A held command acts from its sample to the next, so that beside states at t_k it comes
 half a sample late: ½ (τ_k + τ_{k-1}) is centred, and the same average is taken of every column. The low-pass is
@@ -17,7 +18,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.fit.contrasts import MEAN
+from pipelines.fit.contrasts import of_mean
 from pipelines.fit.equations import Block
 from pipelines.log.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
@@ -195,7 +196,15 @@ class LogEquations:
 
     def times(self) -> Array:
         """The time of every equation [s]."""
-        return np.asarray(self.found.motion.t[self.found.good.kept[np.concatenate([self._moments(run) for run in self.runs])]])
+        return np.asarray(self.found.motion.t[self._rows_of_motion])
+
+    def postures(self) -> Array:
+        """(samples, joints) the position at every equation [rad or m]."""
+        return np.asarray(self.found.motion.q[self._rows_of_motion])
+
+    @property
+    def _rows_of_motion(self) -> npt.NDArray[np.intp]:
+        return np.asarray(self.found.good.kept[np.concatenate([self._moments(run) for run in self.runs])])
 
     def _moments(self, run: slice) -> npt.NDArray[np.intp]:
         """Samples of the mended log that make equations of any joint."""
@@ -207,7 +216,8 @@ class LogEquations:
     def _of_run(self, run: slice) -> Iterator[Block]:
         for _, values, y, used in self._pieces(run):
             if len(y[0]):
-                yield Block(len(self.columns.names), self._places, values, y, used, 0 if self.found.mean is None else MEAN)
+                noise = 0 if self.found.mean is None else of_mean(self.repeats)
+                yield Block(len(self.columns.names), self._places, values, y, used, noise)
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.intp], ...]:

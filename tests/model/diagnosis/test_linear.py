@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import scipy.linalg
+import scipy.signal
 
 from pipelines.model.diagnosis.linear import covariance, deviations, left_out, solved, superfluous
 
@@ -118,3 +120,22 @@ def test_what_one_block_alone_tells_has_no_say() -> None:
     residual -= solved(table, residual) @ table
     found = left_out(table, residual, np.arange(400) // 50)
     assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("rows", [400, 21, 20, 9, 2])
+def test_the_covariance_is_the_sum_of_newey_and_west(rows: int) -> None:
+    """Products of rows up to 20 apart, one by one, fewer where there are no more:
+
+        C Σ_t Σ_s max(0, 1 - |t - s| / 21) r_t r_s x_t x_sᵀ C,    C = (Σ_t x_t x_tᵀ)⁻¹
+    """
+    rng = np.random.default_rng(4)
+    table = rng.standard_normal((2, rows)) * np.array([[1.0], [1e3]])
+    residual = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal(rows))
+    meat = np.zeros((2, 2))
+    for t in range(rows):
+        for s in range(max(0, t - 20), min(rows, t + 21)):
+            meat += (1.0 - abs(t - s) / 21.0) * residual[t] * residual[s] * np.outer(table[:, t], table[:, s])
+    bread = np.linalg.inv(table @ table.T)
+    expected, found = bread @ meat @ bread, covariance(table, residual)
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(found / size / size[:, None], expected / size / size[:, None], atol=1e-9)

@@ -58,3 +58,17 @@ def test_a_period_that_comes_once_has_no_cycle() -> None:
     assert cycle_of(equations(periodic(0, 1))) is None
     assert cycle_of(equations(replace(log, period=None))) is None
     assert cycle_of([]) is None
+
+
+@pytest.mark.parametrize("period", [0.01, 0.2, 7.3, 9.5])
+def test_a_wrong_period_makes_no_cycle(period: float) -> None:
+    """Of the 10 s of the motion: too few phases, or postures of one phase that have nothing in common."""
+    assert cycle_of(equations(replace(periodic(0, 3), period=period))) is None
+
+
+def test_a_joint_that_rests_hinders_no_cycle() -> None:
+    """What it does is noise, and another each time."""
+    log = periodic(0, 2)
+    q = log.q.copy()
+    q[:, 0] = 0.3 + 1e-5 * np.random.default_rng(0).standard_normal(len(q))
+    assert cycle_of(equations(with_signal(log, q=q))) is not None
