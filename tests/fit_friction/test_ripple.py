@@ -128,12 +128,16 @@ def test_half_of_the_torque_left_is_no_good_fit(outrunner: Result) -> None:
         assert fit_friction.report(replace(outrunner, joints=(judged,), checks=())).tone == tone
 
 
-def test_an_inertia_of_unknown_uncertainty_is_not_seen(outrunner: Result) -> None:
+@pytest.mark.parametrize(("inertia", "said"), [
+    (Value(1.0, None, "kg m^2"), "these logs do not show it"), (Value(1.0, 0.6, "kg m^2"), "these logs do not show it"),
+    (Value(-0.531, 0.0008, "kg m^2"), "no inertia is negative; look at the sign of this torque")])
+def test_what_the_inertia_beside_a_ripple_says(outrunner: Result, inertia: Value, said: str) -> None:
+    """Of unknown or great uncertainty it is not seen; known well and negative, it tells of a flipped sign."""
     (joint,) = outrunner.joints
     assert joint.ripple is not None
-    ripple = replace(joint.ripple, inertia=Value(1.0, None, "kg m^2"))
+    ripple = replace(joint.ripple, inertia=inertia)
     (check,) = (check for check in misfits((replace(joint, ripple=ripple),), "logs") if not check.gate)
-    assert "these logs do not show it" in check.message
+    assert said in check.message
 
 
 def test_inertias_of_two_methods_are_not_compared(outrunner: Result) -> None:

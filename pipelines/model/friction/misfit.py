@@ -90,6 +90,8 @@ def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value
     if with_ is None:
         return ""
     words = f"The inertia {shown(without)} is fitted without it; with it the same logs give {shown(with_)}"
+    if with_.std is not None and with_.value < -_SEEN * with_.std:
+        return f"{words}: no inertia is negative; look at the sign of this torque"
     if with_.std is None or with_.value <= _SEEN * with_.std:
         return f"{words}: these logs do not show it, and neither is to be relied on"
     moved = abs(with_.value - without.value) > _MOVED * with_.value
