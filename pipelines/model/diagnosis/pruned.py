@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.case import Case, held_out
 from pipelines.model.diagnosis.chance import BY_CHANCE, no_gain, no_name
@@ -252,10 +254,12 @@ def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | No
     bounds = None if case.thresholds is None else case.thresholds.at(final.weight).gain
     for k in kept:
         one = found.final.model.effects[k]
+        # With reference logs thresholds go with what was found before: all of it, at the last step.
+        own = found.steps[-1].thresholds.at(final.weight).gain if bounds is None and one.log is not None else bounds
         rest = without(found, [other for other in kept if other != k], case, final)
         if not possible(rest):  # what another would have to be without it, it cannot be
             continue
-        missed = (rest.rss - final.rss) / max(_bound(case, one.effect, final, bounds), 1e-300)
+        missed = (rest.rss - final.rss) / max(_bound(case, one.effect, final, own), 1e-300)
         if one.log is None and held_out(rest, case) <= (1.0 + _PAYS) * error:  # what happened once, no other time asks for
             missed = min(missed, 0.999)
         if missed < share:
@@ -264,5 +268,7 @@ def _idle(found: Found, kept: list[int], case: Case, final: Refined) -> int | No
 
 
 def _bound(case: Case, effect: Effect, final: Refined, bounds: Array | None) -> float:
-    """Squared weighted residual that the cause has to take away; `bounds` (families,) where thresholds say so."""
-    return _LEAST * final.rss if bounds is None else float(bounds[case.families.index(family_of(case, effect))])
+    """Squared weighted residual that the cause has to take away; `bounds` (families,) where thresholds say so, infinite where it
+    was not asked."""
+    bound = np.inf if bounds is None else float(bounds[case.families.index(family_of(case, effect))])
+    return bound if np.isfinite(bound) else _LEAST * final.rss

@@ -85,10 +85,11 @@ def test_a_cause_that_brings_nothing_held_out_is_idle_however_much_it_fits(monke
     assert pruned._idle(found, [0, 1], case, final) == 1
 
 
+@pytest.mark.parametrize("referred", [False, True])
 @pytest.mark.parametrize(("missed", "idle"), [(0.5, 1), (20.0, None)])
-def test_what_happened_once_is_idle_where_the_others_leave_hardly_more_without_it(missed: float, idle: int | None,
+def test_what_happened_once_is_idle_where_the_others_leave_hardly_more_without_it(missed: float, idle: int | None, referred: bool,
                                                                                   monkeypatch: pytest.MonkeyPatch) -> None:
-    """Held-out time says nothing of it; its own threshold, of ten, does."""
+    """Held-out time says nothing of it; its own threshold, of ten, does: that of the last step where reference logs give it."""
     found = searched(left(0.5, 0.05, 0.01), (effect("cogging", 1), left(0.01, 0.05, 0.01)),
                      (effect("contact", None), left(0.01, 0.01, 0.01)))
     found.final.model.effects[1].log = 0
@@ -98,7 +99,8 @@ def test_what_happened_once_is_idle_where_the_others_leave_hardly_more_without_i
     monkeypatch.setattr(pruned, "held_out", lambda done, case: 1.0 if done is not others[1,] else 2.0)
     families = (SimpleNamespace(cause="cogging", joint=1), SimpleNamespace(cause="contact", joint=None))
     thresholds = SimpleNamespace(at=lambda weight: SimpleNamespace(gain=np.array([10.0, 10.0])))
-    case: Any = SimpleNamespace(families=families, thresholds=thresholds)
+    found.steps.append(SimpleNamespace(best=None, thresholds=thresholds))
+    case: Any = SimpleNamespace(families=families, thresholds=None if referred else thresholds)
     assert pruned._idle(found, [0, 1], case, final) == idle
 
 
