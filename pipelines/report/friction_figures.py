@@ -42,7 +42,7 @@ def draw_curve(axis: Axes, series: Series, reach: float) -> None:
     axis.fill_between(v, curve - band, curve + band, color=style.BLUE, alpha=0.25, linewidth=0.0, label="± 2 std")
     axis.plot(v, curve, color=style.BLUE, linewidth=1.2, label="fitted law")
     points = series.map_speed <= 1.05 * reach
-    for side in (1.0, -1.0):
+    for side in (1.0, -1.0) if len(series.map_speed) else ():
         axis.errorbar(side * series.map_speed[points], side * series.map_odd[points], 2.0 * series.map_std[points], fmt="o",
                       markersize=3.0, color=style.VERMILLION, elinewidth=0.8, label="± v in pairs" if side > 0 else None)
     axis.axhline(0.0, color=style.GREY, linewidth=0.6)

@@ -170,8 +170,9 @@ def _summary(result: Result) -> Section:
 
 def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
     revolute = joint.revolute
-    curve = curve_figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law, {_band(joint)}; the points pair torques at equal "
-                         "position and opposite speed and know of no law.", joint.series, revolute)
+    points = ("the points pair torques at equal position and opposite speed and know of no law" if len(joint.series.map_speed) else
+              "no torques at equal position and opposite speed were found to hold it against")
+    curve = curve_figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law, {_band(joint)}; {points}.", joint.series, revolute)
     parts = fraction_figure(f"fractions-{joint.joint}", f"{joint.name}: torque of {joint.validation.by} and its fractions in the "
                             "simulation.", joint.series, revolute)
     simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion. Gravity is "

@@ -162,3 +162,10 @@ def test_a_slide_is_told_in_its_own_units(outrunner: Result) -> None:
     (check,) = (check for check in misfits((slide,), "logs") if not check.gate)
     assert "N rms of the torque" not in check.message
     assert "depends on its position alone, mostly a wave every 900 mm" in check.message
+
+
+def test_a_curve_without_points_claims_none(outrunner: Result) -> None:
+    """Joints that all move have no pairs of torques."""
+    assert not len(outrunner.joints[0].series.map_speed)
+    captions = [figure.caption for section in fit_friction.report(outrunner).sections for figure in section.figures]
+    assert any("no torques at equal position and opposite speed" in caption for caption in captions)
