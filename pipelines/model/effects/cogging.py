@@ -11,16 +11,10 @@ import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.orders import NEARLY, orders_along
 
 __all__ = ["Cogging"]
 
-_WAVES = 1.5  # in the range travelled, at least: fewer are the curve of a spring (causes.md: a full turn tells them apart)
-# Of a turn, that may be missing where whole orders are looked for. Stops leave many joints 330 or 340 degrees, which tell waves of
-# neighbouring whole orders apart; a drive with 7, 12 and 28 waves, recorded over .95 of a turn, was taken for 6.8 and its like.
-_MISSING = 0.1
-_HIGHEST = 150.0  # order that is searched for; of a slide: of its whole travel
-_FINEST = 1000.0  # of a slide: a wave of 6 mm, as leads of screws have them; on more than a metre of travel the waves are longer
-_MOST = 200  # orders on the grid
 _ROUNDED = 1e-11  # difference of orders that is rounding
 # Of the squared error that the whole order leaves, at most. A recorded drive with orders 7, 12 and 28 left .9 by a free one in
 # place of the first, made-up waves of 12, 13 and 14 a turn .74; one of 6.8 alone on its joint leaves noise.
@@ -84,33 +78,20 @@ class Cogging(Effect):
         return table
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """From the fewest waves in the range travelled, in steps of half of what it can tell apart: whole ones over many turns.
+        """The orders that the travel tells apart.
 
         Where the joint closes its circle, or nearly, whole orders are held: as long as waves of other orders are missing from the
-        model, they would pull a free one off its place. On a closed circle from one on, for what comes back to where it began is
-        no spring.
+        model, they would pull a free one off its place.
         """
-        travel = max(float(np.ptp(self.own(motion.q))), 1e-3)
-        if self.goes_round(motion, _MISSING) and arm.robot.revolute[self._index]:
-            step = 0.5 if travel < 4.0 * math.pi else 1.0
-            first = 1.0 if self.goes_round(motion) else math.ceil(_WAVES * 2.0 * math.pi / travel)
-            for order in np.arange(first, _HIGHEST, step).tolist():
-                whole = order.is_integer()
-                yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel * whole)
-            return
-        lowest = max(1.0, _WAVES * 2.0 * math.pi / travel)
-        highest = max(self._highest(travel, arm), 4.0 * lowest)
-        step = max(math.pi / travel, (highest - 1.0) / _MOST)
-        for order in np.arange(lowest, highest, step).tolist():
-            yield replace(self, order=order, harmonics=1)
-
-    def _highest(self, travel: float, arm: ArmModel) -> float:
-        """Order that is searched for. A slide's wave is counted in 2π metres, and its travel is what a turn is to a joint's."""
-        return _HIGHEST if arm.robot.revolute[self._index] else float(np.clip(_HIGHEST * 2.0 * math.pi / travel, _HIGHEST, _FINEST))
+        travel, turning = float(np.ptp(self.own(motion.q))), arm.robot.revolute[self._index]
+        around = turning and self.goes_round(motion, NEARLY)
+        for order in orders_along(travel, turning):
+            whole = around and order.is_integer()
+            yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel if whole else 0.0)
 
     def again(self, motion: Motion) -> bool:
         """Magnets, teeth and poles each have their own order; a turn tells them apart, on much less any curve is a few waves."""
-        return self.goes_round(motion, _MISSING)
+        return self.goes_round(motion, NEARLY)
 
     @property
     def free(self) -> tuple[str, ...]:

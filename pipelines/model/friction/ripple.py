@@ -20,8 +20,9 @@ from pipelines.fit.varpro import SeparableFit, fit_separable
 from pipelines.model.friction.equations import Equations
 from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.one_joint import OneJoint, gravity_columns
-from pipelines.model.friction.waves import Waves, orders_along
+from pipelines.model.friction.waves import Waves
 from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.orders import orders_along
 
 __all__ = ["Along", "Ripple", "refitted", "ripple_of"]
 
@@ -170,7 +171,7 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
     if fit.found.rms**2 <= _WORTH**2 * power:
         return None
     few, arms = equations.thinned(_ROWS), equations.arms()
-    every = Waves(orders_along(equations.nodes.q[:, 0], arms[0].revolute))
+    every = Waves(tuple(orders_along(float(np.ptp(equations.nodes.q[:, 0])), arms[0].revolute)))
     parts = [few.build(every.some(part), arms, fit.theta) for part in _batches(len(every.orders))]
     rows = _Rows.of(fit.found.jacobian[few.rows], np.hstack(parts), fit.found.residual[few.rows])
     state = few.build(_State(), arms, fit.theta)

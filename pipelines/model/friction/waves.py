@@ -14,14 +14,9 @@ from pipelines.model.effects.base import ArmModel, Effect, Quantity
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Wave", "Waves", "orders_along"]
+__all__ = ["Wave", "Waves"]
 
-_WAVES = 1.5  # in the range travelled, at least: fewer are a slope, which inertia and gravity take
-_MISSING = 0.1  # of a turn, that may be: the rest still tells neighbouring whole orders apart
-_TURNS = 2.0  # that were travelled tell no more than whole orders apart
-_HIGHEST = 150.0  # order; of a slide: of its whole travel
-_FINEST = 1000.0  # of a slide: a wave of 6 mm
-_MOST = 200  # orders
+_FINEST = 1000.0  # order that a wave may have
 
 
 @dataclass(frozen=True)
@@ -64,15 +59,3 @@ class Waves:
 
     def some(self, chosen: Sequence[int]) -> Waves:
         return Waves(tuple(self.orders[k] for k in chosen))
-
-
-def orders_along(q: Array, revolute: bool) -> tuple[float, ...]:
-    """Orders [1/rev] that a travel q (samples,) [rad] tells apart: half a wave along it more each; whole ones along a turn."""
-    travel = max(float(np.ptp(q)), 1e-3)
-    turn = 2.0 * np.pi
-    if revolute and travel > (1.0 - _MISSING) * turn:
-        first = 1.0 if travel >= turn else np.ceil(_WAVES * turn / travel)
-        return tuple(np.arange(first, _HIGHEST, 0.5 if travel < _TURNS * turn else 1.0).tolist())
-    lowest = max(1.0, _WAVES * turn / travel)
-    highest = max(_HIGHEST if revolute else float(np.clip(_HIGHEST * turn / travel, _HIGHEST, _FINEST)), 4.0 * lowest)
-    return tuple(np.arange(lowest, highest, max(np.pi / travel, (highest - 1.0) / _MOST)).tolist())
