@@ -103,7 +103,7 @@ def _limit(effect: Effect, amplitudes: Array, revolute: tuple[bool, ...], visibi
     shown = effect.reported(values)
     at = {q.name: Value(values[q.name], None, q.unit_at(turning)) for q in effect.parameters
           if q.shape and q.name in shown and np.isfinite(values.get(q.name, np.nan))}
-    size = abs(values[main.name])
+    size = max(abs(values[main.name]), effect.slight)
     smallest = Value(size, None, main.unit_at(turning))
     return Detectable(effect.name, effect.joint, main.name, smallest, at, way, visibility), size <= max(abs(main.low), main.high)
 

@@ -18,12 +18,13 @@ from pipelines.model.diagnosis.exact import Named, number_moved
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Value
 
-__all__ = ["acting", "of_no_size", "parameters", "standard_deviations"]
+__all__ = ["acting", "of_no_size", "parameters", "slight", "standard_deviations"]
 
 _STEP = 1e-4
 # Deviations from zero: of 410 named causes of the test bench the least true one of one number was 6.9, a false gain 4.9; delays of
 # two arms in order 2.3 and 3.5.
 _STDS = 5.0
+_SURE = 2.0  # deviations by which it is less
 
 
 def parameters(done: Refined, place: int, covariance: Array | None = None) -> dict[str, Value]:
@@ -56,13 +57,21 @@ def parameters(done: Refined, place: int, covariance: Array | None = None) -> di
 
 def of_no_size(done: Refined) -> list[int]:
     """Places of effects of one number alone that is not told from zero, in the model with all of them."""
+    return [place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std]
+
+
+def slight(done: Refined) -> list[int]:
+    """Places of effects of which there surely is less than machines in order have, in the model with all of them."""
+    return [place for place, size, std in _sizes(done) if size + _SURE * std < done.model.effects[place].effect.slight]
+
+
+def _sizes(done: Refined) -> list[tuple[int, float, float]]:
+    """Place, amplitude and its standard deviation of the effects of one number alone."""
     whole, found = done.covariance(), []
     for place, one in enumerate(done.model.effects):
         index = done.of_effect(place)
         if len(index) == 1 and one.free_amplitudes and len(one.amplitudes) == 1:
-            variance = float(whole[index[0], index[0]])
-            if variance > 0.0 and abs(one.amplitudes[0]) < _STDS * np.sqrt(variance):
-                found.append(place)
+            found.append((place, abs(float(one.amplitudes[0])), float(np.sqrt(max(whole[index[0], index[0]], 0.0)))))
     return found
 
 

@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mended import not_mending, turned
 from pipelines.model.diagnosis.momentary import ONLY_THEN, only_then
-from pipelines.model.diagnosis.numbers import of_no_size
+from pipelines.model.diagnosis.numbers import of_no_size, slight
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
@@ -42,7 +42,7 @@ from pipelines.model.diagnosis.verdict import (
 from pipelines.model.diagnosis.which_joint import at_which
 from pipelines.model.effects.base import Effect
 
-__all__ = ["NEAR_THE_FLOOR", "Settled", "at_odds", "settled", "vague"]
+__all__ = ["NEAR_THE_FLOOR", "TOO_SLIGHT", "Settled", "at_odds", "settled", "vague"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
@@ -54,6 +54,9 @@ _NO_SIZE = "its size is within five standard deviations of none"
 _IMPOSSIBLE = "beside the others its numbers, or theirs, are none that it can have"
 NEAR_THE_FLOOR = "what can be named explains less than half of what stands above the floor, which is not much, but no noise"
 _LAW_WITHOUT_NAME = "follows a law in the fitted logs, far above the noise, that held-out time does not bear out as any cause"
+TOO_SLIGHT = ("what explains it best is so slight that arms in order have as much of it: something shows, and it may well be "
+              "another cause")
+_SO_LITTLE = "there surely is less of it than arms in order have"
 _STOOD = "what was found after it at the joint leaves less without it"
 
 
@@ -82,9 +85,11 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     last.drop_harmful()
     if not known:
         last.drop_unseen(floor)
-    few = known and last.explains_little(floor)
+    few = NEAR_THE_FLOOR if known and last.explains_little(floor) else ""
     if few:  # what keeps all the rules is no noise: something is wrong, and not this alone
         last.drop(last.kept, _BESIDE)
+    if known and last.drop_slight() and not last.kept:
+        few = TOO_SLIGHT
     if last.kept:
         return Settled(replace(found, final=last.final), replace(ruling, named=tuple(last.kept), doubts=last.doubts), simulated)
     return _nothing(found, plain, next((why for why in there.values() if why), ""), last.doubts, case, floor, known, few)
@@ -133,6 +138,12 @@ class _Last:
     def drop_small(self) -> None:
         self.drop([self.kept[place] for place in of_no_size(self.final)] if self.kept else [], _NO_SIZE)
 
+    def drop_slight(self) -> bool:
+        """Those of which machines in order have as much; whether there were any."""
+        before = len(self.kept)
+        self.drop([self.kept[place] for place in slight(self.final)] if self.kept else [], _SO_LITTLE)
+        return len(self.kept) < before
+
     def drop_harmful(self) -> None:
         """The last of them, as long as all together do harm, or have numbers that cannot be."""
         while self.kept and (why := _harm(self._found, self.final, self._case) or ("" if possible(self.final) else _IMPOSSIBLE)):
@@ -153,12 +164,12 @@ class _Last:
 
 
 def _nothing(found: Found, plain: Found, elsewhere: str, doubts: dict[int, str], case: Case, floor: Array, known: bool,
-             few: bool) -> Settled:
+             few: str) -> Settled:
     """What is said where no cause is kept.
 
     Args:
         elsewhere: why one of them may as well act at another joint; empty where none does.
-        few: what was kept explains too little.
+        few: why what keeps all the rules is no noise, and yet is not named; empty where nothing does.
     """
     alone = _elsewhere(near_other_motion(without_steps(plain, floor, known), plain, case, floor), plain, case, floor, known)
     reason = alone.reason
@@ -167,7 +178,7 @@ def _nothing(found: Found, plain: Found, elsewhere: str, doubts: dict[int, str],
     if not known and alone.verdict == "nothing-wrong" and (where := much_without_name(found, doubts, floor)):
         alone, reason = replace(alone, verdict="unknown"), f"{where} {_LAW_WITHOUT_NAME}"
     if few and alone.verdict == "nothing-wrong" and case.changed is None:  # of what has changed, other motion may leave a little
-        alone, reason = replace(alone, verdict="unknown"), elsewhere or NEAR_THE_FLOOR
+        alone, reason = replace(alone, verdict="unknown"), elsewhere or few
     return Settled(replace(plain, final=plain.nominal), replace(alone, reason=reason, doubts=doubts), ())
 
 

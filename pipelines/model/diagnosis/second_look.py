@@ -29,7 +29,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.own_motion import following, put_right
-from pipelines.model.diagnosis.pruned import NEAR_THE_FLOOR, Settled, settled
+from pipelines.model.diagnosis.pruned import NEAR_THE_FLOOR, TOO_SLIGHT, Settled, settled
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step, last_step, search
 from pipelines.model.diagnosis.thresholds import Thresholds
@@ -59,7 +59,7 @@ def looked_again(done: Settled, case: Case, prepared: Prepared, twin: Twin, most
     once = {family.cause for family in case.families if family.event}
     named = [best.effect for k in done.ruling.named if (best := done.found.steps[k].best) is not None]
     enough = any(effect.name in once or effect.evidence == "reversals" for effect in named)
-    far = done.ruling.verdict == "unknown" and done.ruling.reason != NEAR_THE_FLOOR
+    far = done.ruling.verdict == "unknown" and done.ruling.reason not in (NEAR_THE_FLOOR, TOO_SLIGHT)
     if far or enough or not _evenly(case, twin):
         return done
     there, whitened, usual = _in_white(case, twin)

@@ -19,7 +19,7 @@ from pipelines.log.shared_work import meanwhile
 from pipelines.model.diagnosis.beside import Judged, acted, judged
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import gaps_untold, untold
-from pipelines.model.diagnosis.doubted import unlike_held_out
+from pipelines.model.diagnosis.doubted import above_in_both, unlike_held_out
 from pipelines.model.diagnosis.evidence import evidence
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.floored import Floored
@@ -138,9 +138,11 @@ def _held_against(first: Responding, case: Case, done: Settled, responded: Judge
     judge = first.held.judge if responded.parts else prepared.judge
     if own is None or judge is None or responded.judge is None:
         return done, responded
-    if case.changed is not None and done.ruling.verdict == "nothing-wrong" and not moved:
-        return done, responded  # what motion shows that the reference logs do not have, they may have had as well
     plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
+    if done.ruling.verdict == "nothing-wrong" and not moved and not responded.parts:
+        done = above_in_both(done, plain, own, fitted, case.unlike)
+        if case.changed is not None:
+            return done, responded  # what motion shows that the reference logs do not have, they may have had as well
     final = responded.final
     believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved,
                                bool(responded.parts), fitted)

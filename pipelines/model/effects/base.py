@@ -25,6 +25,7 @@ What a search over effects asks, so that it need not know any of them:
     free                 the non-linear numbers that an exact refit may move; the others are discrete, or follow from these
     shared               non-linear numbers that are those of the friction at its joint: one surface changes sign over one speed
     fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
+    slight               how much of it arms in order have: as a cause, so little has no name
     possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
     believable           whether an arm with it could have moved as it did: one that is clipped all the time follows nothing
     per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
@@ -85,6 +86,7 @@ class Effect(ABC):
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
+    slight: ClassVar[float] = 0.0  # of its amplitude, if it has one alone: what surely is less, instruments in order have as well
     ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken
 
     def __post_init__(self) -> None:

@@ -30,6 +30,7 @@ class TorqueCrosstalk(Effect):
     experiment = "Load one joint while the others carry nothing, each in turn."
     twins = ("torque_gain", "transmission_coupling")
     in_drive = True
+    slight = 0.002  # amplifiers are told apart no better
 
     def __post_init__(self) -> None:
         super().__post_init__()

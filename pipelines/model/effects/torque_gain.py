@@ -31,6 +31,7 @@ class TorqueGain(Effect):
     experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
     twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
     in_drive = True
+    slight = 0.0075  # current sensors and torque constants are told to a hundredth at best
     needs = ("a known payload, where all joints have the same error",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.doubted import unlike_held_out, unlike_noise, unnamed
+from pipelines.model.diagnosis.doubted import above_in_both, unlike_held_out, unlike_noise, unnamed
 from pipelines.model.diagnosis.pruned import Settled
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
@@ -31,6 +32,21 @@ def test_what_an_arm_with_its_load_leaves_is_no_alarm(rest: float, floor: float,
     step: Any = SimpleNamespace(before=nominal, best=None, other=other)
     done = Settled(Found(nominal, (step,), nominal), Ruling("unknown", (), "something stands above the floor"), ())
     assert unnamed(done, np.array([0.01, 0.01, floor])).ruling.verdict == verdict
+
+
+@pytest.mark.parametrize(("fitted", "held_out", "but", "verdict"), [
+    (0.0139, 0.02, (), "nothing-wrong"), (0.02, 0.0139, (), "nothing-wrong"), (0.0141, 0.0141, (), "unknown"),
+    (0.0141, 0.0141, (1,), "nothing-wrong")])
+def test_what_shows_in_fitted_and_in_held_out_logs_is_no_chance(fitted: float, held_out: float, but: tuple[int, ...],
+                                                                verdict: str) -> None:
+    """Either alone may be the floor, which ten replicas know to a tenth: half as much again of both at one joint is not."""
+    nominal = left(0.01, fitted, 0.01)
+    done = Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
+    told = above_in_both(done, np.array([0.03, held_out, 0.01]), FLOOR, FLOOR, but)
+    assert told.ruling.verdict == verdict
+    assert ("joint 2" in told.ruling.reason) is (verdict == "unknown")
+    named = replace(done, ruling=Ruling("cause", (0,), ""))
+    assert above_in_both(named, np.array([0.03, held_out, 0.01]), FLOOR, FLOOR) is named
 
 
 @pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])

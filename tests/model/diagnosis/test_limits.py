@@ -20,12 +20,13 @@ from pipelines.model.diagnosis.candidates import Family
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.injection import _last_root, _raised
 from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.limits import _absorbed, detectable
+from pipelines.model.diagnosis.limits import _absorbed, _limit, detectable
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Rejected
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.without_limit import without_limit
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.rotor_inertia import RotorInertia
+from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from tests.diagnose.sessions import but
 
@@ -194,3 +195,11 @@ def test_of_a_torque_that_runs_away_nobody_says_what_absorbs_it(size: float) -> 
     said = _absorbed(effect, data, nothing, nothing, nothing, "").reason
     assert "absorbed" not in said
     assert "other motion" in said
+
+
+@pytest.mark.parametrize(("shows", "told"), [(0.001, TorqueGain.slight), (-0.001, TorqueGain.slight), (-0.03, 1.0 / 0.97 - 1.0)])
+def test_no_limit_is_lower_than_what_has_a_name(shows: float, told: float) -> None:
+    """A hundredth of a torque is told from none here; arms in order have as much, and so it would not be named."""
+    found = _limit(TorqueGain(joint=1), np.array([shows]), (True,), 0.9, "injected")
+    assert found is not None
+    assert found[0].smallest.value == pytest.approx(told, rel=1e-12)

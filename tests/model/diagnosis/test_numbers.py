@@ -12,7 +12,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.numbers import of_no_size, parameters, standard_deviations
+from pipelines.model.diagnosis.numbers import of_no_size, parameters, slight, standard_deviations
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
@@ -59,3 +59,14 @@ def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, smal
     done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(3), model=SimpleNamespace(effects=(delay, spring)),
                                 of_effect=lambda place: [0] if place == 0 else [1, 2])
     assert of_no_size(done) == small
+
+
+@pytest.mark.parametrize(("size", "least", "few"), [
+    (0.0019, 0.002, []), (-0.0017, 0.002, [0]), (0.0017, 0.002, [0]), (0.0017, 0.0, [])])
+def test_what_surely_is_less_than_arms_in_order_have_is_slight(size: float, least: float, few: list[int]) -> None:
+    """A deviation of 1e-4: of 0.0019 nobody knows whether it is less than 0.002."""
+    gain = SimpleNamespace(free_amplitudes=True, amplitudes=(size,), effect=SimpleNamespace(slight=least))
+    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5), effect=SimpleNamespace(slight=1.0))
+    done: Any = SimpleNamespace(covariance=lambda: 1e-8 * np.eye(3), model=SimpleNamespace(effects=(gain, spring)),
+                                of_effect=lambda place: [0] if place == 0 else [1, 2])
+    assert slight(done) == few
