@@ -117,7 +117,7 @@ def _diagnosis(steps: Iterable[Step]) -> Diagnosis | None:
     """What the run says is wrong; its series stand with the stage."""
     found = next((step.result for step in steps if isinstance(step.result, Diagnosis)), None)
     return None if found is None else dataclasses.replace(
-        found, evidence=(), findings=tuple(dataclasses.replace(one, proof=None) for one in found.findings))
+        found, evidence=(), findings=tuple(dataclasses.replace(one, proof=None, answers=()) for one in found.findings))
 
 
 def _wanted(settings: Settings) -> Iterator[tuple[Stage[Any, Any], Any]]:

@@ -11,6 +11,7 @@ from pipelines.model.diagnosis.responding import BELOW
 from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
 from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
+from pipelines.report.diagnosis_answers import answer_figures
 from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_words import (
     as_sentence,
@@ -68,7 +69,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         pair = " ".join(cause_at(some.cause, some.joint) for some in (one, one.rivals[0]))
         text.append(f"Or let \"rrrid design-excitation LOG --tell-apart {pair}\" design the motion")
     return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
-                   figures=tuple(proof_figures(number, one, units)))
+                   figures=(*answer_figures(number, one), *proof_figures(number, one, units)))
 
 
 def numbers_section(number: int, one: Finding, units: Units = _TURNING, every: Sequence[Finding] = ()) -> Section:

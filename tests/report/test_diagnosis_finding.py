@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Drawing
 
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
+from pipelines.model.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
 from pipelines.model.diagnosis.words import how_much, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
 from pipelines.report.diagnosis_words import together, what_stays
+from pipelines.report.frf_figures import posture_words
 
 
 def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[str, float] | None = None) -> Finding:
@@ -47,12 +49,39 @@ def test_what_a_model_without_the_finding_imitates_is_said(torque: float, left: 
     assert not taken_in(replace(one, joint=None), np.array([left, 9.0]))
 
 
-@pytest.mark.parametrize(("cause", "name", "said"), [("payload", "mass", " of 0.15 kg"), ("cogging", "amplitude", "")])
-def test_a_load_is_told_by_its_mass(cause: str, name: str, said: str) -> None:
-    """One number says how much there is of a load; of waves in several orders none does."""
-    one = finding(cause)
-    assert how_much(replace(one, parameters={name: Value(0.15004, 1e-4, "kg")})) == said
+@pytest.mark.parametrize(("cause", "joint", "name", "value", "said"), [
+    ("payload", None, "mass", Value(0.15004, 1e-4, "kg"), " of 0.15 kg"), ("cogging", 2, "amplitude", Value(0.4, 0.01, "N m"), ""),
+    ("base_resonance", None, "frequency", Value(28.02, 0.1, "Hz"), " (28 Hz)"),
+    ("torque_gain", 1, "gain_error", Value(-0.1004, 1e-3, "1"), " (-10 %)"),
+    ("torque_gain", 1, "gain_error", Value(0.02, 1e-3, "1"), " (+2 %)"),
+    ("time_delay", 1, "delay", Value(0.005, 1e-5, "s"), " (5 ms)"),
+    ("link_length", None, "error", Value(0.012, 1e-4, "m"), " (+12 mm)"),
+    ("gravity_tilt", None, "angle", Value(np.deg2rad(5.0), 1e-3, "rad"), " (5°)"),
+    ("encoder_eccentricity", 3, "amplitude", Value(0.004, 1e-4, "rad"), " (4 mrad)"),
+    ("torque_saturation", 2, "limit", Value(33.0, 0.1, "N m"), " (33 N m)")])
+def test_how_much_there_is_is_told_in_usual_units(cause: str, joint: int | None, name: str, value: Value, said: str) -> None:
+    """One number says how much there is of a load, and by how much a torque scale is off; of waves none does."""
+    one = finding(cause, joint)
+    assert how_much(replace(one, parameters={name: value})) == said
     assert how_much(replace(one, parameters={})) == ""
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_responses_that_name_a_cause_are_drawn_first(told: bool) -> None:
+    """In each posture, with the frequency that the verdict tells; of a cause that residuals name there are none."""
+    f = np.linspace(5.0, 100.0, 40)
+    answers = tuple(Answer(1, np.array([0.0, q, 0.0]), f, 1.0 + 0.1 * np.cos(f), np.full(40, 0.9), np.ones(40)) for q in (0.0, 1.0))
+    one = finding("base_resonance", None)
+    one = replace(one, parameters={"frequency": Value(28.0, 0.1, "Hz")}, origin="frequency responses" if told else "residual",
+                  answers=answers if told else ())
+    drawn = finding_section(2, one, NOMINAL).figures
+    assert [figure.name for figure in drawn] == (["proof-2-response"] if told else [])
+    assert all("28 Hz" in figure.caption and "joint 1" in figure.caption for figure in drawn)
+    for figure in drawn:
+        drawing = Drawing()
+        figure.draw(drawing)
+        assert [text.get_text() for text in drawing.axes[0].get_legend().get_texts()] == [
+            posture_words(one.posture, 1) for one in answers]
 
 
 def test_the_other_joint_is_named() -> None:

@@ -10,19 +10,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.result import NotTestable
+from pipelines.model.diagnosis.result import Answer, NotTestable
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
+from pipelines.model.frf.modes import relative_acceleration
 
 __all__ = ["Compared", "Compliance", "compared", "compliance", "gaps_untold", "untold"]
 
+_FIRST = 1  # the joint that turns with the base
 _MOVED = 3.0  # standard deviations, by which a base's frequency or a joint's stiffness is another one
 _SAME = 0.03  # of it, within which two sessions show the same one: temperature, and how the arm stood
 _NO_RESPONSES = "a gap is told from a spring by frequency responses that show none, and there is no frf log"
@@ -36,6 +38,11 @@ class Compliance:
     named: tuple[Acting, ...]
     rigid: bool
     open: str  # what they leave open, in words; empty where they do not
+    seen: tuple[frf.Seen, ...] = field(default=(), repr=False)
+
+    def answers(self, acting: Acting) -> tuple[Answer, ...]:
+        """The responses that name a cause: of its joint, of the first one where it is the base."""
+        return tuple(_answer(one) for one in self.seen if one.measured.joint == (acting.effect.joint or _FIRST))
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,7 @@ def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] =
               if one.cause is not None and find_effect(one.cause).evidence == "frequency responses"]
     named = tuple(_acting(one, arm) for one in giving if one.cause not in without)
     left = "; ".join(one.evidence for one in found.undecided)
-    return Compliance(named, not giving and not found.undecided, left)
+    return Compliance(named, not giving and not found.undecided, left, found.seen)
 
 
 def compared(now: Compliance, before: Compliance) -> Compared:
@@ -98,3 +105,10 @@ def _acting(one: frf.Finding, arm: Arm) -> Acting:
     known = one.parameters
     return Acting.of(kind(joint=joint), {name: x.value for name, x in known.items()}, {name: x.std for name, x in known.items()},
                      revolute=joint is None or arm.robot.revolute[joint - 1])
+
+
+def _answer(one: frf.Seen) -> Answer:
+    first = one.measured.first
+    shown = relative_acceleration(one.measured).within(*one.modes.band)
+    return Answer(one.measured.joint, np.asarray(first.posture, dtype=np.float64), shown.frequency, np.abs(shown.response),
+                  shown.coherence, np.abs(one.modes.fit.response(shown.frequency)))

@@ -252,7 +252,7 @@ def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, 
         load = None
     kept = [part for part in done.parts if not part.doubt]
     plain, before = (steady(first.held.plain), first.held.judge) if first.held.plain is not None else (found.nominal, judge)
-    every = (*(held_finding(part, plain.rms, floor, chosen.evidence) for part in kept), *named,
+    every = (*(held_finding(part, plain.rms, floor, chosen.evidence, first.answers(part.acting)) for part in kept), *named,
              *((load.finding,) if load is not None else ()))
     rows = final.data if judge is None else judge
     now = held_out_left(final, judge, chosen.blocks)

@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.joined import once_each
 from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.numbers import acting, parameters
 from pipelines.model.diagnosis.refit import Refined
-from pipelines.model.diagnosis.result import RIVALS, Finding, Gain, Rejected, Rival, Value
+from pipelines.model.diagnosis.result import RIVALS, Answer, Finding, Gain, Rejected, Rival, Value
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
@@ -81,8 +81,8 @@ def _in_steps(found: Found, named: Sequence[int], steps: Sequence[Step]) -> list
     return list(pairwise([found.nominal, *(with_some(found, range(count)) for count in range(1, len(steps))), found.final]))
 
 
-def held_finding(part: Part, nominal: Array, floor: Array, draw: bool) -> Finding:
-    """A cause that frequency responses name, with what the logs of motion say of it."""
+def held_finding(part: Part, nominal: Array, floor: Array, draw: bool, answers: Sequence[Answer] = ()) -> Finding:
+    """A cause that frequency responses name, `answers`, with what the logs of motion say of it."""
     acting, before, after = part.acting, part.before, part.after
     effect, data = acting.effect, before.data
     torque = np.zeros(data.rows) if after.data.known is None else after.data.known
@@ -94,7 +94,7 @@ def held_finding(part: Part, nominal: Array, floor: Array, draw: bool) -> Findin
     numbers = {name: Value(value, std.get(name), units.get(name, "1")) for name, value in effect.reported(acting.values).items()}
     return Finding(effect.name, effect.joint, effect.title, numbers, explained(before.rms, after.rms, nominal, floor), seen, (),
                    None, part.gain, "frequency responses", size, of_rated, proof(before, after, joint + 1) if draw else None,
-                   part.doubt)
+                   part.doubt, tuple(answers) if draw else ())
 
 
 def _size(torque: Array, data: Data, joint: int | None, floor: Array) -> tuple[float, int, float]:

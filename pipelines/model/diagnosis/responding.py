@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Prepared, narrowed
 from pipelines.model.diagnosis.linear import deviations
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
-from pipelines.model.diagnosis.result import NotTestable, Standing, Value
+from pipelines.model.diagnosis.result import Answer, NotTestable, Standing, Value
 
 __all__ = ["BELOW", "Responding", "responding"]
 
@@ -45,6 +45,10 @@ class Responding:
     held: Held
     standing: tuple[Standing, ...] = ()
     undecided: tuple[NotTestable, ...] = ()
+
+    def answers(self, acting: Acting) -> tuple[Answer, ...]:
+        """The responses that name a cause."""
+        return () if self.stiff is None else self.stiff.answers(acting)
 
     def nameable(self, case: Case) -> Case:
         """`case`, where frequency responses show no spring: what gives way may be a gap then, which the residual names."""

@@ -15,7 +15,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.calibration import Calibration
 from pipelines.model.diagnosis.unasked import FewerTerms, WithoutLimit
 
-__all__ = ["RIVALS", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable",
+__all__ = ["RIVALS", "Answer", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable",
            "Proof", "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",
            "TorqueGain", "Trial", "Value", "Verdict"]
 
@@ -108,6 +108,18 @@ class Proof:
 
 
 @dataclass(frozen=True)
+class Answer:
+    """How a joint answers in one posture: acceleration per input over frequency, which a rigid body has flat."""
+
+    joint: int  # 1-based, that is moved
+    posture: Array  # (joints,) [rad] or [m]
+    frequency: Array  # (bins,) [Hz]
+    measured: Array  # (bins,) magnitude
+    coherence: Array
+    fitted: Array  # by the modes that were found
+
+
+@dataclass(frozen=True)
 class Finding:
     """An accepted cause."""
 
@@ -125,6 +137,7 @@ class Finding:
     of_rated: float  # the same as a share of the rated torque; NaN where the description gives none
     proof: Proof | None
     doubt: str = ""  # of what frequency responses name: why the extended model goes without it; empty where it has it
+    answers: tuple[Answer, ...] = ()  # the responses that name it, one a posture; empty where others do, or none is drawn
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def _told(first: Responding, case: Case, done: Settled, responded: Judged, floor
     found, ruling, prepared = done.found, done.ruling, first.held.prepared
     nominal, last = found.nominal, found.steps[-1]
     parts = responded.parts
-    held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence) for part in parts)
+    held = tuple(held_finding(part, plain.rms, floored.rms, chosen.evidence, first.answers(part.acting)) for part in parts)
     named = strongest((*held, *causes))
     if held:
         ruling = replace(ruling, verdict="cause")

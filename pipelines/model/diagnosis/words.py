@@ -1,7 +1,7 @@
 """Words of a finding that its sentence and its report share: where it is, and how much of it a model without it imitates.
 
     where(finding)                 " at joint 2 (from joint 1)"
-    how_much(finding)              " of 0.15 kg"
+    how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
     taken_in(finding, left)        ", most of which the nominal model had taken in"
     within(title)                  a title, or a sentence, within another
 """
@@ -18,6 +18,9 @@ from pipelines.model.effects import find_effect
 
 __all__ = ["how_much", "other_joint", "taken_in", "where", "within"]
 
+# Units as a technician says them, where others than SI are usual. An angle of a degree or more is told in degrees.
+_USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
+_DEGREE = np.pi / 180.0
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
 
@@ -29,8 +32,17 @@ def where(one: Finding) -> str:
 
 def how_much(one: Finding) -> str:
     """The number that says how much of it there is, to three digits; empty where no single one does."""
-    told = one.parameters.get(find_effect(one.cause).size)
-    return "" if told is None or not isinstance(told.value, int | float) else f" of {told.value:.3g} {told.unit}"
+    effect = find_effect(one.cause)
+    told = one.parameters.get(effect.size)
+    if told is None or not isinstance(told.value, int | float):
+        return ""
+    if told.unit == "kg":
+        return f" of {told.value:.3g} kg"
+    times, unit = _USUAL.get(told.unit, (1.0, told.unit))
+    if told.unit == "rad" and abs(told.value) >= _DEGREE:
+        times, unit = 1.0 / _DEGREE, "°"
+    signed = any(q.name == effect.size and q.low < 0.0 for q in effect.parameters)
+    return f" ({told.value * times:{'+' if signed else ''}.3g}{'' if unit == '°' else ' '}{unit})"
 
 
 def other_joint(parameters: Mapping[str, Value]) -> str:

@@ -55,6 +55,7 @@ class Backlash(Effect):
     explanation = "Worn teeth, keys or couplings leave free play: motor and link part when the torque turns round, and meet again."
     remedy = "Adjust or replace the gear; a preload, by gravity or a spring, keeps one flank closed."
     experiment = "Move the joint to and fro over small angles, once where gravity loads it and once where it does not."
+    size = "gap"
     evidence = "reversals"
     twins = ("joint_elasticity", "presliding")
     needs = ("reversals of torque, or frequency responses at two amplitudes",)

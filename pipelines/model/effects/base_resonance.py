@@ -41,6 +41,7 @@ class BaseResonance(Effect):
     explanation = "The table, the floor or the bolts under the arm are a spring; the arm's reaction moves them."
     remedy = "Tighten or stiffen what the arm stands on; keep the first joint's bandwidth below it."
     experiment = "Measure the frequency response of the first joint in two postures with different inertia."
+    size = "frequency"
     evidence = "frequency responses"
     twins = ("joint_elasticity",)
     needs = ("frequency responses in two postures",)

@@ -24,6 +24,7 @@ class DriveLag(Effect):
     explanation = "The current loop is slow, or the amplifier filters its command."
     remedy = "Tune the current loop; lead the feed-forward by the time constant."
     experiment = "Repeat an experiment at two speeds, or record the joint's frequency response."
+    size = "time_constant"
     twins = ("time_delay", "torque_lag", "rotor_inertia")
     in_drive = True
 

@@ -32,6 +32,7 @@ class EncoderCrosstalk(Effect):
     explanation = "Belts, cables or a parallel rod turn this encoder a little when another joint moves, or two channels mix."
     remedy = "Take the part found off the reading; look at what couples the two encoders."
     experiment = "Hold this joint still against a stop or a level and move the other over its range."
+    size = "coefficient"
     twins = ("link_length", "transmission_coupling")
     misread = True
 

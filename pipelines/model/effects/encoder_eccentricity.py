@@ -33,6 +33,7 @@ class EncoderEccentricity(Effect):
     explanation = "The disc's centre is beside the axis: the head reads the angle seen from there."
     remedy = "Correct the reading by the sine found, or centre the disc; two opposite heads cancel it."
     experiment = "Turn the joint over a full turn at three constant speeds."
+    size = "amplitude"
     twins = ("cogging", "spring", "gravity_tilt")
     misread = True
 

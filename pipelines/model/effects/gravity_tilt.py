@@ -39,6 +39,7 @@ class GravityTilt(Effect):
     explanation = "The floor, the table or the mounting plate is not level, or gravity was described in other axes."
     remedy = "Level the base, or correct gravity in the robot description."
     experiment = "Hold the arm still, stretched out, in eight angles of joint 1, and with the elbow bent in the same eight."
+    size = "angle"
     twins = ("spring", "cogging", "torque_offset")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

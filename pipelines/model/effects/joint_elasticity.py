@@ -43,6 +43,7 @@ class JointElasticity(Effect):
     explanation = "Gear, belt or shaft give way: the link does not stand where the motor's encoder says."
     remedy = "Check belt, clamps and gear; keep the bandwidth below the antiresonance, compensate the deflection by the torque."
     experiment = "Measure the frequency response of this joint in two postures with different inertia."
+    size = "frequency"
     evidence = "frequency responses"
     twins = ("base_resonance", "backlash")
     needs = ("frequency responses in two postures",)

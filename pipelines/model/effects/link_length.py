@@ -37,6 +37,7 @@ class LinkLength(Effect):
     explanation = "The drawing, the calibration or the robot description has another length than the arm."
     remedy = "Measure the link and correct the robot description; the tip is off by as much."
     experiment = "Hold the arm in static poses with the elbow bent and straight, and move it fast in the same poses."
+    size = "error"
     twins = ("rotor_inertia", "payload", "encoder_crosstalk")
 
     @classmethod

@@ -24,6 +24,7 @@ class RotorInertia(Effect):
     explanation = "The rotor and the gear's fast shaft turn with the motor; the gear ratio enters squared."
     remedy = "Add it to the model; it is a property of the machine, not a fault."
     experiment = "Accelerate the joint in two postures with different load inertia."
+    size = "inertia"
     twins = ("torque_gain", "link_length")
     from_motion = True
 

@@ -33,6 +33,7 @@ class TimeDelay(Effect):
     explanation = "The encoder's value waits in a converter, on a bus or in a buffer before it is stamped with a time."
     remedy = "Stamp positions where they are taken, or move this joint's signal by the delay before it is used; lower the gains."
     experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
+    size = "delay"
     twins = ("drive_lag", "torque_lag")
     misread = True
 

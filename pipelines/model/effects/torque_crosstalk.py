@@ -28,6 +28,7 @@ class TorqueCrosstalk(Effect):
     explanation = "Two current measurements or motor cables influence each other, or a transmission leads torque past its joint."
     remedy = "Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission."
     experiment = "Load one joint while the others carry nothing, each in turn."
+    size = "coefficient"
     twins = ("torque_gain", "transmission_coupling")
     in_drive = True
     slight = 0.002  # amplifiers are told apart no better

@@ -29,6 +29,7 @@ class TorqueGain(Effect):
     explanation = "Torque constant, current measurement or gear ratio is not what the log assumes; magnets lose strength."
     remedy = "Where it fell, look at the motor's magnets and the amplifier; correct the torque constant."
     experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
+    size = "gain_error"
     twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
     in_drive = True
     slight = 0.0075  # current sensors and torque constants are told to a hundredth at best

@@ -37,6 +37,7 @@ class TorqueSaturation(Effect):
     explanation = "Current or voltage is limited, or the motor saturates; the command is logged all the same."
     remedy = "Correct the limit in the controller's settings, or ask for less acceleration; look at supply and temperature limits."
     experiment = "Repeat the experiment slower, so that the torque stays below the limit."
+    size = "limit"
     twins = ("torque_gain", "load_friction", "quadratic_drag")
     in_drive = True
     fixed_amplitudes = (1.0,)

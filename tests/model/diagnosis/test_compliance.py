@@ -24,6 +24,14 @@ def test_a_soft_base_is_named_with_its_frequency() -> None:
     numbers = found.named[0].values
     assert numbers["frequency"] == pytest.approx(28.0, abs=0.2)
     assert numbers["damping_ratio"] == pytest.approx(0.04, rel=0.1)
+    answers = found.answers(found.named[0])
+    assert [(one.joint, one.posture.shape) for one in answers] == [(1, (3,)), (1, (3,))]
+    for one in answers:  # a dip, then a rise beside the frequency of the base, and no such thing elsewhere
+        sure = (one.coherence > 0.9) & (one.frequency < 45.0)
+        assert 27.0 < one.frequency[sure][np.argmax(one.measured[sure])] < 31.0
+        assert one.fitted[sure] == pytest.approx(one.measured[sure], rel=0.1)
+        level = one.fitted[(one.frequency > 45.0) & (one.frequency < 100.0)]
+        assert np.ptp(level) < 0.1 * level.mean() < np.ptp(one.fitted)
 
 
 def test_without_responses_what_gives_way_is_not_testable() -> None:
