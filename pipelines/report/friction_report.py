@@ -201,7 +201,8 @@ def _words(joint: JointResult) -> tuple[str, ...]:
         words.append(f"At rest friction carried from {format_number(low, 3)} to {format_number(high, 3)} N m.")
     if joint.validation.by and (never := _never_broke_away(joint)):
         words.append(f"No break-away torque {' or '.join(never)} is given: nowhere in these logs does the joint rest for {REST:g} "
-                     f"s and then run that way within {WITHIN:g} s. A slow ramp of torque from rest shows it.")
+                     f"s and then run that way within {WITHIN:g} s. A slow ramp of torque from rest shows it, where the joint does "
+                     "not creep for longer before it runs.")
     return tuple(words)
 
 

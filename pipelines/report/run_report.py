@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from pipelines.errors import NothingMatched
 from pipelines.log.places import slug
@@ -47,19 +47,28 @@ def _title(result: Result) -> str:
 
 
 def _verdicts(group: Group) -> list[str]:
-    """What diagnosis says, then the extended model, then what was refused, each reason once, or else whatever is not in order;
-    without these, what the last stage says.
+    """What diagnosis says, then the extended model, then what was refused, each reason once, or else which stages found something
+    that is not in order: what they say, where no diagnosis says more; without these, what the last stage says.
 
     Of several robots or days each has its first answer there; the table of stages has the others.
     """
     done = [step for step in group.stages if step.result is not None]
     answers = [step for kind in (Diagnosis, Extension) for step in done if isinstance(step.result, kind)]
     refused = _refusals(group)
-    others = [step.report.verdict for step in group.stages if step not in answers and step.report.tone in ("attention", "bad")]
-    shown = [*(step.report.verdict for step in answers), *(refused or others)] or [step.report.verdict for step in done[-1:]]
+    others = [step for step in group.stages if step not in answers and step.report.tone in ("attention", "bad")]
+    told = _look_at(others) if answers else [step.report.verdict for step in others]
+    shown = [*(step.report.verdict for step in answers), *(refused or told)] or [step.report.verdict for step in done[-1:]]
     if group.name:
         return [f"{group.name}: {words}" for words in shown[:1]]
     return shown
+
+
+def _look_at(steps: Sequence[Step]) -> list[str]:
+    """Their names in a sentence: what they say stands with the stages, and is about the logs more than about the arm."""
+    if not steps:
+        return []
+    *first, last = (step.name for step in steps)
+    return [f"{', '.join(first)}{' and ' if first else ''}{last} found something to look at as well: see the stages."]
 
 
 def _refusals(group: Group) -> list[str]:

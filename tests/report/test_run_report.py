@@ -6,6 +6,7 @@ import dataclasses
 from dataclasses import fields
 
 import numpy as np
+import pytest
 
 from pipelines.errors import Check
 from pipelines.model.diagnosis.outcome import Extension
@@ -129,3 +130,20 @@ def test_what_is_not_in_order_is_told_where_nothing_was_refused() -> None:
     steps = (Step("inspect", 1, object(), Report("Log doctor", "All should be looked at.", "attention"), ()),
              Step("reconstruct", 0, object(), Report("Motion", "Known.", "good"), ()))
     assert run_report(Result(steps)).verdict == "All should be looked at."
+
+
+@pytest.mark.parametrize(("stages", "said"), [
+    (("inspect",), "inspect found something to look at as well: see the stages."),
+    (("inspect", "fit-friction", "frf"), "inspect, fit-friction and frf found something to look at as well: see the stages.")])
+def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: tuple[str, ...], said: str) -> None:
+    """The headline is about the arm; what they say stands in the table of stages."""
+    rms = ResidualRms(NOMINAL, NOMINAL, NOMINAL)
+    empty = {field.name: None for field in fields(Diagnosis)} | {"findings": (), "residual_rms": rms}
+    bare = Diagnosis(**empty)  # type: ignore[arg-type]
+    steps = (*(Step(name, 0, object(), Report(name, "Waist: a long story.", "attention"), ()) for name in stages),
+             Step("reconstruct", 0, object(), Report("Motion", "Known.", "good"), ()),
+             Step("diagnose", 0, bare, Report("Diagnosis", "Cogging.", "bad"), ()))
+    told = run_report(Result(steps))
+    assert told.verdict == f"Cogging. {said}"
+    table = next(section for section in told.sections if section.title == "Stages").tables[0]
+    assert "Waist: a long story." in [row[2] for row in table.rows]
