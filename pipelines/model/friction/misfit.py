@@ -23,7 +23,7 @@ _MOVED = 0.1  # of the inertia: less is within what a fit is good for
 
 
 def misfits(joints: Sequence[JointResult], where: str) -> tuple[Check, ...]:
-    """D19, joint by joint: a gate where the law leaves most of the torque of joints that were never driven alone.
+    """D19, a gate, where the law leaves most of the torque of a joint that was never driven alone; D21 where a joint ripples.
 
     A joint that was driven alone is judged by its simulated speed instead.
     """
@@ -45,7 +45,7 @@ def _rippling(joint: JointResult, where: str) -> Check | None:
     if ripple is None:
         return None
     inertia, torque = inertia_in_words(joint, ripple, _written), "torque" if joint.revolute else "force"
-    return Check.of("D19", "warn", f"{plain_number(ripple.rms.value)} {ripple.rms.unit} rms of the {torque} of joint {joint.joint} "
+    return Check.of("D21", "warn", f"{plain_number(ripple.rms.value)} {ripple.rms.unit} rms of the {torque} of joint {joint.joint} "
                     f"{depends_in_words(joint, ripple)}: {100.0 * ripple.share:.0f} % of what friction and inertia leave (mean "
                     f"square){inertia and f'. {inertia}'}", where=where, remedy=NAMED)
 
