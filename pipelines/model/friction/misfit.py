@@ -64,20 +64,11 @@ def _waves_in_words(joint: JointResult, ripple: Rippled) -> str:
     order, *others = ripple.orders
     apart = 2.0 * math.pi / max(float(np.ptp(ripple.along.angle)), 1e-12)
     near = min((abs(other - order) for other in others), default=math.inf) < _TOLD_APART * apart
-    if near and (order < _SEVERAL * apart or _share_of(order, ripple) < _MOST):
+    if near and (order < _SEVERAL * apart or ripple.largest < _MOST):
         return ""
     length = f"a wave every {plain_number(2000.0 * math.pi / order)} mm"
     size = f"about {plain_number(order)} waves a turn" if joint.revolute else length
     return f", mostly {size}" if others else f", {size}"
-
-
-def _share_of(order: float, ripple: Rippled) -> float:
-    """What one wave is of all of them (mean square)."""
-    whole = ripple.along.waves - np.mean(ripple.along.waves)
-    angle = order * ripple.along.angle
-    one = np.stack([np.sin(angle), np.cos(angle), np.ones_like(angle)], axis=1)
-    left = whole - one @ np.linalg.lstsq(one, whole, rcond=None)[0]
-    return 1.0 - float(left @ left) / max(float(whole @ whole), 1e-300)
 
 
 def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value], str]) -> str:

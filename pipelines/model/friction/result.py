@@ -94,6 +94,7 @@ class Rippled:
     rms: Value  # [N m], of a slide [N]: rms of what it explains of what the law leaves
     share: float  # of what the law leaves of blocks held out (mean square)
     orders: tuple[float, ...]  # [1/rev] waves in a turn, of a slide [1/(2π m)] in 2π m; the largest first
+    largest: float  # what that one is of all of them (mean square)
     inertia: Value | None  # of the joint, with the ripple known; null where the law was fitted by another method
     along: Along
 
@@ -244,7 +245,8 @@ def _rippled(ripple: Ripple | None, inertia: Value | None, revolute: bool) -> Ri
     if ripple is None:
         return None
     unit = "N m" if revolute else "N"
-    return Rippled(Value(ripple.rms, ripple.std, unit), ripple.share, ripple.orders, inertia, ripple.along)
+    largest = ripple.along.share_of(ripple.orders[0])
+    return Rippled(Value(ripple.rms, ripple.std, unit), ripple.share, ripple.orders, largest, inertia, ripple.along)
 
 
 def _beside_ripple(joint: JointFit) -> Value | None:

@@ -51,6 +51,13 @@ class Along:
     back: Array  # the same of rows that move back
     waves: Array  # [N m], of a slide [N]: those that were fitted
 
+    def share_of(self, order: float) -> float:
+        """What one of the waves is of all of them (mean square)."""
+        whole, turned = self.waves - np.mean(self.waves), order * self.angle
+        one = np.stack([np.sin(turned), np.cos(turned), np.ones_like(turned)], axis=1)
+        left = whole - one @ np.linalg.lstsq(one, whole, rcond=None)[0]
+        return 1.0 - float(left @ left) / max(float(whole @ whole), 1e-300)
+
 
 @dataclass(frozen=True)
 class Ripple:
