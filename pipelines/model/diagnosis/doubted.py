@@ -2,6 +2,7 @@
 
     done = unlike_held_out(done, rms, floor, nominal)     held-out logs have a floor of their own
     done = above_in_both(done, rms, floor, fitted)        what has no name shows in both, in neither enough alone
+    done = without_twin(done, rms, noise, why)           an arm in order can be simulated under its own controller
     done = unlike_motion(done, usual)                     noise does not follow how a joint moves
     done = unlike_noise(done, usual)                      noise does not oscillate
     done = unnamed(done, floor)                           what has changed has a name that the residual does not show
@@ -22,7 +23,7 @@ from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.twin import Twin
 from pipelines.model.diagnosis.verdict import Ruling, at_floor, held_out_high, takes_most, without_steps
 
-__all__ = ["above_in_both", "of_replicas", "unlike_held_out", "unlike_motion", "unlike_noise", "unnamed"]
+__all__ = ["above_in_both", "of_replicas", "unlike_held_out", "unlike_motion", "unlike_noise", "unnamed", "without_twin"]
 
 # Times the floor of the held-out logs. The right cause, a spring turned farther than it was fitted, has been seen to leave 5.1, a
 # wrong one 16; of 114 arms in order none left more than 1.9. Of what the nominal model leaves there a wrong name leaves more than a
@@ -35,6 +36,7 @@ _SURELY, _CLEAR, _HALF = 1.4, 1.2, 0.5
 # arms in order, of reference logs of another motion and of standing too, the most that any joint left of both was 1.33; causes that
 # were not known, and left too little of the fitted logs alone, 1.46 and 1.54.
 _BOTH = 1.4
+_NO_NOISE = 15.0  # times the noise in what a model leaves: of right causes of arms without a floor none left more
 _QUIET = 1.3  # times the floor that a twin gives, that an arm in order leaves of the fitted logs at most: of 147 none left more
 _MOST_LEFT = "what explains the fitted logs leaves more than half of what stands above the floor at its joint in those held out"
 # Times the spectrum beside it, and times the most of any replica, that a line of an oscillation has at least. Of 21 arms in order,
@@ -113,6 +115,25 @@ def above_in_both(done: Settled, rms: Array, floor: Array, fitted: Array, but: C
     if not high:
         return done
     reason = f"the residual of {high} stands above the floor in the fitted logs and in those held out, and no cause explains it"
+    return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
+
+
+def without_twin(done: Settled, held_out: Array, noise: Array, why: str) -> Settled:
+    """"unknown" where nothing was found, the fitted arm cannot be simulated under the controller that the logs describe, and a
+    joint stands many times above the noise, fitted and held out: an arm in order is followed by its own model.
+
+    Args:
+        held_out: (joints,) [N m] what the nominal model leaves of what was held out.
+        noise: (joints,) [N m] in what it leaves.
+        why: it cannot; empty where it can, or nobody knows its controller.
+    """
+    if not why or done.ruling.verdict != "nothing-wrong":
+        return done
+    high = held_out_high(np.minimum(held_out, done.found.nominal.rms), np.maximum(noise, 1e-12), _NO_NOISE)
+    if not high:
+        return done
+    reason = (f"the residual of {high} stands far above the noise, no cause explains it, and the arm as it was fitted cannot be "
+              f"simulated: {why}")
     return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
 
 

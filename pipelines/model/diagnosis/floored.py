@@ -41,6 +41,7 @@ class Floored:
     reference: Array | None = None  # (joints,) [N m] what all the reference logs leave, whatever their speeds
     judging: Array | float = 1.0  # (joints,) times as much power the reference logs leave at the speeds of the logs held out
     twin: Twin | None = None  # whose replicas it is, where it was made for these logs
+    no_twin: str = ""  # why there is none although the logs know their controller: the fitted arm cannot be simulated
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -48,7 +49,10 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
     """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
     if given is not None:
         refuse_unfit(given, prepared, case.families, "twin")
-    made, twin = _calibrated(prepared, case, rough, chosen) if given is None else (given, None)
+    try:
+        made, twin = _calibrated(prepared, case, rough, chosen) if given is None else (given, None)
+    except InputRejected as refused:  # D15, D17
+        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=refused.message)
     if made is None:
         return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
     return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
@@ -57,17 +61,18 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
 
 def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
                 ) -> tuple[Calibration | None, Twin | None]:
-    """Thresholds by the twin; None where the logs do not know their controller, or the fitted arm cannot be simulated."""
+    """Thresholds by the twin; None where the logs do not know their controller.
+
+    Raises:
+        InputRejected: D15, D17, the fitted arm cannot be simulated.
+    """
     places = replayable([log for log, _ in prepared.motions])
     if not places or not chosen.replicas:
         return None, None
     left, last, weight = clean(rough[-1]), rough[-1].before, rough[0].before.weight
     model = last.model
-    try:
-        noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
-        twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas, chosen.seed)
-    except InputRejected:  # such an arm cannot be simulated: D15, D17
-        return None, None
+    noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
+    twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas, chosen.seed)
     if twin is None:
         return None, None
     weighted = twin.weighted(weight)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.doubted import above_in_both, unlike_held_out, unlike_noise, unnamed
+from pipelines.model.diagnosis.doubted import above_in_both, unlike_held_out, unlike_noise, unnamed, without_twin
 from pipelines.model.diagnosis.pruned import Settled
 from pipelines.model.diagnosis.search import Found
 from pipelines.model.diagnosis.verdict import Ruling
@@ -47,6 +47,19 @@ def test_what_shows_in_fitted_and_in_held_out_logs_is_no_chance(fitted: float, h
     assert ("joint 2" in told.ruling.reason) is (verdict == "unknown")
     named = replace(done, ruling=Ruling("cause", (0,), ""))
     assert above_in_both(named, np.array([0.03, held_out, 0.01]), FLOOR, FLOOR) is named
+
+
+@pytest.mark.parametrize(("fitted", "held_out", "why", "verdict"), [
+    (1.3, 1.2, "it runs away", "unknown"), (1.3, 1.2, "", "nothing-wrong"), (0.1, 1.2, "it runs away", "nothing-wrong"),
+    (1.3, 0.1, "it runs away", "nothing-wrong")])
+def test_an_arm_that_its_own_model_cannot_follow_is_not_in_order(fitted: float, held_out: float, why: str, verdict: str) -> None:
+    """A load that sloshes leaves a hundred times the noise, and a model with it in its numbers is no arm; a recorded arm, whose
+    controller nobody knows, leaves as much in order."""
+    nominal = left(0.01, 0.01, fitted)
+    done = Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
+    told = without_twin(done, np.array([0.01, 0.01, held_out]), FLOOR, why)
+    assert told.ruling.verdict == verdict
+    assert ("joint 3" in told.ruling.reason and why in told.ruling.reason) is (verdict == "unknown")
 
 
 @pytest.mark.parametrize(("held_out", "verdict"), [(0.03, "cause"), (0.16, "unknown")])
