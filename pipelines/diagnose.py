@@ -101,8 +101,11 @@ def beside(settings: Settings, request: Request) -> Beside:
     return Beside(Material(arm, request.tell, stored), sources, folders)
 
 
-def compute(inputs: Inputs, settings: Settings) -> Result:
+def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     """Gates, then the search.
+
+    Args:
+        whole: with detection limits and the series of figures; neither has a part in the verdict and its numbers.
 
     Raises:
         NothingMatched: C06, no log to fit.
@@ -123,7 +126,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     memory = Memory()
     said = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
-                               settings.decimate, settings.min_speed, settings.seed)
+                               settings.decimate, settings.min_speed, settings.seed, evidence=whole, limits=whole)
     found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)
     found = _beside_clocks(found, said)
     robot = chosen.identify[0].robot

@@ -15,12 +15,12 @@ import jsonschema
 import pytest
 
 from pipelines.errors import Check
-from pipelines.log.files import open_log, write_log
+from pipelines.log.files import PROVENANCE, open_log, write_log
 from pipelines.log.result_schema import result_schema
 from pipelines.log.results import decode, encode, read_series
 from pipelines.log.table import write_csv
 from pipelines.report.report import Report
-from pipelines.stage import Request, Stage, run_stage
+from pipelines.stage import Outcome, Request, Stage, footer_of, run_stage
 from rrrid_cli.commands import STAGES
 from tests.controlled import controlled_log
 from tests.diagnose.sessions import but, session, written
@@ -43,6 +43,10 @@ def _stage(module: str) -> Stage[Any, Any]:
     return stage
 
 
+def _module(stage: Stage[Any, Any]) -> str:
+    return stage.compute.__module__.removeprefix("pipelines.")
+
+
 def _recording(folder: Path, samples: Path) -> Path:
     """A CSV recording and its recipe, for the stage that makes logs instead of reading them."""
     folder.mkdir(exist_ok=True)
@@ -52,7 +56,10 @@ def _recording(folder: Path, samples: Path) -> Path:
     return recipe
 
 
-def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) -> tuple[Any, Any]:
+Ran = tuple[Stage[Any, Any], Outcome[Any]]
+
+
+def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
     stage = _stage(module)
     settings = stage.settings()
     paths: tuple[Path, ...] = (samples / "rrr-closed-form",)
@@ -82,7 +89,13 @@ def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) ->
         paths = (written_result(tmp_path / "a", 1), written_result(tmp_path / "b", 2))
     if module == "design_excitation":
         settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
-    return stage, run_stage(stage, Request(paths, out=tmp_path / "out", no_report=no_report), settings)
+    return stage, run_stage(stage, Request(paths, out=tmp_path / "out"), settings)
+
+
+@pytest.fixture(scope="module")
+def ran(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Ran:
+    """One outcome of a stage for all that is asked of it: pytest asks it all before the next stage's turn."""
+    return _run(request.param, tmp_path_factory.mktemp(request.param), samples)
 
 
 def test_every_stage_is_a_command() -> None:
@@ -119,12 +132,12 @@ def test_compute_opens_no_file_and_prints_nothing(module: str) -> None:
                 assert name not in FORBIDDEN, f"{function.__qualname__} calls {name}"
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m != "run"])
-def test_a_stored_result_redraws_its_report(module: str, tmp_path: Path, samples: Path) -> None:
+@pytest.mark.parametrize("ran", [m for m in MODULES if m != "run"], indirect=True)
+def test_a_stored_result_redraws_its_report(ran: Ran) -> None:
     """result.json and result.h5 hold all that the report shows: what is read back draws the same page."""
     from pipelines.report.render import render_report
 
-    stage, outcome = _run(module, tmp_path, samples, no_report=True)
+    stage, outcome = ran
     stored = json.loads((outcome.folder / "result.json").read_text())
     jsonschema.validate(stored, result_schema(type(outcome.result), stage.name))
     assert stored.pop("command") == stage.name
@@ -133,16 +146,16 @@ def test_a_stored_result_redraws_its_report(module: str, tmp_path: Path, samples
     assert encode(again)[0] == encode(outcome.result)[0]
     redrawn = stage.report(again)
     assert isinstance(redrawn, Report)
-    assert render_report(redrawn, {})["report.html"] == render_report(outcome.report, {})["report.html"]
+    footer = footer_of(stage.name, json.loads((outcome.folder / PROVENANCE).read_text())["inputs"])
+    assert render_report(redrawn, footer)["report.html"] == (outcome.folder / "report.html").read_bytes()
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_twice_is_the_same(module: str, tmp_path: Path, samples: Path) -> None:
+@pytest.mark.parametrize("ran", MODULES, indirect=True)
+def test_twice_is_the_same(ran: Ran, tmp_path: Path, samples: Path) -> None:
     """Equal inputs give equal bytes, provenance.json apart."""
     contents = []
-    for _ in range(2):
-        _, outcome = _run(module, tmp_path, samples)
-        files = sorted(p for p in outcome.folder.rglob("*") if p.is_file() and p.name != "provenance.json")
+    for _, outcome in (ran, _run(_module(ran[0]), tmp_path, samples)):
+        files = sorted(p for p in outcome.folder.rglob("*") if p.is_file() and p.name != PROVENANCE)
         contents.append({p.relative_to(outcome.folder).as_posix(): p.read_bytes() for p in files})
     assert contents[0] == contents[1]
     assert "report.html" in contents[0]
@@ -156,11 +169,10 @@ def _examined(folder: Path, out: Path) -> tuple[int, list[Check]]:
     return len(result.logs), [c for c in result.checks if c.level in ("reject", "repair")]
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m not in ("inspect", "run", "frf", "diagnose", "compare")])
-def test_every_log_a_stage_writes_is_in_order(module: str, tmp_path: Path, samples: Path) -> None:
+@pytest.mark.parametrize("ran", [m for m in MODULES if m not in ("inspect", "run", "frf", "diagnose", "compare")], indirect=True)
+def test_every_log_a_stage_writes_is_in_order(ran: Ran, tmp_path: Path) -> None:
     """`inspect` passes on every log that any stage writes; these stages write some."""
-    _, outcome = _run(module, tmp_path, samples, no_report=True)
-    logs, complaints = _examined(outcome.folder, tmp_path / "examined")
+    logs, complaints = _examined(ran[1].folder, tmp_path / "examined")
     assert logs > 0
     assert complaints == []
 

@@ -1,7 +1,7 @@
 """`rrrid diagnose` on sealed cases: machines, joints, strengths and experiments drawn from the test bench.
 
-A dozen short ones; and as `slow` the whole campaign, some 650 cases of 52 s, whose table it prints (pytest -s). The same by
-hand, in parts that can be interrupted: python -m benchmarks.hidden_effects all --out FOLDER
+A dozen short ones, without their detection limits; and as `slow` the whole campaign, some 650 cases of 52 s, whose table it
+prints (pytest -s). The same by hand, in parts that can be interrupted: python -m benchmarks.hidden_effects all --out FOLDER
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.hidden_effects.cases import SealedCase, campaign
-from benchmarks.hidden_effects.judge import by_command, judge, scores_in, tasks
+from benchmarks.hidden_effects.judge import by_command, by_compute, judge, scores_in, tasks
 from benchmarks.hidden_effects.make import make_cases
 from benchmarks.hidden_effects.score import Score
 from benchmarks.hidden_effects.table import rows, table
@@ -32,7 +32,7 @@ def dozen() -> list[SealedCase]:
 def scores(tmp_path_factory: pytest.TempPathFactory) -> list[Score]:
     out: Path = tmp_path_factory.mktemp("dozen")
     list(make_cases(dozen(), out))
-    return list(judge(out, out / "verdicts.jsonl", tasks(out), by_command))
+    return list(judge(out, out / "verdicts.jsonl", tasks(out), by_compute))
 
 
 def test_no_cause_is_named_that_is_not_there(scores: list[Score]) -> None:

@@ -26,7 +26,7 @@ from pipelines.log.results import encode
 from pipelines.model.effects import all_effects
 from pipelines.stage import Request, run_stage
 
-__all__ = ["Diagnose", "asked", "by_command", "engine_named", "judge", "scores_in", "tasks"]
+__all__ = ["Diagnose", "asked", "by_command", "by_compute", "engine_named", "judge", "scores_in", "tasks"]
 
 Diagnose = Callable[[Path, tuple[str, ...]], Any]
 Task = tuple[Sealed, tuple[str, ...]]
@@ -40,6 +40,14 @@ def by_command(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
     settings = dataclasses.replace(stage.settings(), without=without) if without else stage.settings()
     with tempfile.TemporaryDirectory() as place:
         return run_stage(stage, Request((folder,), out=Path(place) / "out", no_report=True), settings).json
+
+
+def by_compute(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
+    """What `by_command` says but for detection limits, the series of figures and a folder of output: no score looks at them."""
+    module = importlib.import_module("pipelines.diagnose")
+    settings = module.Settings(without=without)
+    found: Mapping[str, Any] = encode(module.compute(module.read(Request((folder,)), settings), settings, whole=False))[0]
+    return found
 
 
 def engine_named(name: str | None) -> Diagnose:

@@ -51,9 +51,14 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def test_stored_thresholds_give_the_same_answer(place: Path) -> None:
+@pytest.fixture(scope="module")
+def again(place: Path) -> Outcome[diagnose.Result]:
+    """The same logs by the thresholds that the first diagnosis has stored."""
+    return asked(place / "logs", place / "again", calibration=str(place / "first"))
+
+
+def test_stored_thresholds_give_the_same_answer(place: Path, again: Outcome[diagnose.Result]) -> None:
     """Every figure and every series, the origin apart; and the calibration is handed on as it is."""
-    again = asked(place / "logs", place / "again", calibration=str(place / "first"))
     first, second = (json.loads((place / name / "result.json").read_text()) for name in ("first", "again"))
     assert without_origin(first) == without_origin(second)
     for name in ("result.h5", "calibration.json", "calibration.h5"):
@@ -64,11 +69,10 @@ def test_stored_thresholds_give_the_same_answer(place: Path) -> None:
     assert any("An earlier diagnosis has stored them" in text for text in said)
 
 
-def test_a_cause_of_the_whole_arm_may_be_left_out_later(place: Path) -> None:
+def test_a_cause_of_the_whole_arm_may_be_left_out_later(place: Path, again: Outcome[diagnose.Result]) -> None:
     """The others are held against what they were held against with it."""
     fewer = asked(place / "logs", place / "fewer", calibration=str(place / "first"), without=(*FEW, "gravity_tilt"))
-    whole = asked(place / "logs", place / "with", calibration=str(place / "first"))
-    kept = {(one.cause, one.joint): one.gain for one in whole.result.thresholds if one.cause != "gravity_tilt"}
+    kept = {(one.cause, one.joint): one.gain for one in again.result.thresholds if one.cause != "gravity_tilt"}
     assert {(one.cause, one.joint): one.gain for one in fewer.result.thresholds} == kept
     assert [one.cause for one in fewer.result.findings] == ["cogging"]
 
@@ -104,7 +108,8 @@ def test_reading_gives_back_what_was_written(place: Path, tmp_path: Path) -> Non
     assert [(one.place, one.joint) for one in made.wide.causes] == [("", None), *own]
 
 
-def test_one_of_an_older_version_knows_causes_of_the_whole_arm_alone(place: Path, tmp_path: Path) -> None:
+def test_one_of_an_older_version_knows_causes_of_the_whole_arm_alone(place: Path, again: Outcome[diagnose.Result],
+                                                                     tmp_path: Path) -> None:
     """It is read, and the others are held against what grows with the weight of their joint, as they were then."""
     stored = json.loads((place / "first/calibration.json").read_text())
     of_arm = [one for one in stored["wide"]["causes"] if one["joint"] is None]
@@ -115,9 +120,9 @@ def test_one_of_an_older_version_knows_causes_of_the_whole_arm_alone(place: Path
     (tmp_path / "older/calibration.json").write_text(json.dumps(older))
     shutil.copy(place / "first/calibration.h5", tmp_path / "older")
     found = asked(place / "logs", tmp_path / "out", calibration=str(tmp_path / "older")).result
-    now = asked(place / "logs", tmp_path / "now", calibration=str(place / "first")).result
     assert [(one.cause, one.joint) for one in found.findings] == [("cogging", 2)]
-    same = {(one.cause, one.joint): one.gain == other.gain for one, other in zip(found.thresholds, now.thresholds, strict=True)}
+    same = {(one.cause, one.joint): one.gain == other.gain
+            for one, other in zip(found.thresholds, again.result.thresholds, strict=True)}
     assert {name for (name, _), alike in same.items() if not alike} == {"encoder_eccentricity"}
 
 
@@ -162,7 +167,7 @@ def test_a_cause_that_it_does_not_know_is_asked_to_be_left_out(place: Path, tmp_
         asked(place / "logs", tmp_path / "out", without=but("cogging", "quadratic_drag"), calibration=str(place / "first"))
 
 
-def test_a_run_takes_it_as_diagnose_does(place: Path, tmp_path: Path) -> None:
+def test_a_run_takes_it_as_diagnose_does(place: Path, again: Outcome[diagnose.Result], tmp_path: Path) -> None:
     """The same causes against the same thresholds, and no twin; taken back as long as the file is the same, and refused in an
     output folder of its own."""
     home = tmp_path / "stored"
@@ -171,7 +176,7 @@ def test_a_run_takes_it_as_diagnose_does(place: Path, tmp_path: Path) -> None:
     settings = run.Settings({"diagnose": own}, tuple(name for name in STAGES if name not in ("inspect", "diagnose")))
     request = Request((place / "logs",), out=tmp_path / "run", no_report=True)
     found = run_stage(run.STAGE, request, settings).result.stages[-1].result
-    alone = asked(place / "logs", tmp_path / "alone", calibration=str(home)).result
+    alone = again.result
     assert found.calibrated_with == alone.calibrated_with == ("excitation-1",)
     assert [(one.cause, one.joint) for one in found.findings] == [(one.cause, one.joint) for one in alone.findings]
     assert found.thresholds == alone.thresholds

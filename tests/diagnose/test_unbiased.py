@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from pipelines.bench import experiments
-from pipelines.bench.machine import Machine, draw_machine
+from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis import unbiased
@@ -27,9 +28,25 @@ from pipelines.model.diagnosis.unbiased import smoothed_away
 MACHINES = (1501, 1502, 1503, 1505)
 
 
-def fitted(machine: Machine, seed: int, spoiled: Callable[[ExperimentLog], ExperimentLog] = lambda log: log,
-           ) -> tuple[Refined, Prepared]:
+@lru_cache(maxsize=8)
+def recorded(number: int, seed: int) -> ExperimentLog:
+    machine = draw_machine(number, "fault")
     log, = record(machine, (), [experiments.excitation(machine, seed, 6.0, 2)], seed)
+    return log
+
+
+def as_recorded(log: ExperimentLog) -> ExperimentLog:
+    return log
+
+
+def of_no_controller(log: ExperimentLog) -> ExperimentLog:
+    return replace(log, controller=None)
+
+
+@lru_cache(maxsize=8)
+def fitted(number: int, seed: int, spoiled: Callable[[ExperimentLog], ExperimentLog] = as_recorded) -> tuple[Refined, Prepared]:
+    """Of the machine of this number; none of these tests changes it."""
+    log = recorded(number, seed)
     prepared = prepare(Logs((spoiled(log),)), DiagnosisSettings())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     return refine(Exact.start(columns, fit), replace(prepared.data, steady=True), fit.weight), prepared
@@ -47,7 +64,7 @@ def errors() -> tuple[Array, Array]:
     for seed, number in enumerate(MACHINES):
         machine = draw_machine(number, "fault")
         truth = np.array([one.sharpness for one in machine.friction])
-        done, prepared = fitted(machine, seed)
+        done, prepared = fitted(number, seed)
         artefact = smoothed_away(done.model.arm, np.array(machine.amplifier_noise), done.data, prepared, seed)
         assert artefact is not None
         before.append(sharpness(done) / truth - 1.0)
@@ -70,8 +87,7 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
 @pytest.mark.parametrize("known", [True, False])
 def test_every_model_of_a_search_is_moved_by_what_the_arm_that_was_found_leaves(known: bool) -> None:
     """The nominal one, that of the only step, before and after, and the final one; none where no log can be run."""
-    machine = draw_machine(1501, "fault")
-    done, prepared = fitted(machine, 0, lambda log: log if known else replace(log, controller=None))
+    done, prepared = fitted(1501, 0, as_recorded if known else of_no_controller)
     other = refine(done.model, done.data, 2.0 * done.weight)
     nothing: Any = Step(other, None, (), (), None, ())  # type: ignore[arg-type]
     case: Any = SimpleNamespace(beside=())
@@ -87,7 +103,7 @@ def test_every_model_of_a_search_is_moved_by_what_the_arm_that_was_found_leaves(
 
 
 def test_logs_that_no_controller_is_known_of_leave_nothing() -> None:
-    done, prepared = fitted(draw_machine(1501, "fault"), 0, lambda log: replace(log, controller=None))
+    done, prepared = fitted(1501, 0, of_no_controller)
     assert smoothed_away(done.model.arm, np.zeros(3), done.data, prepared, 0) is None
 
 
@@ -101,7 +117,7 @@ def test_a_log_with_a_hole_is_run_with_the_hole(name: str, missing: int) -> None
         return replace(log, signals={**log.signals, name: replace(log.signals[name], values=values)})
 
     machine = draw_machine(1501, "fault")
-    done, prepared = fitted(machine, 0, spoiled)
+    done, prepared = fitted(1501, 0, spoiled)
     artefact = smoothed_away(done.model.arm, np.array(machine.amplifier_noise), done.data, prepared, 0)
     assert artefact is not None
     assert artefact.shape == (done.data.rows,)
@@ -113,7 +129,7 @@ def test_a_log_with_a_hole_is_run_with_the_hole(name: str, missing: int) -> None
 def test_rows_that_a_run_does_not_come_to_count_as_if_it_left_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Samples that a log lacks for a reason of its own, spikes say, no simulated one lacks."""
     machine = draw_machine(1501, "fault")
-    done, prepared = fitted(machine, 0)
+    done, prepared = fitted(1501, 0)
     spikes = np.arange(prepared.motions[0][0].n_samples)[:, None] // 50 == 60
     monkeypatch.setattr(unbiased, "_as_missing", lambda x, measured: np.where(spikes, np.nan, x))
     artefact = smoothed_away(done.model.arm, np.array(machine.amplifier_noise), done.data, prepared, 0)
