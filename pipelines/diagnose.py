@@ -105,7 +105,8 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     """Gates, then the search.
 
     Args:
-        whole: with detection limits and the series of figures; neither has a part in the verdict and its numbers.
+        whole: with detection limits, what they find beyond all reach, and the series of figures: none has a part in the verdict, in
+            findings or their numbers.
 
     Raises:
         NothingMatched: C06, no log to fit.

@@ -43,7 +43,8 @@ def by_command(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
 
 
 def by_compute(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
-    """What `by_command` says but for detection limits, the series of figures and a folder of output: no score looks at them."""
+    """What `by_command` says without detection limits, series of figures and a folder of output: verdict, findings and numbers are
+    the same, `not_testable` lacks causes of which the limits say that no arm could have so much."""
     module = importlib.import_module("pipelines.diagnose")
     settings = module.Settings(without=without)
     found: Mapping[str, Any] = encode(module.compute(module.read(Request((folder,)), settings), settings, whole=False))[0]

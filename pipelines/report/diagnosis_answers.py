@@ -29,7 +29,7 @@ def answer_figures(number: int, one: Finding) -> Iterator[Figure]:
         return
     told = one.parameters.get("frequency")
     frequency = told.value if told is not None and isinstance(told.value, float) else math.nan
-    said = f"; vertical line: {format_number(frequency, 3)} Hz" if math.isfinite(frequency) else ""
+    said = f"; vertical line: {format_number(frequency, 3)} Hz, that of the verdict" if math.isfinite(frequency) else ""
     joint = one.answers[0].joint
     yield Figure(f"proof-{number}-response", f"How joint {joint} answers in each posture, acceleration per input: measured points, "
                  f"and the modes that were found over them{said}. A rigid body is flat.",
@@ -45,7 +45,9 @@ def draw_answers(axes: Axes, answers: tuple[Answer, ...], frequency: float) -> N
     if math.isfinite(frequency):
         axes.axvline(frequency, color=style.VERMILLION, linewidth=0.8, zorder=0.5)
     levels = np.concatenate([one.fitted for one in answers])
-    axes.set_ylim(_ROOM[0] * float(levels.min()), _ROOM[1] * float(levels.max()))
+    levels = levels[np.isfinite(levels) & (levels > 0.0)]
+    if len(levels):
+        axes.set_ylim(_ROOM[0] * float(levels.min()), _ROOM[1] * float(levels.max()))
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel("acceleration per input")
     axes.legend(loc="best", fontsize="small")

@@ -47,8 +47,8 @@ def _title(result: Result) -> str:
 
 
 def _verdicts(group: Group) -> list[str]:
-    """What diagnosis says, then the extended model, then what was refused, each reason once, or else which stages found something
-    that is not in order: what they say, where no diagnosis says more; without these, what the last stage says.
+    """What diagnosis says, and the extended model. Then what was refused, each reason once; where nothing was, which stages have
+    remarks, or what these say where there is neither. Without all that, what the last stage says.
 
     Of several robots or days each has its first answer there; the table of stages has the others.
     """
@@ -64,11 +64,14 @@ def _verdicts(group: Group) -> list[str]:
 
 
 def _look_at(steps: Sequence[Step]) -> list[str]:
-    """Their names in a sentence: what they say stands with the stages, and is about the logs more than about the arm."""
-    if not steps:
-        return []
-    *first, last = (step.name for step in steps)
-    return [f"{', '.join(first)}{' and ' if first else ''}{last} found something to look at as well: see the stages."]
+    """Their names, by how grave it is: what they say stands with the stages, and is about the logs more than about the arm."""
+    found = []
+    for tone, words in (("bad", "Not in order"), ("attention", "With remarks")):
+        names = [step.name for step in steps if step.report.tone == tone]
+        if names:
+            *first, last = names
+            found.append(f"{words}: {', '.join(first)}{' and ' if first else ''}{last}; see the stages.")
+    return found
 
 
 def _refusals(group: Group) -> list[str]:

@@ -58,7 +58,10 @@ def test_what_a_model_without_the_finding_imitates_is_said(torque: float, left: 
     ("link_length", None, "error", Value(0.012, 1e-4, "m"), " (+12 mm)"),
     ("gravity_tilt", None, "angle", Value(np.deg2rad(5.0), 1e-3, "rad"), " (5°)"),
     ("encoder_eccentricity", 3, "amplitude", Value(0.004, 1e-4, "rad"), " (4 mrad)"),
-    ("torque_saturation", 2, "limit", Value(33.0, 0.1, "N m"), " (33 N m)")])
+    ("rotor_inertia", 3, "inertia", Value(0.006, 1e-4, "kg m^2"), " (0.006 kg m²)"), ("rotor_inertia", 3, "inertia",
+                                                                                    Value(5.2, 0.1, "kg"), " (5.2 kg)"),
+    ("torque_gain", 1, "gain_error", Value(float("nan"), None, "1"), ""),
+    ("torque_saturation", 2, "limit", Value(1253.0, 0.1, "N m"), " (1250 N m)")])
 def test_how_much_there_is_is_told_in_usual_units(cause: str, joint: int | None, name: str, value: Value, said: str) -> None:
     """One number says how much there is of a load, and by how much a torque scale is off; of waves none does."""
     one = finding(cause, joint)

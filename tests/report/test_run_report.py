@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import pytest
@@ -133,14 +134,15 @@ def test_what_is_not_in_order_is_told_where_nothing_was_refused() -> None:
 
 
 @pytest.mark.parametrize(("stages", "said"), [
-    (("inspect",), "inspect found something to look at as well: see the stages."),
-    (("inspect", "fit-friction", "frf"), "inspect, fit-friction and frf found something to look at as well: see the stages.")])
-def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: tuple[str, ...], said: str) -> None:
+    ({"inspect": "attention"}, "With remarks: inspect; see the stages."),
+    ({"inspect": "attention", "fit-friction": "bad", "frf": "attention"},
+     "Not in order: fit-friction; see the stages. With remarks: inspect and frf; see the stages.")])
+def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: dict[str, Any], said: str) -> None:
     """The headline is about the arm; what they say stands in the table of stages."""
     rms = ResidualRms(NOMINAL, NOMINAL, NOMINAL)
     empty = {field.name: None for field in fields(Diagnosis)} | {"findings": (), "residual_rms": rms}
     bare = Diagnosis(**empty)  # type: ignore[arg-type]
-    steps = (*(Step(name, 0, object(), Report(name, "Waist: a long story.", "attention"), ()) for name in stages),
+    steps = (*(Step(name, 0, object(), Report(name, "Waist: a long story.", tone), ()) for name, tone in stages.items()),
              Step("reconstruct", 0, object(), Report("Motion", "Known.", "good"), ()),
              Step("diagnose", 0, bare, Report("Diagnosis", "Cogging.", "bad"), ()))
     told = run_report(Result(steps))

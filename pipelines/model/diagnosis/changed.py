@@ -90,7 +90,8 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
         judging = 1.0 if case.judge is None else _times(since.floor_of(case.judge), since.floor)
         floored = Floored(floor, "reference logs", None, given, noise, since.floor, judging)
         sure = isinstance(moved, Absorbed) and not moved.unsure
-        told = diagnosis_of(first, case, done, floored, chosen, partial(_taken, limits, since.chance), sure)
+        told = diagnosis_of(first, case, done, floored, chosen, partial(_taken, limits, since.chance), sure,
+                            moved is not None)
     if given is None:
         told = replace(told, calibration=Calibration(
             origin_of("reference logs", logs, None, chosen), conditions_of(now), alone.chance.weight, alone.floor,

@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,7 +24,6 @@ from pipelines.model.frf.modes import relative_acceleration
 
 __all__ = ["Compared", "Compliance", "compared", "compliance", "gaps_untold", "untold"]
 
-_FIRST = 1  # the joint that turns with the base
 _MOVED = 3.0  # standard deviations, by which a base's frequency or a joint's stiffness is another one
 _SAME = 0.03  # of it, within which two sessions show the same one: temperature, and how the arm stood
 _NO_RESPONSES = "a gap is told from a spring by frequency responses that show none, and there is no frf log"
@@ -39,10 +38,12 @@ class Compliance:
     rigid: bool
     open: str  # what they leave open, in words; empty where they do not
     seen: tuple[frf.Seen, ...] = field(default=(), repr=False)
+    seen_at: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # place of a cause -> joints that show it
 
     def answers(self, acting: Acting) -> tuple[Answer, ...]:
-        """The responses that name a cause: of its joint, of the first one where it is the base."""
-        return tuple(_answer(one) for one in self.seen if one.measured.joint == (acting.effect.joint or _FIRST))
+        """The responses that name a cause: of its joint, of the first one that shows it where it is the base."""
+        joint = min(self.seen_at.get(acting.place, (0,)))
+        return tuple(_answer(one) for one in self.seen if one.measured.joint == joint)
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,11 @@ def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] =
         return Compliance((), False, f"the frequency responses are of no use: {refused.message}")
     giving = [one for one in found.classification
               if one.cause is not None and find_effect(one.cause).evidence == "frequency responses"]
-    named = tuple(_acting(one, arm) for one in giving if one.cause not in without)
+    wanted = [one for one in giving if one.cause not in without]
+    named = tuple(_acting(one, arm) for one in wanted)
     left = "; ".join(one.evidence for one in found.undecided)
-    return Compliance(named, not giving and not found.undecided, left, found.seen)
+    shown = {acting.place: one.seen_at for acting, one in zip(named, wanted, strict=True)}
+    return Compliance(named, not giving and not found.undecided, left, found.seen, shown)
 
 
 def compared(now: Compliance, before: Compliance) -> Compared:

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.calibrated import bounds_of, conditions_of, origin_of, refuse_unfit, thresholds_of
@@ -18,6 +20,7 @@ from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.clean import clean
 from pipelines.model.diagnosis.drive_noise import drive_noise, white
 from pipelines.model.diagnosis.evidence import floors_of
+from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.own_motion import following
@@ -27,6 +30,9 @@ from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin, make_twin, replayable
 
 __all__ = ["Floored", "floored_by"]
+
+_RUNS_AWAY = "RRID-D17"
+_UNLIKELY = 2.0  # times what the nominal model leaves of the log at some joint, that a twin of an arm in order leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +47,7 @@ class Floored:
     reference: Array | None = None  # (joints,) [N m] what all the reference logs leave, whatever their speeds
     judging: Array | float = 1.0  # (joints,) times as much power the reference logs leave at the speeds of the logs held out
     twin: Twin | None = None  # whose replicas it is, where it was made for these logs
-    no_twin: str = ""  # why there is none although the logs know their controller: the fitted arm cannot be simulated
+    no_twin: str = ""  # why there is none although the logs know their controller: no model of the arm follows it
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -51,8 +57,9 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
         refuse_unfit(given, prepared, case.families, "twin")
     try:
         made, twin = _calibrated(prepared, case, rough, chosen) if given is None else (given, None)
-    except InputRejected as refused:  # D15, D17
-        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=refused.message)
+    except InputRejected as refused:
+        why = refused.message if refused.code == _RUNS_AWAY else ""  # numbers of too poor a motion, D15, are no arm's fault
+        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=why)
     if made is None:
         return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
     return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
@@ -69,12 +76,8 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
     places = replayable([log for log, _ in prepared.motions])
     if not places or not chosen.replicas:
         return None, None
-    left, last, weight = clean(rough[-1]), rough[-1].before, rough[0].before.weight
-    model = last.model
-    noise = drive_noise(model, prepared.data, left, prepared.motions, prepared.recipe, places[0], chosen.seed)
-    twin = make_twin(model, last.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas, chosen.seed)
-    if twin is None:
-        return None, None
+    model, twin = _likely(prepared, rough, chosen, places[0])
+    weight = rough[0].before.weight
     weighted = twin.weighted(weight)
     found = Thresholds.of_twin(*weighted, case.families, model.nominal)
     made = Calibration(
@@ -83,3 +86,30 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
         floors_of(twin.data, twin.fits[0].left) if chosen.evidence else (),
         following(*weighted).max(axis=1), twin.noise.wander)
     return made, twin
+
+
+def _likely(prepared: Prepared, rough: tuple[Explored, ...], chosen: DiagnosisSettings, place: int) -> tuple[Exact, Twin]:
+    """The twin of the arm beside the greatest causes; where that cannot be simulated, or leaves far more than the log itself does,
+    which no floor is above, of the arm beside fewer of them, and the least of these twins where all do.
+
+    Raises:
+        InputRejected: D15, D17, none of these arms can be simulated.
+    """
+    left, usual = clean(rough[-1]), np.maximum(rough[0].before.rms, 1e-300)
+    made: list[tuple[float, Exact, Twin]] = []
+    refusals: list[InputRejected] = []
+    for done in dict.fromkeys(one.before for one in reversed(rough)):
+        try:
+            noise = drive_noise(done.model, prepared.data, left, prepared.motions, prepared.recipe, place, chosen.seed)
+            twin = make_twin(done.model, done.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas,
+                             chosen.seed)
+        except InputRejected as refused:
+            refusals.append(refused)
+            continue
+        made.append((float(np.max(twin.rms / usual)), done.model, twin))
+        if made[-1][0] <= _UNLIKELY:
+            break
+    if not made:
+        raise refusals[0]
+    _, model, least = min(made, key=lambda one: one[0])
+    return model, least

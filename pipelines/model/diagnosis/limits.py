@@ -41,7 +41,7 @@ _MAIN = 0.1  # of a column: a parameter that makes up less of it does not hide i
 
 
 def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: tuple[bool, ...],
-               probe: Probe | None = None, nameable: Collection[str] = ("residual",),
+               probe: Probe | None = None, nameable: Collection[str] = ("residual",), slight: bool = False,
                ) -> tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]:
     """Every cause that shows, with the smallest amplitude that would have been found; and those for which it is beyond its range.
 
@@ -49,6 +49,7 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
         screened, thresholds: of the last step, in the order of the families.
         probe: the final model, into whose logs causes are put; None: by the formula above.
         nameable: kinds of evidence there are.
+        slight: what arms in order have as much of has no name, however sure it is.
     """
     found, beyond = [], []
     named = {(e.effect.name, e.effect.joint) for e in probe.final.model.effects} if probe is not None else set()
@@ -60,10 +61,10 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
         effect, hidden = one.family.shapes[0], smallest.get(one.family)
         limit = None
         if hidden is not None:
-            limit = _limit(hidden.effect, hidden.amplitudes, revolute, one.best_visibility, "injected")
+            limit = _limit(hidden.effect, hidden.amplitudes, revolute, one.best_visibility, "injected", slight)
         elif effect.fixed_amplitudes is None and one.reach > 0.0 and np.isfinite(bound):
             amplitudes = (np.sqrt(bound) + _SIDE * np.sqrt(chance)) / one.reach * np.eye(one.width)[0]
-            limit = _limit(effect, amplitudes, revolute, one.best_visibility, "analytic")
+            limit = _limit(effect, amplitudes, revolute, one.best_visibility, "analytic", slight)
         told, possible = limit or (None, False)
         if told is not None and possible and (hidden is None or hidden.found):
             found.append(told)
@@ -87,8 +88,10 @@ def _smallest(bounds: Mapping[Family, float], probe: Probe) -> dict[Family, Hidd
 
 
 def _limit(effect: Effect, amplitudes: Array, revolute: tuple[bool, ...], visibility: float,
-           way: Literal["injected", "analytic"]) -> tuple[Detectable, bool] | None:
+           way: Literal["injected", "analytic"], slight: bool = False) -> tuple[Detectable, bool] | None:
     """The reported parameter that goes with the amplitudes, and whether its range holds it."""
+    if slight and len(amplitudes) == 1 and 0.0 < abs(amplitudes[0]) < effect.slight:
+        amplitudes = np.sign(amplitudes) * effect.slight
     values = effect.values(amplitudes)
     if effect.fixed_amplitudes is not None:
         q = next(q for q in effect.parameters if q.name == effect.grows_with)
@@ -103,7 +106,7 @@ def _limit(effect: Effect, amplitudes: Array, revolute: tuple[bool, ...], visibi
     shown = effect.reported(values)
     at = {q.name: Value(values[q.name], None, q.unit_at(turning)) for q in effect.parameters
           if q.shape and q.name in shown and np.isfinite(values.get(q.name, np.nan))}
-    size = max(abs(values[main.name]), effect.slight)
+    size = abs(values[main.name])
     smallest = Value(size, None, main.unit_at(turning))
     return Detectable(effect.name, effect.joint, main.name, smallest, at, way, visibility), size <= max(abs(main.low), main.high)
 

@@ -18,7 +18,7 @@ from pipelines.model.diagnosis.exact import Named, number_moved
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Value
 
-__all__ = ["acting", "of_no_size", "parameters", "slight", "standard_deviations"]
+__all__ = ["acting", "of_no_size", "parameters", "standard_deviations", "too_slight"]
 
 _STEP = 1e-4
 # Deviations from zero: of 410 named causes of the test bench the least true one of one number was 6.9, a false gain 4.9; delays of
@@ -60,9 +60,10 @@ def of_no_size(done: Refined) -> list[int]:
     return [place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std]
 
 
-def slight(done: Refined) -> list[int]:
+def too_slight(done: Refined) -> list[int]:
     """Places of effects of which there surely is less than machines in order have, in the model with all of them."""
-    return [place for place, size, std in _sizes(done) if size + _SURE * std < done.model.effects[place].effect.slight]
+    return [place for place, size, std in _sizes(done)
+            if std > 0.0 and size + _SURE * std < done.model.effects[place].effect.slight]
 
 
 def _sizes(done: Refined) -> list[tuple[int, float, float]]:

@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.mended import not_mending, turned
 from pipelines.model.diagnosis.momentary import ONLY_THEN, only_then
-from pipelines.model.diagnosis.numbers import of_no_size, slight
+from pipelines.model.diagnosis.numbers import of_no_size, too_slight
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.steadied import steadied
@@ -56,7 +56,7 @@ NEAR_THE_FLOOR = "what can be named explains less than half of what stands above
 _LAW_WITHOUT_NAME = "follows a law in the fitted logs, far above the noise, that held-out time does not bear out as any cause"
 TOO_SLIGHT = ("what explains it best is so slight that arms in order have as much of it: something shows, and it may well be "
               "another cause")
-_SO_LITTLE = "there surely is less of it than arms in order have"
+_SO_LITTLE = "it would be so little that arms in order have as much"
 _STOOD = "what was found after it at the joint leaves less without it"
 
 
@@ -82,14 +82,15 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     last = _believed(found, ruling.named, {k: why for k, why in doubts.items() if why}, case)
     last.drop_idle()
     last.drop_small()
+    slight = known and case.changed is None and last.drop_slight()  # what has changed was measured by the same sensors before
     last.drop_harmful()
     if not known:
         last.drop_unseen(floor)
     few = NEAR_THE_FLOOR if known and last.explains_little(floor) else ""
     if few:  # what keeps all the rules is no noise: something is wrong, and not this alone
         last.drop(last.kept, _BESIDE)
-    if known and last.drop_slight() and not last.kept:
-        few = TOO_SLIGHT
+    if slight and not last.kept:
+        few = few or TOO_SLIGHT
     if last.kept:
         return Settled(replace(found, final=last.final), replace(ruling, named=tuple(last.kept), doubts=last.doubts), simulated)
     return _nothing(found, plain, next((why for why in there.values() if why), ""), last.doubts, case, floor, known, few)
@@ -141,7 +142,7 @@ class _Last:
     def drop_slight(self) -> bool:
         """Those of which machines in order have as much; whether there were any."""
         before = len(self.kept)
-        self.drop([self.kept[place] for place in slight(self.final)] if self.kept else [], _SO_LITTLE)
+        self.drop([self.kept[place] for place in too_slight(self.final)] if self.kept else [], _SO_LITTLE)
         return len(self.kept) < before
 
     def drop_harmful(self) -> None:
@@ -174,7 +175,7 @@ def _nothing(found: Found, plain: Found, elsewhere: str, doubts: dict[int, str],
     alone = _elsewhere(near_other_motion(without_steps(plain, floor, known), plain, case, floor), plain, case, floor, known)
     reason = alone.reason
     if alone.verdict == "unknown":
-        reason = elsewhere or f"{alone.reason}: {next(iter(doubts.values()), '')}"
+        reason = elsewhere or (TOO_SLIGHT if few == TOO_SLIGHT else f"{alone.reason}: {next(iter(doubts.values()), '')}")
     if not known and alone.verdict == "nothing-wrong" and (where := much_without_name(found, doubts, floor)):
         alone, reason = replace(alone, verdict="unknown"), f"{where} {_LAW_WITHOUT_NAME}"
     if few and alone.verdict == "nothing-wrong" and case.changed is None:  # of what has changed, other motion may leave a little

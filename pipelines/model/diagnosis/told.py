@@ -46,12 +46,12 @@ Limits = tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]
 
 
 def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings,
-                 limits: Callable[[], Limits] | None = None, moved: bool = False) -> Diagnosis:
+                 limits: Callable[[], Limits] | None = None, moved: bool = False, hinted: bool = False) -> Diagnosis:
     """What was found, as a result tells it.
 
     Args:
         limits: asks for those that another process looks for; by default they are worked out here.
-        moved: whether there is a cause that the base parameters show.
+        moved: whether there is a cause that the base parameters show; `hinted`: or something of which they do not tell what it is.
     """
     done = replace(done, found=steady_nominal(done.found))
     held, prepared = replace(first.held, case=case), first.held.prepared
@@ -66,7 +66,7 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
             done = replace(done, found=unbiased(done.found, prepared, case, chosen.seed))
             own = floor()
         responded = judged(held, done.found.final)
-    done, responded = _held_against(first, case, done, responded, own, chosen, moved, floored.rms)
+    done, responded = _held_against(first, case, done, responded, own, chosen, (moved, hinted), floored.rms)
     plain = done.found.nominal if held.plain is None else steady(held.plain)  # nothing taken out for what responses name
     named = findings(done.found, done.ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks, chosen.evidence,
                      case.beside)
@@ -131,20 +131,21 @@ def _own_floor(responded: Judged, first: Responding, case: Case, floored: Floore
 
 
 def _held_against(first: Responding, case: Case, done: Settled, responded: Judged, own: Array | None, chosen: DiagnosisSettings,
-                  moved: bool, fitted: Array) -> tuple[Settled, Judged]:
+                  moved: tuple[bool, bool], fitted: Array) -> tuple[Settled, Judged]:
     """What is believed beside the floor of the held-out logs, `own` (joints,) [N m], that of the fitted ones, and what responses
     have named beside that."""
+    sure, hinted = moved
     held, prepared = replace(first.held, case=case), first.held.prepared
     judge = first.held.judge if responded.parts else prepared.judge
     if own is None or judge is None or responded.judge is None:
         return done, responded
     plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
-    if done.ruling.verdict == "nothing-wrong" and not moved and not responded.parts:
-        done = above_in_both(done, plain, own, fitted, case.unlike)
-        if case.changed is not None:
-            return done, responded  # what motion shows that the reference logs do not have, they may have had as well
+    if done.ruling.verdict == "nothing-wrong" and not sure:
+        asked = done if hinted or responded.parts else above_in_both(done, plain, own, fitted, case.unlike)
+        if case.changed is not None or asked is not done:
+            return asked, responded  # what motion shows that the reference logs do not have, they may have had as well
     final = responded.final
-    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, moved,
+    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, sure,
                                bool(responded.parts), fitted)
     return believed, responded if believed is done else judged(held, believed.found.final)
 
@@ -159,7 +160,8 @@ def limits_of(last: Step, case: Case, first: Responding, probed: Probed | None =
     arms = case.arms(last.before.model)
     probe, bounds = ((Probe.of(last.before, case.judge, arms), last.thresholds) if probed is None else
                      probed(last.before, case.judge, arms))
-    return detectable(last.screened, bounds, first.held.prepared.data.logs[0].log.robot.revolute, probe, case.nameable)
+    return detectable(last.screened, bounds, first.held.prepared.data.logs[0].log.robot.revolute, probe, case.nameable,
+                      slight=case.thresholds is not None and case.changed is None)
 
 
 def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool], left: Array) -> str:

@@ -90,15 +90,13 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
 
 
 def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe: Recipe, noise: DriveNoise, replicas: int,
-              seed: int) -> Twin | None:
-    """Replicas of every log that can be simulated; None where there is none.
+              seed: int) -> Twin:
+    """Replicas of every log that can be simulated, of which there is one at least.
 
     Raises:
         InputRejected: D15, D17: the fitted arm cannot be simulated.
     """
     places = replayable([log for log, _ in motions])
-    if not places or replicas < 1:
-        return None
     columns = model.columns
     drawn = Noise(noise.white, np.zeros_like(noise.white))
     seeds = range(seed, seed + replicas)

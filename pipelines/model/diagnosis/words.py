@@ -15,10 +15,11 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Finding, Value
 from pipelines.model.effects import find_effect
+from pipelines.model.friction.words import plain_number
 
 __all__ = ["how_much", "other_joint", "taken_in", "where", "within"]
 
-# Units as a technician says them, where others than SI are usual. An angle of a degree or more is told in degrees.
+# Units as a technician says them, where others than SI are usual. How far something is tilted is told in degrees.
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 _DEGREE = np.pi / 180.0
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
@@ -34,15 +35,14 @@ def how_much(one: Finding) -> str:
     """The number that says how much of it there is, to three digits; empty where no single one does."""
     effect = find_effect(one.cause)
     told = one.parameters.get(effect.size)
-    if told is None or not isinstance(told.value, int | float):
+    if told is None or not isinstance(told.value, int | float) or not np.isfinite(told.value):
         return ""
-    if told.unit == "kg":
-        return f" of {told.value:.3g} kg"
-    times, unit = _USUAL.get(told.unit, (1.0, told.unit))
-    if told.unit == "rad" and abs(told.value) >= _DEGREE:
-        times, unit = 1.0 / _DEGREE, "°"
+    if told.unit == "kg" and one.joint is None:
+        return f" of {plain_number(told.value, 3)} kg"
+    times, unit = (1.0 / _DEGREE, "°") if effect.size == "angle" else _USUAL.get(told.unit, (1.0, told.unit))
     signed = any(q.name == effect.size and q.low < 0.0 for q in effect.parameters)
-    return f" ({told.value * times:{'+' if signed else ''}.3g}{'' if unit == '°' else ' '}{unit})"
+    sign = "+" if signed and told.value > 0.0 else ""
+    return f" ({sign}{plain_number(told.value * times, 3)}{'' if unit == '°' else ' '}{unit.replace('^2', '²')})"
 
 
 def other_joint(parameters: Mapping[str, Value]) -> str:

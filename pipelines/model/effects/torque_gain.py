@@ -32,7 +32,7 @@ class TorqueGain(Effect):
     size = "gain_error"
     twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
     in_drive = True
-    slight = 0.0075  # current sensors and torque constants are told to a hundredth at best
+    slight = 0.0075  # a current sensor that is exact to a hundredth of its range may be off by so much
     needs = ("a known payload, where all joints have the same error",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -64,7 +64,7 @@ def _waves_in_words(joint: JointResult, ripple: Rippled) -> str:
     order, *others = ripple.orders
     apart = 2.0 * math.pi / max(float(np.ptp(ripple.along.angle)), 1e-12)
     near = min((abs(other - order) for other in others), default=math.inf) < _TOLD_APART * apart
-    if near and (order < _SEVERAL * apart or ripple.largest < _MOST):
+    if near and (order < _SEVERAL * apart or not ripple.largest_share >= _MOST):
         return ""
     length = f"a wave every {plain_number(2000.0 * math.pi / order)} mm"
     size = f"about {plain_number(order)} waves a turn" if joint.revolute else length

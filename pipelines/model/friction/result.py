@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -94,9 +95,9 @@ class Rippled:
     rms: Value  # [N m], of a slide [N]: rms of what it explains of what the law leaves
     share: float  # of what the law leaves of blocks held out (mean square)
     orders: tuple[float, ...]  # [1/rev] waves in a turn, of a slide [1/(2π m)] in 2π m; the largest first
-    largest: float  # what that one is of all of them (mean square)
     inertia: Value | None  # of the joint, with the ripple known; null where the law was fitted by another method
     along: Along
+    largest_share: float = math.nan  # of the largest wave in all of them (mean square); not known of results stored before it was
 
 
 @dataclass(frozen=True)
@@ -246,7 +247,7 @@ def _rippled(ripple: Ripple | None, inertia: Value | None, revolute: bool) -> Ri
         return None
     unit = "N m" if revolute else "N"
     largest = ripple.along.share_of(ripple.orders[0])
-    return Rippled(Value(ripple.rms, ripple.std, unit), ripple.share, ripple.orders, largest, inertia, ripple.along)
+    return Rippled(Value(ripple.rms, ripple.std, unit), ripple.share, ripple.orders, inertia, ripple.along, largest)
 
 
 def _beside_ripple(joint: JointFit) -> Value | None:

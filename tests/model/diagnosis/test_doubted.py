@@ -39,7 +39,7 @@ def test_what_an_arm_with_its_load_leaves_is_no_alarm(rest: float, floor: float,
     (0.0141, 0.0141, (1,), "nothing-wrong")])
 def test_what_shows_in_fitted_and_in_held_out_logs_is_no_chance(fitted: float, held_out: float, but: tuple[int, ...],
                                                                 verdict: str) -> None:
-    """Either alone may be the floor, which ten replicas know to a tenth: half as much again of both at one joint is not."""
+    """Either alone may be the floor, which ten replicas know to a tenth: two fifths more of both at one joint are not."""
     nominal = left(0.01, fitted, 0.01)
     done = Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
     told = above_in_both(done, np.array([0.03, held_out, 0.01]), FLOOR, FLOOR, but)

@@ -197,9 +197,13 @@ def test_of_a_torque_that_runs_away_nobody_says_what_absorbs_it(size: float) -> 
     assert "other motion" in said
 
 
-@pytest.mark.parametrize(("shows", "told"), [(0.001, TorqueGain.slight), (-0.001, TorqueGain.slight), (-0.03, 1.0 / 0.97 - 1.0)])
+@pytest.mark.parametrize(("shows", "told"), [
+    (0.001, 1.0 - 1.0 / (1.0 + TorqueGain.slight)), (-0.001, 1.0 / (1.0 - TorqueGain.slight) - 1.0), (-0.03, 1.0 / 0.97 - 1.0)])
 def test_no_limit_is_lower_than_what_has_a_name(shows: float, told: float) -> None:
-    """A hundredth of a torque is told from none here; arms in order have as much, and so it would not be named."""
-    found = _limit(TorqueGain(joint=1), np.array([shows]), (True,), 0.9, "injected")
+    """A thousandth of a torque is told from none here; arms in order have as much, and where that has no name it is no limit."""
+    effect, amplitudes = TorqueGain(joint=1), np.array([shows])
+    found, plain = (_limit(effect, amplitudes, (True,), 0.9, "injected", slight) for slight in (True, False))
     assert found is not None
+    assert plain is not None
     assert found[0].smallest.value == pytest.approx(told, rel=1e-12)
+    assert plain[0].smallest.value == pytest.approx(abs(1.0 / (1.0 + shows) - 1.0), rel=1e-12)

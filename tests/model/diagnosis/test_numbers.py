@@ -12,7 +12,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
 from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.numbers import of_no_size, parameters, slight, standard_deviations
+from pipelines.model.diagnosis.numbers import of_no_size, parameters, standard_deviations, too_slight
 from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
@@ -69,4 +69,6 @@ def test_what_surely_is_less_than_arms_in_order_have_is_slight(size: float, leas
     spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5), effect=SimpleNamespace(slight=1.0))
     done: Any = SimpleNamespace(covariance=lambda: 1e-8 * np.eye(3), model=SimpleNamespace(effects=(gain, spring)),
                                 of_effect=lambda place: [0] if place == 0 else [1, 2])
-    assert slight(done) == few
+    assert too_slight(done) == few
+    done.covariance = lambda: np.zeros((3, 3))  # of what logs do not show nobody knows whether it is less
+    assert too_slight(done) == []

@@ -147,7 +147,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(nominal: float,
     monkeypatch.setattr(pruned, "_not_told", lambda *args: False)
     monkeypatch.setattr(pruned, "_harm", lambda *args: "")
     monkeypatch.setattr(pruned, "of_no_size", lambda done: [])
-    monkeypatch.setattr(pruned, "slight", lambda done: [])
+    monkeypatch.setattr(pruned, "too_slight", lambda done: [])
     monkeypatch.setattr(pruned, "without", lambda *args: left(rest, 0.01, 0.01))
     case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
                                 unlike=())
@@ -163,7 +163,7 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     for step in made.steps:
         step.best.log, step.other = None, None
     for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
-                         "of_no_size": [], "slight": [], "not_mending": [0, 1], "_idle": None}.items():
+                         "of_no_size": [], "too_slight": [], "not_mending": [0, 1], "_idle": None}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(pruned, "turned", lambda found, kept, *_: kept)
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
@@ -177,25 +177,31 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     assert done.ruling.doubts == {1: pruned._IMPOSSIBLE}
 
 
-@pytest.mark.parametrize(("slight", "verdict", "named"), [([], "cause", (0, 1)), ([0], "cause", (1,)), ([0, 1], "unknown", ())])
-def test_what_arms_in_order_have_as_much_of_has_no_name(slight: list[int], verdict: str, named: tuple[int, ...],
-                                                        monkeypatch: pytest.MonkeyPatch) -> None:
-    """It keeps every rule, so that it is no noise; beside another it is just not told, alone something else may be what shows."""
-    made = searched(left(0.015, 0.015, 0.01), (effect("torque_gain", 1), left(0.01, 0.015, 0.01)),
+@pytest.mark.parametrize(("much", "slight", "changed", "verdict", "named"), [
+    (0.015, [], None, "cause", (0, 1)), (0.0115, [0], None, "cause", (1,)), (0.015, [0, 1], None, "unknown", ()),
+    (0.04, [0], None, "unknown", ()), (0.04, [0, 1], None, "unknown", ()), (0.015, [0, 1], object(), "cause", (0, 1))])
+def test_what_arms_in_order_have_as_much_of_has_no_name(much: float, slight: list[int], changed: object, verdict: str,
+                                                        named: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """It keeps every rule, so that it is no noise: alone something else may be what shows, and beside another too where it took
+    most of what was wrong. What has changed was measured by the same sensors before."""
+    made = searched(left(much, 0.013, 0.01), (effect("torque_gain", 1), left(0.01, 0.013, 0.01)),
                     (effect("torque_gain", 2), left(0.01, 0.01, 0.01)))
     for step in made.steps:
         step.best.log, step.other = None, None
     for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
-                         "of_no_size": [], "slight": slight, "not_mending": [0, 1], "_idle": None, "possible": True}.items():
+                         "of_no_size": [], "too_slight": slight, "not_mending": [0, 1], "_idle": None, "possible": True}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(pruned, "turned", lambda found, kept, *_: kept)
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
-    monkeypatch.setattr(pruned, "without", lambda *_: made.final)
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None, unlike=())
+    rest = {(0, 1): made.final, (0,): left(0.01, 0.013, 0.01), (1,): left(much, 0.01, 0.01)}
+    monkeypatch.setattr(pruned, "without", lambda found, kept, *_: rest[tuple(kept)])
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=changed, shared=None, beside=(), before=None,
+                                unlike=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
     assert (done.ruling.verdict, done.ruling.named) == (verdict, named)
-    assert done.ruling.doubts == dict.fromkeys(slight, pruned._SO_LITTLE)
-    assert (done.ruling.reason == pruned.TOO_SLIGHT) is (verdict == "unknown")
+    if changed is None:
+        assert [done.ruling.doubts[k] for k in slight] == [pruned._SO_LITTLE] * len(slight)
+    assert (done.ruling.reason == pruned.TOO_SLIGHT) is (slight == [0, 1] and changed is None)
 
 
 @pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])
@@ -232,7 +238,7 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     made = searched(left(0.01, elsewhere, 0.03), (waves, left(0.01, elsewhere, 0.01)))
     made.steps[0].best.log, made.steps[0].other = None, None
     for name, answer in {"simulated_steps": (), "at_which": "", "at_odds": "", "strays": "", "_not_told": False, "_harm": "",
-                         "of_no_size": [], "slight": [], "not_mending": [], "_idle": None, "only_then": False, "possible": True,
+                         "of_no_size": [], "too_slight": [], "not_mending": [], "_idle": None, "only_then": False, "possible": True,
                          "_unseen": []}.items():
         monkeypatch.setattr(pruned, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(pruned, "turned", lambda found, apart, believed, *_: believed)
