@@ -19,8 +19,9 @@ from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.stood import Share
 from pipelines.model.diagnosis.thresholds import Thresholds
 
-__all__ = ["Case", "Changed", "ShareOf", "held_out"]
+__all__ = ["Case", "Changed", "HeldOut", "ShareOf", "held_out"]
 
+_QUIETER = 0.5  # of what a joint leaves of the fitted logs: with less held out it is weighted by the held-out logs
 _ALIKE = 0.05  # of a joint's torque, by which two arms may differ and have the same columns to first order
 
 ShareOf = Callable[[Refined, int], Share]  # of an effect of a model, by its place
@@ -63,6 +64,28 @@ class Case:
         more = self.data.rms(self.model.torque(self.data) - torque)
         alike = (more <= _ALIKE * self.data.rms(torque)).all() and not any(one.effect.last for one in model.effects)
         return Arms(model.arm, self.model.arm if alike else model.arm)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """What a model leaves on what it was not fitted to, beside which others are held."""
+
+    error: float  # squared, weighted
+    weight: Array  # (joints,) [1/(N m)] of the fit; more of a joint that is far quieter there than in the fitted logs
+
+    @classmethod
+    def of(cls, now: Refined, case: Case) -> HeldOut:
+        """A joint that something disturbs in the fitted logs alone would have next to no say by the weights of the fit."""
+        rows = now.data if case.judge is None else case.judge
+        left = held_out_left(now, case.judge, case.blocks)
+        weight = np.maximum(now.weight, _QUIETER / np.maximum(rows.rms(left), 1e-300))
+        return cls(float(np.sum(np.square(left * weight[rows.joint]))), weight)
+
+    def share(self, done: Refined, case: Case) -> float:
+        """What `done` leaves of it."""
+        rows = done.data if case.judge is None else case.judge
+        left = held_out_left(done, case.judge, case.blocks)
+        return float(np.sum(np.square(left * self.weight[rows.joint]))) / self.error
 
 
 def held_out(done: Refined, case: Case) -> float:

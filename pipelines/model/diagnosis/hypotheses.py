@@ -10,7 +10,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family
-from pipelines.model.diagnosis.case import Case, held_out
+from pipelines.model.diagnosis.case import Case, HeldOut
 from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.ledger import Tried
@@ -29,8 +29,8 @@ _TELLS = 3.0  # standard deviations of a further number
 _ROUNDING = 1e-12  # of the largest variance, each number in its own deviations
 
 
-def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
-    """A cause fitted exactly beside everything that was found before; `error` is what was left held out without it."""
+def fitted(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried:
+    """A cause fitted exactly beside everything that was found before; `error` is that without it."""
     if one.family.event:
         return _happened(case, now, one, error)
     effect = one.shape[0].full()
@@ -42,7 +42,7 @@ def fitted(case: Case, now: Refined, one: Screened, error: float) -> Tried:
     return _in_range(case, now, one, error) or tried
 
 
-def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error: float) -> Tried | None:
+def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error: HeldOut) -> Tried | None:
     """The cause that, in the form that screening takes, has one number more than `best` at its joint and is worth it; None where
     none is.
 
@@ -91,7 +91,7 @@ def apart_from(numbers: Array, covariance: Array, plane: Array) -> float:
     return float(np.linalg.norm(left - there @ np.linalg.lstsq(there, left, rcond=None)[0]))
 
 
-def _in_range(case: Case, now: Refined, one: Screened, error: float) -> Tried | None:
+def _in_range(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried | None:
     """In that of the screened shapes which asks for least, of those that explain nearly the most with numbers that can be; None
     where there is none.
 
@@ -113,18 +113,18 @@ def _in_range(case: Case, now: Refined, one: Screened, error: float) -> Tried | 
     return tried if tried.possible else None
 
 
-def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: float, held: tuple[str, ...] = ()) -> Tried:
+def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: HeldOut, held: tuple[str, ...] = ()) -> Tried:
     table = laid_whole(case.data, effect, now.model.arm)
     start = (now.model.with_effect(effect, _amplitudes(now.fit, table), held=held) if one.amplitude is None else
              beyond_first_order(now, effect, one.amplitude))
     done = refine(start, case.data, now.weight)
-    left = held_out(done, case) / error
+    left = error.share(done, case)
     rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
     believable = done.model.effects[-1].effect.believable([log.motion for log in case.data.logs], done.model.nominal)
     return Tried(one, effect, None, done, left, rank, _visibility(now, table), believable=believable)
 
 
-def best_form(case: Case, now: Refined, best: Tried, error: float) -> Tried:
+def best_form(case: Case, now: Refined, best: Tried, error: HeldOut) -> Tried:
     """The cause by the law that leaves decidedly less of its joint, fitted and held out, where it has more than one; each further
     number has to leave decidedly less again."""
     if best.log is not None:
@@ -165,7 +165,7 @@ def _given(case: Case, now: Refined, one: Screened, amplitudes: Array) -> Effect
     return best
 
 
-def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:
+def _happened(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried:
     """An event: in one log, which no other can confirm; or in all at the same time, where the held-out ones do."""
     log, effect = one.logs[0], one.shape[0].full()
     whole = laid_whole(case.data, effect, now.model.arm)
@@ -176,7 +176,7 @@ def _happened(case: Case, now: Refined, one: Screened, error: float) -> Tried:
         return tried
     named = once.model.effects[-1]
     always = refine(now.model.with_effect(named.effect, np.array(named.amplitudes)), case.data, now.weight)
-    seen = held_out(always, case) / error
+    seen = error.share(always, case)
     rank = float(np.sqrt(seen * always.rss / now.rss))
     return Tried(one, effect, None, always, seen, rank, tried.visibility) if seen < _CONFIRMED else tried
 

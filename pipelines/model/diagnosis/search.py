@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.model.diagnosis.borne_out import borne_out
-from pipelines.model.diagnosis.case import Case, held_out
+from pipelines.model.diagnosis.case import Case, HeldOut, held_out
 from pipelines.model.diagnosis.curves import with_curves_anew
 from pipelines.model.diagnosis.elsewhere import at_its_joint
 from pipelines.model.diagnosis.gate import CLOSE, Gate, gate_of, once_more
@@ -222,7 +222,7 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
         there: those that are fitted already.
     """
     great = _great(case, now, screened, wanted)
-    error = held_out(now, case) if great else np.nan
+    error = HeldOut.of(now, case) if great else HeldOut(np.nan, now.weight)
     done = {id(one.screened): one for one in there}
     tried = [done.get(id(one)) or fitted(case, now, one, error) for one in great]
     best = fewest(sorted(tried, key=lambda one: one.rank))
