@@ -59,7 +59,7 @@ def _recording(folder: Path, samples: Path) -> Path:
 Ran = tuple[Stage[Any, Any], Outcome[Any]]
 
 
-def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
+def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) -> Ran:
     stage = _stage(module)
     settings = stage.settings()
     paths: tuple[Path, ...] = (samples / "rrr-closed-form",)
@@ -89,7 +89,7 @@ def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
         paths = (written_result(tmp_path / "a", 1), written_result(tmp_path / "b", 2))
     if module == "design_excitation":
         settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
-    return stage, run_stage(stage, Request(paths, out=tmp_path / "out"), settings)
+    return stage, run_stage(stage, Request(paths, out=tmp_path / "out", no_report=no_report), settings)
 
 
 @pytest.fixture(scope="module")
