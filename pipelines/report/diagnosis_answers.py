@@ -12,7 +12,7 @@ from pipelines.model.diagnosis.result import Answer, Finding
 from pipelines.report import style
 from pipelines.report.frf_figures import posture_words
 from pipelines.report.report import Figure
-from pipelines.report.style import format_number
+from pipelines.report.style import format_number, format_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,8 @@ def draw_answers(axes: Axes, answers: tuple[Answer, ...], frequency: float) -> N
     if len(levels):
         axes.set_ylim(_ROOM[0] * float(levels.min()), _ROOM[1] * float(levels.max()))
     axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel("acceleration per input")
+    unit = answers[0].unit
+    axes.set_ylabel("acceleration per input" if unit == "1" else f"acceleration per input [{format_unit(unit)}]")
     axes.legend(loc="best", fontsize="small")
     for axis in (axes.xaxis, axes.yaxis):
         style.log_ticks(axis)

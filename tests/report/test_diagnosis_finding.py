@@ -73,7 +73,8 @@ def test_how_much_there_is_is_told_in_usual_units(cause: str, joint: int | None,
 def test_responses_that_name_a_cause_are_drawn_first(told: bool) -> None:
     """In each posture, with the frequency that the verdict tells; of a cause that residuals name there are none."""
     f = np.linspace(5.0, 100.0, 40)
-    answers = tuple(Answer(1, np.array([0.0, q, 0.0]), f, 1.0 + 0.1 * np.cos(f), np.full(40, 0.9), np.ones(40)) for q in (0.0, 1.0))
+    answers = tuple(Answer(1, np.array([0.0, q, 0.0]), "1/(kg m^2)", f, 1.0 + 0.1 * np.cos(f), np.full(40, 0.9), np.ones(40))
+                    for q in (0.0, 1.0))
     one = finding("base_resonance", None)
     one = replace(one, parameters={"frequency": Value(28.0, 0.1, "Hz")}, origin="frequency responses" if told else "residual",
                   answers=answers if told else ())
@@ -83,6 +84,7 @@ def test_responses_that_name_a_cause_are_drawn_first(told: bool) -> None:
     for figure in drawn:
         drawing = Drawing()
         figure.draw(drawing)
+        assert "[1/(kg m²)]" in drawing.axes[0].get_ylabel()
         assert [text.get_text() for text in drawing.axes[0].get_legend().get_texts()] == [
             posture_words(one.posture, 1) for one in answers]
 

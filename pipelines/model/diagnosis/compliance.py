@@ -113,5 +113,6 @@ def _acting(one: frf.Finding, arm: Arm) -> Acting:
 def _answer(one: frf.Seen) -> Answer:
     first = one.measured.first
     shown = relative_acceleration(one.measured).within(*one.modes.band)
-    return Answer(one.measured.joint, np.asarray(first.posture, dtype=np.float64), shown.frequency, np.abs(shown.response),
+    unit = "1" if first.quantity == "r" else "1/(kg m^2)" if first.revolute else "1/kg"
+    return Answer(one.measured.joint, np.asarray(first.posture, dtype=np.float64), unit, shown.frequency, np.abs(shown.response),
                   shown.coherence, np.abs(one.modes.fit.response(shown.frequency)))

@@ -113,6 +113,7 @@ class Answer:
 
     joint: int  # 1-based, that is moved
     posture: Array  # (joints,) [rad] or [m]
+    unit: str  # of acceleration per input: 1 where an acceleration is asked for, else 1/(kg m^2), of a slide 1/kg
     frequency: Array  # (bins,) [Hz]
     measured: Array  # (bins,) magnitude
     coherence: Array
