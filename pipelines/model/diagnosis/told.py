@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.compliance import gaps_untold, untold
 from pipelines.model.diagnosis.doubted import above_in_both, unlike_held_out
 from pipelines.model.diagnosis.evidence import evidence
+from pipelines.model.diagnosis.extrapolated import extrapolated
 from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.floored import Floored
 from pipelines.model.diagnosis.held_out import held_out_left
@@ -140,14 +141,20 @@ def _held_against(first: Responding, case: Case, done: Settled, responded: Judge
     if own is None or judge is None or responded.judge is None:
         return done, responded
     plain = judge.rms(held_out_left(first.held.plain or done.found.nominal, judge, chosen.blocks))
-    if done.ruling.verdict == "nothing-wrong" and not sure:
-        asked = done if hinted or responded.parts else above_in_both(done, plain, own, fitted, case.unlike)
-        if case.changed is not None or asked is not done:
-            return asked, responded  # what motion shows that the reference logs do not have, they may have had as well
-    final = responded.final
-    believed = unlike_held_out(done, responded.judge.rms(held_out_left(final, responded.judge, chosen.blocks)), own, plain, sure,
-                               bool(responded.parts), fitted)
-    return believed, responded if believed is done else judged(held, believed.found.final)
+    left = responded.judge.rms(held_out_left(responded.final, responded.judge, chosen.blocks))
+
+    def believed(floor: Array) -> Settled:
+        asked = done
+        if done.ruling.verdict == "nothing-wrong" and not sure:
+            asked = done if hinted or responded.parts else above_in_both(done, plain, floor, fitted, case.unlike)
+            if case.changed is not None:
+                return asked  # what motion shows that the reference logs do not have, they may have had as well
+        return asked if asked is not done else unlike_held_out(done, left, floor, plain, sure, bool(responded.parts), fitted)
+
+    told = believed(own)
+    if told is not done and done.ruling.verdict == "nothing-wrong":  # fitted to other motion, an arm in order leaves more
+        told = believed(np.hypot(own, extrapolated(done.found.nominal, judge)))
+    return told, responded if told.found is done.found else judged(held, told.found.final)
 
 
 def limits_of(last: Step, case: Case, first: Responding, probed: Probed | None = None) -> Limits:
