@@ -83,12 +83,11 @@ class HeldOut:
 
     def share(self, done: Refined, case: Case) -> float:
         """What `done` leaves of it."""
-        rows = done.data if case.judge is None else case.judge
-        left = held_out_left(done, case.judge, case.blocks)
-        return float(np.sum(np.square(left * self.weight[rows.joint]))) / self.error
+        return held_out(done, case, self.weight) / self.error
 
 
-def held_out(done: Refined, case: Case) -> float:
-    """Squared weighted error on what the model was not fitted to."""
+def held_out(done: Refined, case: Case, weight: Array | None = None) -> float:
+    """Squared weighted error on what the model was not fitted to; `weight` (joints,), by default that of its fit."""
     data = done.data if case.judge is None else case.judge
-    return float(np.sum(np.square(held_out_left(done, case.judge, case.blocks) * done.weight[data.joint])))
+    own = done.weight if weight is None else weight
+    return float(np.sum(np.square(held_out_left(done, case.judge, case.blocks) * own[data.joint])))

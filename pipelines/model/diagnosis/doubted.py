@@ -36,8 +36,8 @@ _SURELY, _CLEAR, _HALF = 1.4, 1.2, 0.5
 # arms in order, of reference logs of another motion and of standing too, the most that any joint left of both was 1.33; causes that
 # were not known, and left too little of the fitted logs alone, 1.46 and 1.54.
 _BOTH = 1.4
-# Times the noise in what a model leaves. None of 240 arms in order of the test bench, and of no other arm there, was without a twin
-# for that reason; the load that sloshes left 18, 33 and 1400 times the noise.
+# Times the noise in what a model leaves. No arm in order of the test bench, 286 and some of other kinds, was without a twin where
+# its controller was described; one with a load that sloshes left 18, 33 and 1400 times the noise of its joints.
 _NO_NOISE = 15.0
 _QUIET = 1.3  # times the floor that a twin gives, that an arm in order leaves of the fitted logs at most: of 147 none left more
 _MOST_LEFT = "what explains the fitted logs leaves more than half of what stands above the floor at its joint in those held out"

@@ -55,13 +55,14 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
     """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
     if given is not None:
         refuse_unfit(given, prepared, case.families, "twin")
-    try:
-        made, twin = _calibrated(prepared, case, rough, chosen) if given is None else (given, None)
-    except InputRejected as refused:
-        why = refused.message if refused.code == _RUNS_AWAY else ""  # numbers of too poor a motion, D15, are no arm's fault
-        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=why)
+    made, twin, why = given, None, ""
+    if given is None:
+        try:
+            made, twin = _calibrated(prepared, case, rough, chosen)
+        except InputRejected as refused:
+            why = refused.message if refused.code == _RUNS_AWAY else ""  # numbers of too poor a motion, D15, are no arm's fault
     if made is None:
-        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None)
+        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=why)
     return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
                    twin=twin)
 
