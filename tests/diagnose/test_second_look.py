@@ -102,6 +102,7 @@ HUMP, DRAG, OTHER, THERE = effect("stribeck", 1), effect("quadratic_drag", 1), e
     (((HUMP, left(0.02, 0.1, 0.01)),), ((HUMP, left(0.02, 0.1, 0.01)), (THERE, left(0.02, 0.01, 0.01))), True),  # one more
     (((HUMP, left(0.0101, 0.1, 0.01)),), ((HUMP, left(0.0101, 0.1, 0.01)), (DRAG, left(0.01, 0.1, 0.01))), False),  # a trifle more
     (((HUMP, left(0.0101, 0.1, 0.01)), (DRAG, left(0.01, 0.1, 0.01))), ((HUMP, left(0.0101, 0.1, 0.01)),), True),  # a trifle less
+    (((HUMP, left(0.0167, 0.1, 0.01)), (DRAG, left(0.01, 0.1, 0.01))), ((HUMP, left(0.0167, 0.1, 0.01)),), False),  # it stands high
     (((HUMP, left(0.02, 0.1, 0.01)), (THERE, left(0.02, 0.01, 0.01))), ((HUMP, left(0.02, 0.1, 0.01)),), False)])  # half of it less
 def test_a_second_look_is_believed_where_it_explains_as_much(first: Any, second: Any, believed: bool) -> None:
     assert second_look._believed(looked(*first), looked(*second), FLOOR, np.full(3, 0.02)) is believed

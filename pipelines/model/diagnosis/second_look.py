@@ -3,15 +3,15 @@
     done = looked_again(done, case, prepared, twin, most, floor)
 
 The first look weighs every row alike. Where the drive's zero wanders slowly and a cause is quicker than that, it sees the wander.
-The second one takes out of the rows what the noise of an arm in order, the twin's, makes alike in neighbouring ones (`whitening`),
-and what the ripple of its torque constants has in common wherever a joint comes by (`ripple`), and searches again: with thresholds
-of the same replicas through the same, and by the same rules. Generalised least squares (Aitken
-1935) lose nothing that plain ones see, where the noise is that of the twin, and tell causes apart that are alike where the wander
-is. Where the second look finds as many causes at every joint as the first has found, under other names or more, and they leave no
-more of the rows as they are, it is believed. What is next to nothing beside a greater cause, and may as well be what that one's law
-does not have, has to be found by both looks. What happened once is no matter of noise that is slow: where the first look names such
-a thing, it is all. So it is where it names a gap, which is looked for below the frequencies at which it rings, and where logs have
-rows of different spacing: no one filter makes the noise of all of them white.
+The second one takes out of the rows what the noise of an arm in order, the twin's, makes alike in neighbouring ones
+(`whitening`), and what the ripple of its torque constants has in common wherever a joint comes by (`ripple`), and searches again:
+with thresholds of the same replicas through the same, and by the same rules. Generalised least squares (Aitken 1935) lose nothing
+that plain ones see, where the noise is that of the twin, and tell causes apart that are alike where the wander is. Where the
+second look finds as many causes at every joint as the first has found, under other names or more, and they leave no more of the
+rows as they are, it is believed. What is next to nothing beside a greater cause, and may as well be what that one's law does not
+have, has to be found by both looks, as long as no joint stands high without it. What happened once is no matter of noise that is
+slow: where the first look names such a thing, it is all. So it is where it names a gap, which is looked for below the frequencies
+at which it rings, and where logs have rows of different spacing: no one filter makes the noise of all of them white.
 
 What it found is then told in newton metres of the rows as they are: beside the nominal model of the first look, every model with
 the numbers that the second one has fitted.
@@ -34,7 +34,7 @@ from pipelines.model.diagnosis.refit import Refined, refine
 from pipelines.model.diagnosis.search import Found, Step, last_step, search
 from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import REST_OF_A_LAW, Ruling, excess, explained, rule
+from pipelines.model.diagnosis.verdict import REST_OF_A_LAW, Ruling, excess, explained, rule, stands_high
 from pipelines.model.diagnosis.whitening import Whitening
 
 __all__ = ["looked_again"]
@@ -85,7 +85,9 @@ def _believed(first: Settled, second: Settled, floor: Array, scatter: Array) -> 
     """
     before, now = _names(first), _names(second)
     if now < before:
-        return _share(first, before - now, floor) < _LITTLE
+        # One in a hundred of a great cause may stand far above the floor: what the first look explains is no noise then.
+        opened = stands_high(second.found.final.rms, floor) & ~stands_high(first.found.final.rms, floor)
+        return _share(first, before - now, floor) < _LITTLE and not opened.any()
     if before and before < now and _share(second, now - before, floor) < _LEAST:
         return False
     left = [excess(one.found.final.rms, floor) for one in (first, second)]

@@ -11,13 +11,14 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
 __all__ = ["REST_OF_A_LAW", "REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "much_without_name",
-           "rule", "seen_in", "takes_most", "too_little", "without_steps"]
+           "rule", "seen_in", "stands_high", "takes_most", "too_little", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -95,7 +96,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
     """`any_share`: whether something that gives way counts however little it explains; by default where the floor is known."""
     every = known if any_share is None else any_share
     other = next((step.other for step in found.steps if step.other is not None and (every or _much(step.other, found))), None)
-    joints = np.flatnonzero(found.final.rms > _ABOVE * floor)
+    joints = np.flatnonzero(stands_high(found.final.rms, floor))
     high = _named(joints.tolist())
     gap = any(step.best is not None and step.best.effect.evidence == "reversals" for step in accepted)
     if other is not None and (not accepted or (len(joints) and not gap)):
@@ -117,7 +118,7 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
         if not named and high and any(why == REST_UNKNOWN for why in doubts.values()):
             return Ruling("unknown", (), f"the best explanation leaves {high} far above the noise", doubts)
         return Ruling("cause", named, "", doubts)
-    near = not (found.nominal.rms > _ABOVE * floor).any()
+    near = not stands_high(found.nominal.rms, floor).any()
     if too_little(found.nominal.rms, found.final.rms, floor) and not (near and mended):
         if near:  # without that explanation nothing would be wrong
             return Ruling("nothing-wrong", (), "", dict.fromkeys(range(len(accepted)), _LITTLE))
@@ -196,6 +197,11 @@ def _happened(step: Step) -> bool:
 def at_floor(rms: Array, floor: Array) -> bool:
     """Whether every joint stands so low that it may be the floor."""
     return bool((rms <= _CLEAR * floor).all())
+
+
+def stands_high(rms: Array, floor: Array) -> NDArray[np.bool_]:
+    """(joints,) Whether each stands so high that it is not explained."""
+    return rms > _ABOVE * floor
 
 
 def held_out_high(rms: Array, floor: Array, times: float = _FAR) -> str:
