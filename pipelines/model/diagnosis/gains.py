@@ -39,6 +39,7 @@ _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
 _LONGEST = 5.0  # [s] of a log that is simulated
 _SOFT = 1.0  # [s] the same, where something moves beside the joints of an arm, which takes many steps
+_LONGER = 6.0  # times as long, where the last arm comes no nearer than the first: what noise does to an error averages out
 _WINDOW = 0.1  # [s]
 _FINE = 1e-3  # [s] between torques that drive a window: a faster log's are averaged, which moves an arm as far
 _EXACT = 1e-3  # of the position error, to which it is worked out
@@ -68,6 +69,7 @@ class Simulation:
     samples: Array  # (blocks,)
     first: Strayed | None = None  # in the first of the logs; None where no controller is known
     span: tuple[SimulatedSpan, ...] = ()  # of each log that was simulated
+    longest: float = np.nan  # [s] of a log, at most
 
     @classmethod
     def none(cls, joints: int) -> Simulation:
@@ -153,7 +155,8 @@ def nearer(before: Simulation, after: Simulation, *, late: bool = False) -> bool
 def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int, Simulation] | None = None) -> list[Simulation]:
     """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else.
 
-    Without logs nothing is simulated.
+    Without logs nothing is simulated. In a loop the stretches are short, and longer ones where they leave it open whether the last
+    arm comes nearer than the first: what the amplifiers' noise moves, no simulated arm follows.
 
     Args:
         known: of arms, by their places, that were simulated already beside others with the same effects as these.
@@ -164,19 +167,31 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
     logs = motions[:_LOGS]
     soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
     if known:
-        how, left = next(iter(known.values())).how, [k for k in range(len(arms)) if k not in known]
-        if how == "none":
+        one, left = next(iter(known.values())), [k for k in range(len(arms)) if k not in known]
+        if one.how == "none":
             return none
-        found = shared_out(partial(_if_possible, motions=logs, closed=how == "closed-loop", soft=soft), [arms[k] for k in left])
+        found = _each([arms[k] for k in left], logs, soft, one.longest, closed=one.how == "closed-loop")
         every = {**known, **dict(zip(left, found, strict=True))}
         return [every[k] for k in range(len(arms))]
-    for closed in (True, False):
-        if closed and not all(in_loop(arms[0], log) for log, _ in logs):
-            continue
-        found = shared_out(partial(_if_possible, motions=logs, closed=closed, soft=soft), arms)
+    if all(in_loop(arms[0], log) for log, _ in logs):
+        longest = _SOFT if soft else _LONGEST
+        found = _each(arms, logs, soft, longest)
+        if _open(found[0], found[-1]) and any(log.n_samples * log.sample_time > longest for log, _ in logs):
+            found = _each(arms, logs, soft, _LONGER * longest)
         if found[0].how != "none":
             return found
-    return none
+    found = _each(arms, logs, soft, np.inf, closed=False)
+    return none if found[0].how == "none" else found
+
+
+def _open(first: Simulation, last: Simulation) -> bool:
+    """Whether both could be simulated, and the last is not nearer."""
+    return "none" not in (first.how, last.how) and first is not last and not nearer(first, last)
+
+
+def _each(arms: Sequence[Arm], motions: Motions, soft: bool, longest: float, *, closed: bool = True) -> list[Simulation]:
+    """`soft`: something moves beside the joints of one of them; `longest` [s] of a log in a loop."""
+    return shared_out(partial(_if_possible, motions=motions, closed=closed, soft=soft, longest=longest), arms)
 
 
 def in_loop(arm: Arm, log: ExperimentLog) -> bool:
@@ -188,16 +203,16 @@ def in_loop(arm: Arm, log: ExperimentLog) -> bool:
     return True
 
 
-def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
+def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -> Simulation:
     try:
-        return _all(arm, motions, closed, soft)
+        return _all(arm, motions, closed, soft, longest)
     except InputRejected:
         return Simulation.none(arm.n_joints)
 
 
-def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
+def _all(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -> Simulation:
     square, away, span = [], [], []
-    pairs = _closed(arm, motions, _SOFT if soft else _LONGEST) if closed else _in_windows(arm, motions, _ROUGH if soft else _EXACT)
+    pairs = _closed(arm, motions, longest) if closed else _in_windows(arm, motions, _ROUGH if soft else _EXACT)
     for (q, seen, between), (log, _) in zip(pairs, motions, strict=True):
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
@@ -210,7 +225,8 @@ def _all(arm: Arm, motions: Motions, closed: bool, soft: bool) -> Simulation:
     (log, _), (q, seen, _) = motions[0], pairs[0]
     first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
     return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
-                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first, tuple(span))
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first, tuple(span),
+                      longest)
 
 
 def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array, float]]:

@@ -111,6 +111,19 @@ def test_the_simulated_span_is_where_the_measured_arm_counts(long: tuple[Any, An
         assert (simulation_errors([arm], ((moved, found),))[0].tip_rms == first.tip_rms) == same
 
 
+def test_longer_stretches_are_simulated_where_the_last_arm_comes_no_nearer(long: tuple[Any, Any]) -> None:
+    """An arm that is worse first, and then the fitted one: what is short tells. The same two the other way round, and one arm twice,
+    are told apart by all of the log; what is simulated beside them then is as long."""
+    (log, found), arm = long
+    heavy = replace(arm, base=tuple(replace(one, value=1.2 * one.value) for one in arm.base))
+    assert [one.span[0].seconds for one in simulation_errors([heavy, arm], ((log, found),))] == [5.0, 5.0]
+    for arms in ([arm, heavy], [arm, replace(arm)]):
+        both = simulation_errors(arms, ((log, found),))
+        assert [one.span[0].seconds for one in both] == pytest.approx([6.0, 6.0], abs=0.01)
+        beside = simulation_errors([*arms, heavy], ((log, found),), dict(enumerate(both)))[-1]
+        assert beside.samples.sum() == both[0].samples.sum()
+
+
 def test_the_simulated_span_of_windows_is_all_that_they_cover(long: tuple[Any, Any]) -> None:
     """Without a controller nearly all of the log is simulated, 0.1 s at a time, and half of it where half can be used."""
     (log, found), arm = long
