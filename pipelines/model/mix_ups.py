@@ -22,6 +22,7 @@ _WORSE = 1.03  # times what a row left before: chance
 _EITHER = 1.5  # of two explanations, neither leaves so much more than the other: these rows cannot tell them apart
 _SCALES = {"0.5": 0.5, "2": 2.0, "0.1": 0.1, "10": 10.0, "pi/180 (degrees)": np.pi / 180, "180/pi": 180 / np.pi,
            "2 pi (turns)": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi, "-1": -1.0}
+_UNITS = {name: factor for name, factor in _SCALES.items() if "pi" in name}  # what a file may have every angle in
 
 
 def torque_columns(e: Evidence) -> list[Check]:
@@ -98,7 +99,7 @@ def position_columns(e: Evidence) -> list[Check]:
 
 
 def encoder_scale(e: Evidence) -> list[Check]:
-    """S15: would one joint's angle fit better in another scale?
+    """S15: would one joint's angle fit better in another scale, or those of all in another unit?
 
     First with one set of rigid parameters for all rows, where the scale of a joint tells that bends nothing and moves little.
     Then with parameters of its own for each row, where a joint's angle bends the arm: that holds whatever the torques' scales.
@@ -121,7 +122,12 @@ def encoder_scale(e: Evidence) -> list[Check]:
     return [_angle(e, *found, f"; so does its tau divided by {torque.factor:.3g}")] if found[1] < _EITHER * torque.after else []
 
 
-def _angle(e: Evidence, before: float, after: float, joint: int, factor: str, rival: str = "") -> Check:
+def _angle(e: Evidence, before: float, after: float, joint: int | None, factor: str, rival: str = "") -> Check:
+    if joint is None:
+        return e.subject.say("S15", "warn",
+                             f"q fits if every angle is multiplied by {factor}, residual {before:.2g} -> {after:.2g}",
+                             signal="q", gate=True,
+                             remedy="correct the unit of the angles on import, rad or deg or turns: it is declared for all of them")
     return e.subject.say("S15", "warn",
                          f"q of joint {joint + 1} fits if multiplied by {factor}, residual {before:.2g} -> {after:.2g}{rival}",
                          signal="q", joint=joint, gate=True,
@@ -130,9 +136,9 @@ def _angle(e: Evidence, before: float, after: float, joint: int, factor: str, ri
 
 
 def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Array], bad: float,
-            ) -> tuple[float, float, int, str] | None:
-    """What the log as it is leaves, what the best angle and scale leave, the joint and the factor; None where the log leaves no
-    more than `bad` or not far more than that.
+            ) -> tuple[float, float, int | None, str] | None:
+    """What the log as it is leaves, what the best angle and scale leave, the joint, None for all that turn, and the factor; None
+    where the log leaves no more than `bad` or not far more than that.
 
     By the right scale no row fits worse `alone`, with its own parameters: a joint that hears of another drive may fit far better
     with an angle scaled down, but the other joints' rows, which are in order, do not.
@@ -140,10 +146,12 @@ def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Ar
     motion, before, rows = e.thinned().motion, _rms(residual()), alone()
     if before < bad:
         return None
-    found: list[tuple[float, int, str]] = []
-    for joint in e.telling.tolist():
-        for name, factor in _SCALES.items():
-            scale = np.where(np.arange(e.n_joints) == joint, factor, 1.0)
+    found: list[tuple[float, int | None, str]] = []
+    turning = np.array([one.revolute for one in e.subject.log.robot.joints])
+    places = [(joint, _SCALES, np.arange(e.n_joints) == joint) for joint in e.telling.tolist()]
+    for joint, scales, there in (*places, (None, _UNITS, turning)):
+        for name, factor in scales.items():
+            scale = np.where(there, factor, 1.0)
             other = {"q": motion.q * scale, "dq": motion.dq * scale, "ddq": motion.ddq * scale}
             left = _rms(residual(**other))
             if left > min(_GOOD, _SCALE_BETTER * before):
@@ -152,4 +160,4 @@ def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Ar
             # The direction of a joint that bends nothing is that of its torque: S14 tells.
             if (own <= _WORSE * rows).all() and (factor > 0.0 or (own <= _MUCH_BETTER * rows).any()):
                 found.append((left, joint, name))
-    return (before, *min(found)) if found else None
+    return (before, *min(found, key=lambda one: one[0])) if found else None

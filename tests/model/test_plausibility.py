@@ -110,6 +110,16 @@ def test_an_encoder_scale_is_hinted_at(joint: int, factor: float, hint: str) -> 
     assert f"q of joint {joint + 1} fits if multiplied by {hint}" in found[0].message
 
 
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("factor", "hint"), [(np.pi / 180, "180/pi"), (180 / np.pi, "pi/180 (degrees)"), (0.5 / np.pi, "2 pi")])
+def test_a_unit_that_every_angle_is_in_is_hinted_at(seed: int, factor: float, hint: str) -> None:
+    """Radians declared as degrees move an arm by next to nothing, and are within all limits."""
+    log = healthy_without_reference(good_log(seed))
+    found = [c for c in plausibility(Subject(with_signal(log, q=log.q * factor))) if c.level != "ok"]
+    assert [(c.code, c.gate) for c in found] == [("RRID-S15", True)]
+    assert f"q fits if every angle is multiplied by {hint}" in found[0].message
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("level", [1.0, 0.3])
 @pytest.mark.parametrize("factor", [0.5, 2.0])

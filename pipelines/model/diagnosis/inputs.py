@@ -21,7 +21,7 @@ from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.sharper import sharpened
 from pipelines.model.diagnosis.unasked import FewerTerms
-from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, with_cutoff
+from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, refuse_too_few, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstruction
@@ -78,7 +78,8 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
         arm: whose friction laws the nominal model takes; Coulomb and viscous friction where left out.
 
     Raises:
-        InputRejected: S01, no log to fit; T04, a log without a stretch that can be used.
+        InputRejected: S01, no log to fit; T04, a log without a stretch that can be used; T08, of which, or of a joint, too few
+            equations are left.
     """
     if not logs.identify:
         raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
@@ -110,11 +111,26 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
     rows: list[Data | None] = []
     first = 0
     for part in (fitted, judging, referring):
+        _refuse_held(part, held[first:first + len(part)], part is judging)
         rows.append(_moving(part, columns, recipe, held[first:first + len(part)], first) if part else None)
         first += len(part)
     data, judge, reference = rows
     assert data is not None  # prepare refuses logs without any to fit
+    refuse_too_few([one.equations for one in data.logs], fitted)
     return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
+
+
+def _refuse_held(motions: Motions, held: Sequence[Joints], judging: bool) -> None:
+    """T08: of a joint that moves in none of the logs nothing can be fitted, and a log in which none does judges nothing."""
+    still = np.all(held, axis=0) if motions else np.zeros(1, dtype=bool)
+    if not (still.all() if judging else still.any()):
+        return
+    log = motions[0][0]
+    what = "judge" if judging else f"are fitted, of role '{log.role}',"
+    which = "every joint" if still.all() else f"joint {int(np.argmax(still)) + 1}"
+    raise InputRejected("T08", f"{which} is held in the logs that {what} and moves in others", where=log.source or log.name,
+                        remedy="record an excitation in which it moves" if not judging else
+                        "leave that log out, or record one in which the arm moves")
 
 
 def _moving(motions: Motions, columns: Columns, recipe: Recipe, held: Sequence[Joints], first: int) -> Data:

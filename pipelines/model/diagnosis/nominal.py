@@ -22,8 +22,8 @@ from pipelines.model.effects.base import ArmModel, Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
 
-__all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_slopes", "nominal_arm", "orthonormal", "polish",
-           "rigid_rows", "rows_of", "several_rows"]
+__all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_shapes", "law_slopes", "nominal_arm", "orthonormal",
+           "polish", "rigid_rows", "rows_of", "several_rows"]
 
 _RANK = 1e-12  # of the largest: smaller eigenvalues of the Gram matrix of unit columns are rounding
 _ROUNDS = 6  # of weights
@@ -202,17 +202,25 @@ def _moved(law: Effect, name: str, factor: float) -> Effect:
 
 
 def law_slopes(data: Data, columns: Columns, all_beta: Array) -> tuple[list[Array], list[tuple[int, str]]]:
-    """(1, rows) of each shape: the slope of the torque by its logarithm; and which shapes they are."""
-    slopes, names, first = [], [], len(columns.kept)
-    for place, law in enumerate(columns.laws):
-        count = sum(not q.shape for q in law.parameters)
-        beta = all_beta[first:first + count]
-        first += count
-        for quantity in _free(law) if beta.any() else []:
-            up, down = (law_rows(data, _moved(law, quantity.name, factor), columns) for factor in (1.0 + _STEP, 1.0 - _STEP))
-            slopes.append((beta @ (up - down))[None] / (2.0 * _STEP))
-            names.append((place, quantity.name))
-    return slopes, names
+    """(1, rows) of each shape: the slope of the torque by its logarithm; and which shapes they are, as `law_shapes` has them."""
+    slopes, shapes = [], law_shapes(columns, all_beta)
+    for place, name in shapes:
+        law, beta = columns.laws[place], _of_laws(columns, all_beta)[place]
+        up, down = (law_rows(data, _moved(law, name, factor), columns) for factor in (1.0 + _STEP, 1.0 - _STEP))
+        slopes.append((beta @ (up - down))[None] / (2.0 * _STEP))
+    return slopes, shapes
+
+
+def law_shapes(columns: Columns, all_beta: Array) -> list[tuple[int, str]]:
+    """Places of the laws and names of their free shapes: of a law that takes no torque none, for it has no shape."""
+    return [(place, quantity.name) for place, beta in enumerate(_of_laws(columns, all_beta)) if beta.any()
+            for quantity in _free(columns.laws[place])]
+
+
+def _of_laws(columns: Columns, all_beta: Array) -> list[Array]:
+    """The amplitudes of each law."""
+    counts = [sum(not q.shape for q in law.parameters) for law in columns.laws]
+    return np.split(all_beta[len(columns.kept):], np.cumsum(counts))[:-1]
 
 
 def _best_of_grid(data: Data, law: Effect, columns: Columns, rest: Fit) -> tuple[Effect, Array]:

@@ -48,7 +48,7 @@ def _of_joint(data: Data, left: Array, joint: int) -> tuple[float, float, float]
     step = float(np.median(np.diff(data.logs[0].t)))
     size = round(_SECONDS / step)
     seen = [welch(piece, 1.0 / step, size) for piece in _pieces(data, left, joint, step, size)]
-    if len(seen) < _FEWEST:
+    if len(seen) < _FEWEST or _HIGHEST / step <= _LOWEST:
         return 0.0, np.nan, 0.0
     hertz, powers = seen[0].frequency, np.array([one.density * one.resolution for one in seen])  # [N m^2] by frequency
     stands = [_stands(hertz, half.mean(axis=0), _HIGHEST / step) for half in (powers, powers[::2], powers[1::2])]

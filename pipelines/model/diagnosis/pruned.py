@@ -34,6 +34,7 @@ from pipelines.model.diagnosis.verdict import (
     at_floor,
     explained,
     held_out_high,
+    mostly_lost,
     much_without_name,
     seen_in,
     too_little,
@@ -56,6 +57,8 @@ NEAR_THE_FLOOR = "what can be named explains less than half of what stands above
 _LAW_WITHOUT_NAME = "follows a law in the fitted logs, far above the noise, that held-out time does not bear out as any cause"
 TOO_SLIGHT = ("what explains it best is so slight that arms in order have as much of it: something shows, and it may well be "
               "another cause")
+_NO_MODEL = ("it says next to nothing of how this arm moves, so look at the units, the order and the timing of what was recorded, "
+             "and whether the logs that are fitted move every joint")
 _SO_LITTLE = "it would be so little that arms in order have as much"
 _STOOD = "what was found after it at the joint leaves less without it"
 
@@ -184,14 +187,20 @@ def _nothing(found: Found, plain: Found, elsewhere: str, doubts: dict[int, str],
 
 
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:
-    """Nothing wrong in the fitted logs is not enough where the held-out ones show something.
+    """Nothing wrong in the fitted logs is not enough where the held-out ones show something; or, where nobody knows the floor,
+    where the model leaves most of the torque there.
 
     Not so of what has changed: motion that the reference logs do not have shows what no law of friction has to the last, and
     would have shown it before.
     """
-    if ruling.verdict != "nothing-wrong" or not known or case.judge is None or case.changed is not None:
+    if ruling.verdict != "nothing-wrong" or case.changed is not None or (known and case.judge is None):
         return ruling
-    high = held_out_high(case.judge.rms(held_out_left(found.nominal, case.judge, case.blocks)), floor)
+    rows = case.data if case.judge is None else case.judge
+    left = rows.rms(held_out_left(found.nominal, case.judge, case.blocks))
+    if not known:
+        lost = mostly_lost(left, rows.rms(rows.y), floor)
+        return Ruling("unknown", (), f"held out, the model leaves {lost}: {_NO_MODEL}") if lost else ruling
+    high = held_out_high(left, floor)
     return Ruling("unknown", (), f"on held-out logs the residual of {high} stands far above the floor") if high else ruling
 
 

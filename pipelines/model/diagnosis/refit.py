@@ -17,7 +17,7 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.dissipation import dissipating, driving
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.linear import covariance, left_out, solved, superfluous
-from pipelines.model.diagnosis.nominal import Fit, rigid_rows
+from pipelines.model.diagnosis.nominal import Fit, law_shapes, rigid_rows
 from pipelines.model.diagnosis.slopes import Which, slopes_of
 
 __all__ = ["Refined", "moved_by", "refine"]
@@ -120,6 +120,9 @@ def moved_by(done: Refined, left: Array) -> Refined:
     table, y = (_steadied(done.data, x * done.weights, done.weight) for x in (done.slopes, left))
     shift = _within(done.model, list(done.names), table, y, 0.0, done.data.rubbing)
     model = done.model.moved(shift, done.names)
+    shapes = [(place, name) for kind, place, name in done.names if kind == 0]
+    if law_shapes(model.columns, model.beta) != shapes:  # a law that takes no torque now, or did not before
+        return _refined(model, done.data, done.weight, 0, done.data.y)
     return replace(done, model=model, left=done.data.y - model.torque(done.data))
 
 

@@ -241,7 +241,7 @@ def _great(case: Case, now: Refined, screened: Sequence[Screened], wanted: Seque
     taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
     asked = {id(one) for one in wanted}
     able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
-            or (case.again and one.shape[0].again(case.data.logs[0].motion))]
+            or (case.again and any(one.shape[0].again(log.motion) for log in case.data.logs))]
     least = _LEAST_WHITE if case.white else _LEAST
     able = [one for one in able if one.gain[0] >= least * now.rss and one.stands_out and id(one) in asked
             and one.family.shapes[0].evidence in case.nameable]

@@ -46,7 +46,7 @@ class Chosen:
     """One effect of the standing set."""
 
     effect: Effect
-    gain: float  # share of the squared residual of its joint that it took away
+    gain: float  # share of the squared residual of its joint, or of all, that it took away there
     amplitudes: Array
 
 
@@ -84,7 +84,8 @@ def _sized(fit: Fit, found: Sequence[Screened], tables: Sequence[Array], chosen:
 
 
 def _greedily(fit: Fit, found: Sequence[Screened], tables: Sequence[Array], barred: Collection[int]) -> list[tuple[int, float]]:
-    """Places of those that take most of what is left, one after the other, with the share of their joint that each took."""
+    """Places of those that take most of what is left, one after the other, with the share that each took of its own joint's, or of
+    all. What it takes off other joints as well, only the choice counts."""
     data = fit.data
     residual, basis = fit.residual, np.zeros((0, data.rows))
     powers = np.bincount(data.joint, residual**2, minlength=data.n_joints)
@@ -102,9 +103,12 @@ def _greedily(fit: Fit, found: Sequence[Screened], tables: Sequence[Array], barr
                 best, most, left = k, gain, own
         if most < _WORTH:
             break
-        chosen.append((best, most))
-        basis = np.concatenate([basis, left])
-        residual = residual - (left @ residual) @ left
+        after = residual - (left @ residual) @ left
+        joint = found[best].joint
+        here = np.ones(data.n_joints, dtype=bool) if joint is None else np.arange(data.n_joints) == joint - 1
+        share = float(np.sum((residual**2 - after**2)[here[data.joint]])) / max(float(powers[here].sum()), 1e-300)
+        chosen.append((best, max(share, 0.0)))
+        basis, residual = np.concatenate([basis, left]), after
     return chosen
 
 

@@ -17,8 +17,8 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.search import Found, Step
 
-__all__ = ["REST_OF_A_LAW", "REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "much_without_name",
-           "rule", "seen_in", "stands_high", "takes_most", "too_little", "without_steps"]
+__all__ = ["REST_OF_A_LAW", "REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "mostly_lost",
+           "much_without_name", "rule", "seen_in", "stands_high", "takes_most", "too_little", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -207,6 +207,16 @@ def stands_high(rms: Array, floor: Array) -> NDArray[np.bool_]:
 def held_out_high(rms: Array, floor: Array, times: float = _FAR) -> str:
     """Which joints stand far above the floor on held-out logs; empty where none does."""
     return _named(np.flatnonzero(rms > times * floor).tolist())
+
+
+def mostly_lost(rms: Array, torque: Array, noise: Array) -> str:
+    """How much a model leaves of the torque of which joints, where that is more than half and no noise; empty where of none.
+
+    Args:
+        rms, torque, noise: (joints,) [N m] what it leaves, what there is, and the noise in what it leaves.
+    """
+    joints = np.flatnonzero((rms > _HALF * torque) & (rms > _TIMES * noise)).tolist()
+    return ", ".join(f"{100.0 * rms[j] / max(torque[j], 1e-300):.0f} % of the torque of joint {j + 1}" for j in joints)
 
 
 def _named(joints: Iterable[int]) -> str:

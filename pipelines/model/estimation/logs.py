@@ -20,7 +20,7 @@ from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
-           "of_each", "with_cutoff"]
+           "of_each", "refuse_too_few", "with_cutoff"]
 
 Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
@@ -122,8 +122,7 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
         recipe.check(log)
     recipe = with_cutoff(recipe, motions)
     equations = equations_of(motions, recipe, columns, rows)
-    _fast_enough(equations, motions)
-    _enough(equations, motions[0][0])
+    refuse_too_few(equations, motions)
     found = estimate(equations, columns, weighted)
     return Fitted(found, motions, recipe, _of_whole_torque(found.solution.errors, equations), weighted)
 
@@ -138,17 +137,26 @@ def with_cutoff(recipe: Recipe, motions: Motions) -> Recipe:
     return replace(recipe, cutoff_hz=highest if felt else None, found=True)
 
 
+def refuse_too_few(equations: Sequence[LogEquations], motions: Motions) -> None:
+    """
+    Raises:
+        InputRejected: T08, too few equations are left for a fit, in all or of a joint.
+    """
+    _fast_enough(equations, motions)
+    _enough(equations, motions[0][0])
+
+
 def _fast_enough(equations: Sequence[LogEquations], motions: Motions) -> None:
     """T08: no sample of any log is as fast as the least speed asked for."""
-    slow = np.all([one.rows.slow.all(axis=0) for one in equations], axis=0)
+    asked = np.max([one.conditioning.min_speed for one in equations], axis=0)
+    slow = np.all([one.rows.slow.all(axis=0) for one in equations], axis=0) & (asked > 0.0)
     if not slow.any():
         return
     j = int(np.argmax(slow))
     fastest = max(float(np.abs(found.motion.dq[found.good.kept, j]).max()) for _, found in motions)
     unit = "rad/s" if motions[0][0].robot.joints[j].revolute else "m/s"
-    asked = np.broadcast_to(np.array(equations[0].conditioning.min_speed), len(slow))[j]
     raise InputRejected("T08", f"no equation of joint {j + 1} is left: its largest speed is {fastest:.3g} {unit}, --min-speed asks "
-                        f"for {asked:g}", where=motions[0][0].source or motions[0][0].name,
+                        f"for {asked[j]:g}", where=motions[0][0].source or motions[0][0].name,
                         remedy="give less; one value a joint, where their speeds differ")
 
 

@@ -112,8 +112,8 @@ def test_the_simulated_span_is_where_the_measured_arm_counts(long: tuple[Any, An
 
 
 def test_longer_stretches_are_simulated_where_the_last_arm_comes_no_nearer(long: tuple[Any, Any]) -> None:
-    """An arm that is worse first, and then the fitted one: what is short tells. The same two the other way round, and one arm twice,
-    are told apart by all of the log; what is simulated beside them then is as long."""
+    """An arm that is worse first, and then the fitted one: what is short tells. The same two the other way round, and one arm
+    twice, are told apart by all of the log; what is simulated beside them then is as long."""
     (log, found), arm = long
     heavy = replace(arm, base=tuple(replace(one, value=1.2 * one.value) for one in arm.base))
     assert [one.span[0].seconds for one in simulation_errors([heavy, arm], ((log, found),))] == [5.0, 5.0]

@@ -42,12 +42,24 @@ def test_nothing_wrong_is_not_said_where_held_out_logs_show_something(held_out: 
 
 @pytest.mark.parametrize(("judge", "changed", "known"), [
     (None, None, True),  # blocks of the fitted logs: the same motion
-    (object(), object(), True),  # what has changed
-    (object(), None, False)])  # nobody knows the floor
+    (object(), object(), True)])  # what has changed
 def test_held_out_motion_is_asked_only_where_it_can_tell(judge: Any, changed: Any, known: bool) -> None:
     case: Any = SimpleNamespace(judge=judge, changed=changed, blocks=10)
     said = Ruling("nothing-wrong", (), "")
     assert pruned._elsewhere(said, searched(left(0.01, 0.01, 0.01)), case, FLOOR, known) is said
+
+
+@pytest.mark.parametrize(("torque", "verdict"), [(0.9, "unknown"), (1.5, "nothing-wrong"), (0.01, "nothing-wrong")])
+def test_a_model_that_leaves_most_of_the_torque_is_none(torque: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody knows the floor: held out it leaves 0.6 N m of joint 2, more than half, or less; or no more than noise."""
+    noise = 1.0 if torque < 0.1 else 1e-3
+    monkeypatch.setattr(pruned, "held_out_left", lambda done, judge, blocks: np.array([0.01, 0.6, 0.01]))
+    judge = SimpleNamespace(rms=lambda rms: rms, y=np.array([1.0, torque, 1.0]))
+    case: Any = SimpleNamespace(judge=judge, changed=None, blocks=10)
+    found = searched(left(0.01, 0.01, 0.01))
+    ruling = pruned._elsewhere(Ruling("nothing-wrong", (), ""), found, case, np.full(3, noise), False)
+    assert ruling.verdict == verdict
+    assert ("67 % of the torque of joint 2" in ruling.reason) == (verdict == "unknown")
 
 
 def model_of(**numbers: Any) -> Any:

@@ -6,7 +6,8 @@ import numpy as np
 
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal, rigid_rows
+from pipelines.model.diagnosis.nominal import fit_nominal, law_rows, rigid_rows
+from pipelines.model.diagnosis.refit import moved_by, refine
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.slopes import slopes_of
 from pipelines.model.effects.gravity_tilt import GravityTilt
@@ -25,3 +26,20 @@ def test_across_a_tilt_the_slope_is_that_of_its_sine_and_has_nothing_of_the_curv
     found = slopes[len(model.beta) + names.index((1, 0, "1"))]
     level = prepared.data.lay(lambda motion: GravityTilt().columns(motion, model.nominal)[..., 1:2])[0]
     np.testing.assert_allclose(found, np.sin(ANGLE) / ANGLE * level, atol=1e-7 * np.abs(level).max())
+
+
+def test_a_law_that_takes_no_torque_any_more_has_no_shape_either() -> None:
+    """What is left beside the model asks joint 1 for friction that would drive it: it has none then, and slopes, names and
+    covariance are those of the model as it is."""
+    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    done = refine(Exact.start(columns, fit), prepared.data, fit.weight)
+    place = next(k for k, law in enumerate(columns.laws) if law.joint == 1 and law.name == "coulomb")
+    first = len(columns.kept) + sum(sum(not q.shape for q in law.parameters) for law in columns.laws[:place])
+    friction = done.model.beta[first] * law_rows(prepared.data, columns.laws[place], columns)[0]
+    assert any(one[:2] == (0, place) for one in done.names)
+    moved = moved_by(done, -1.5 * friction)
+    assert moved.model.beta[first] == 0.0
+    again = refine(moved.model, prepared.data, done.weight, steps=0)
+    assert moved.names == again.names
+    assert moved.slopes.shape == again.slopes.shape

@@ -56,3 +56,18 @@ def test_what_cannot_be_leaves_its_place_to_what_can(monkeypatch: pytest.MonkeyP
 def test_what_explains_most_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     like = HUMP + 0.3 * np.cos(np.arange(ROWS) / 5.0)
     assert chosen(monkeypatch, worse=like, best=HUMP) == ["best"]
+
+
+def test_it_takes_no_more_of_its_joint_than_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An effect of joint 1 that most of what joint 2 has left comes of as well: what it takes there is no share of joint 1."""
+    both = np.concatenate([HUMP, 3.0 * HUMP])
+    law, joint = Law("both"), np.repeat([0, 1], ROWS)
+    found = SimpleNamespace(family=SimpleNamespace(event=False, shapes=(law,)), shape=(law,), joint=1)
+    monkeypatch.setattr(standing, "screen", lambda *_: [found])
+    monkeypatch.setattr(standing, "lay_shape", lambda *_: both[None])
+    data = SimpleNamespace(rows=2 * ROWS, n_joints=2, joint=joint, counts=np.ones(2 * ROWS, dtype=bool),
+                           blocks=lambda count: np.tile(np.arange(ROWS) * count // ROWS, 2))
+    residual = both + np.where(joint == 0, 1.0, 0.1) * np.random.default_rng(7).standard_normal(2 * ROWS)
+    fit: Any = SimpleNamespace(data=data, residual=residual, project=lambda x: x)
+    (one,) = standing_set(data, fit, [found.family], None)  # type: ignore[arg-type, list-item]
+    assert one.gain == pytest.approx(1.0 / 3.0, abs=0.05)  # the power of HUMP in that of HUMP and noise
