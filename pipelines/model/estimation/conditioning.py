@@ -13,6 +13,7 @@ __all__ = ["HIGHEST", "Conditioning", "condition", "cutoff_at", "wanted_cutoff"]
 
 HIGHEST = 0.4  # of the rate: a low-pass from there on takes nothing away that would be worth it
 _GAP = 1.5  # sample times between two samples: one is missing
+_SHORT = 0.5  # of the longest stretch without a gap
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,18 @@ def wanted_cutoff(motion: Motion, rate: float) -> float:
 
 
 def _highest_frequency(motion: Motion, rate: float) -> float:
-    """Below it lies 99.9 % of the power of the speed, joints scaled alike [Hz]."""
+    """Below it lies 99.9 % of the power of the speed, joints scaled alike [Hz].
+
+    Of stretches without a gap, each by itself: laid end to end, a jump would count as the fastest motion. Short ones, whose own
+    ends are that as well, count only where there are no longer ones.
+    """
     finite = np.isfinite(motion.dq).all(axis=1)
-    known = _bridged(motion.t[finite], motion.dq[finite], rate)
+    known, t = motion.dq[finite], motion.t[finite]
     scale = known.std(axis=0)
     x = (known - known.mean(axis=0))[:, scale > 0.0] / scale[scale > 0.0]
-    power = np.sum(np.abs(np.fft.rfft(x * np.hanning(len(x))[:, None], axis=0)) ** 2, axis=1)
+    stretches = np.split(x, 1 + np.flatnonzero(np.diff(t) > _GAP / rate))
+    longest = max(map(len, stretches))
+    power = np.sum([np.sum(np.abs(np.fft.rfft(some * np.hanning(len(some))[:, None], longest, axis=0)) ** 2, axis=1)
+                    for some in stretches if len(some) >= _SHORT * longest], axis=0)
     total = np.cumsum(power)
-    return float(np.searchsorted(total, 0.999 * total[-1]) + 1) * rate / len(x) if total[-1] > 0.0 else rate
-
-
-def _bridged(t: Array, x: Array, rate: float) -> Array:
-    """`x` (samples, joints) with straight lines over the gaps of `t`: laid end to end, a jump would count as the fastest motion."""
-    if len(t) < 2 or np.diff(t).max() < _GAP / rate:
-        return x
-    even = np.arange(t[0], t[-1], 1.0 / rate)
-    return np.stack([np.interp(even, t, column) for column in x.T], axis=1)
+    return float(np.searchsorted(total, 0.999 * total[-1]) + 1) * rate / longest if total[-1] > 0.0 else rate

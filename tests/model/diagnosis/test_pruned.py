@@ -256,8 +256,10 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     monkeypatch.setattr(pruned, "turned", lambda found, apart, believed, *_: believed)
     monkeypatch.setattr(pruned, "_asked_again", lambda found, kept, *_: (kept, found.final))
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
+    monkeypatch.setattr(pruned, "held_out_left", lambda done, *_: done.rms)
+    torque: Any = SimpleNamespace(rms=lambda rms: rms, y=np.ones(3))
     case: Any = SimpleNamespace(floored=False, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
-                                unlike=())
+                                unlike=(), data=torque)
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0,), ""), case, case, FLOOR, False)
     assert done.ruling.named == named
     assert done.ruling.verdict == ("cause" if named else "nothing-wrong")

@@ -1,0 +1,33 @@
+"""The low-pass that a motion asks for is that of the motion, whatever is missing of the log."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipelines.model.estimation.conditioning import wanted_cutoff
+from pipelines.model.rigid.body import Motion
+
+RATE = 500.0  # [Hz]
+FASTEST = 5.0  # [Hz]
+
+
+def motion(gap: float, missing: str) -> Motion:
+    """Ten seconds of three joints that move at one to five hertz; in the middle `gap` [s] is cut out, or is no number."""
+    t = np.arange(0.0, 10.0, 1.0 / RATE)
+    dq = np.stack([np.sin(2.0 * np.pi * f * t + phase) for f, phase in ((1.0, 0.3), (2.0, 1.1), (FASTEST, 2.0))], axis=1)
+    lost = np.abs(t - 5.03) < 0.5 * gap
+    if missing == "samples":
+        t, dq = t[~lost], dq[~lost]
+    else:
+        dq[lost] = np.nan
+    return Motion(t, np.zeros_like(dq), dq, np.zeros_like(dq))
+
+
+@pytest.mark.parametrize("missing", ["samples", "numbers"])
+@pytest.mark.parametrize("gap", [0.0, 0.1, 0.4, 0.8])
+def test_a_gap_is_no_fast_motion(gap: float, missing: str) -> None:
+    """Laid end to end, a gap of 0.4 s would jump, and ask for a low-pass of six times the frequency."""
+    whole = wanted_cutoff(motion(0.0, missing), RATE)
+    assert whole == pytest.approx(5.0 * FASTEST, rel=0.05)
+    assert wanted_cutoff(motion(gap, missing), RATE) == pytest.approx(whole, rel=0.15)
