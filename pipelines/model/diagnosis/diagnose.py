@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.candidates import families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.change_of_sign import SEVERAL, loosened, of_one_law, plainer_of, shows, wrong_law
 from pipelines.model.diagnosis.changed import changed
-from pipelines.model.diagnosis.doubted import of_replicas, unlike_motion, unlike_noise, without_twin
+from pipelines.model.diagnosis.doubted import of_replicas, unlike_motion, unlike_noise, without_replay, without_twin
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.floored import floored_by
 from pipelines.model.diagnosis.held_out import held_out_left
@@ -138,6 +138,7 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
         rows = case.data if case.judge is None else case.judge
         left = held_out_left(done.found.nominal, case.judge, case.blocks)
         done = without_twin(done, rows.rms(left), floored.rms, floored.no_twin)
+    done = without_replay(done, floored.no_replay)
     if floored.twin is not None:
         done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
         done = unlike_noise(done, partial(of_replicas, floored.twin))

@@ -27,7 +27,7 @@ from pipelines.model.diagnosis.own_motion import following
 from pipelines.model.diagnosis.search import Explored
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.twin import Twin, make_twin, replayable
+from pipelines.model.diagnosis.twin import Twin, make_twin, not_replayable, replayable
 
 __all__ = ["Floored", "floored_by"]
 
@@ -48,6 +48,7 @@ class Floored:
     judging: Array | float = 1.0  # (joints,) times as much power the reference logs leave at the speeds of the logs held out
     twin: Twin | None = None  # whose replicas it is, where it was made for these logs
     no_twin: str = ""  # why there is none although the logs know their controller: no model of the arm follows it
+    no_replay: str = ""  # or the logs cannot be replayed
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -62,7 +63,8 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
         except InputRejected as refused:
             why = refused.message if refused.code == _RUNS_AWAY else ""  # numbers of too poor a motion, D15, are no arm's fault
     if made is None:
-        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=why)
+        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=why,
+                       no_replay="" if why or not chosen.replicas else not_replayable([log for log, _ in prepared.motions]))
     return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
                    twin=twin)
 

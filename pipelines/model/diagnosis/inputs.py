@@ -17,6 +17,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.bridged import bridged
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.sharper import sharpened
@@ -83,6 +84,7 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     """
     if not logs.identify:
         raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
+    logs = replace(logs, **{part: tuple(map(bridged, getattr(logs, part))) for part in ("identify", "validate", "reference")})
     columns = _columns(logs, arm)
     how = Reconstruction()
     parts = (logs.identify, logs.validate, logs.reference)

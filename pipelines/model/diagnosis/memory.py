@@ -52,7 +52,7 @@ class Memory:
 
     def examined(self, logs: Logs, allow_mismatch: bool) -> tuple[Check, ...]:
         """As `examined` of all that a diagnosis looks at."""
-        every = (*logs.identify, *logs.validate, *logs.reference, *logs.frf)
+        every = (*logs.identify, *logs.validate, *logs.reference, *logs.frf, *logs.frf_before)
         return self.of("said", every, allow_mismatch, lambda: examined(every, allow_mismatch))
 
     def since(self, prepared: Prepared, chosen: DiagnosisSettings) -> Since:

@@ -27,7 +27,7 @@ from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Experiment, Noise, Simulated, simulate_together
 
-__all__ = ["Twin", "imperfect", "make_twin", "replayable", "replica"]
+__all__ = ["Twin", "imperfect", "make_twin", "not_replayable", "replayable", "replica"]
 
 _NUISANCE = 20040509
 
@@ -87,6 +87,19 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
             continue
         found.append(place)
     return tuple(found)
+
+
+def not_replayable(logs: Sequence[ExperimentLog]) -> str:
+    """Why the first of the logs that describe their controller cannot be replayed all the same, and what to do; empty where none
+    describes it."""
+    for log in logs:
+        if log.controller is None or log.controller.law == "unknown":
+            continue
+        try:
+            Experiment.of_log(log)
+        except InputRejected as refused:
+            return f"of {log.name}: {refused.message}" + (f"; {refused.remedy}" if refused.remedy else "")
+    return ""
 
 
 def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe: Recipe, noise: DriveNoise, replicas: int,
