@@ -71,9 +71,12 @@ def turned(found: Found, kept: list[int], believed: list[int], case: Case) -> li
 
 
 def _mistaken(found: Found, earlier: int, later: int, case: Case) -> bool:
-    """Whether the later of two causes would have passed for the earlier one, or is what the law of that leaves."""
+    """Whether the later of two causes would have passed for the earlier one, or is what the law of that leaves. Of two that have no
+    shape each is what it is: one that is not there takes nothing beside the other, and is dropped for that."""
     own, before = (found.final.model.effects[k].effect for k in (later, earlier))
     if before.joint != own.joint or not (own.name in before.twins or before.name in own.twins):
+        return False
+    if before.shapeless and own.shapeless:
         return False
     if imitated(found.steps[earlier], family_of(case, own), case) > _ALIKE:
         return True

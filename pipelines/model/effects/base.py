@@ -85,6 +85,7 @@ class Effect(ABC):
     passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
+    shapeless: ClassVar[bool] = False  # its law is the machine's to the last: it leaves no rest for another to mend
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
     slight: ClassVar[float] = 0.0  # of its amplitude, if it has one alone: what surely is less, instruments in order have as well
     ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken

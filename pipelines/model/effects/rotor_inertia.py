@@ -27,6 +27,7 @@ class RotorInertia(Effect):
     size = "inertia"
     twins = ("torque_gain", "link_length")
     from_motion = True
+    shapeless = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self.own(motion.ddq))

@@ -32,6 +32,7 @@ class TorqueGain(Effect):
     size = "gain_error"
     twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
     in_drive = True
+    shapeless = True
     slight = 0.0075  # a current sensor that is exact to a hundredth of its range may be off by so much
     needs = ("a known payload, where all joints have the same error",)
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from pipelines.model.diagnosis import mended
 from pipelines.model.diagnosis import search as search_module
-from pipelines.model.diagnosis.candidates import families, whole_motion
+from pipelines.model.diagnosis.candidates import Family, families, whole_motion
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.fewer import without
@@ -21,6 +24,7 @@ from pipelines.model.diagnosis.nominal import fit_nominal
 from pipelines.model.diagnosis.search import Found, search
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.verdict import Ruling, explained
+from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
 
@@ -78,3 +82,16 @@ def test_an_offset_that_is_one_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     every = list(range(len(names)))
     kept = turned(found, not_mending(found, every, case), every, case)
     assert "torque_offset" in [names[k] for k in kept]
+
+
+@pytest.mark.parametrize(("cause", "mends"), [("rotor_inertia", False), ("load_friction", True)])
+def test_what_has_no_shape_mends_none(cause: str, mends: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An inertia found after a scale of torque, which would have passed for it, is one of its own; a friction is what the first law
+    leaves, as it was before."""
+    kind, before = find_effect(cause), find_effect("torque_gain")
+    made = SimpleNamespace(effects=[SimpleNamespace(effect=one(joint=3)) for one in (before, kind)])
+    step = SimpleNamespace(best=None, before=SimpleNamespace(rms=np.ones(3)))
+    found: Any = SimpleNamespace(final=SimpleNamespace(model=made, rms=np.ones(3)), steps=[step, step], nominal=step.before)
+    case: Any = SimpleNamespace(families=(Family(cause, 3, (kind(joint=3),)),), beside=())
+    monkeypatch.setattr(mended, "imitated", lambda *_: 0.7)
+    assert (not_mending(found, [0, 1], case) == [0]) is mends
