@@ -101,8 +101,8 @@ def _key_figures(steps: list[Step]) -> Table | None:
     if table is None or anew is None or len(steps) == 1:
         return table
     left = ", ".join(format_number(float(x), 3) for x in anew.after_rms.validate)
-    return dataclasses.replace(table, caption=f"{table.caption} What is called extended is as diagnosed; the model of extend, in its "
-                               f"model.json, leaves {left} {units_in(anew).torque}.")
+    said = f"What is called extended is as diagnosed; that of extend, in its model.json, leaves {left} {units_in(anew).torque}."
+    return dataclasses.replace(table, caption=f"{table.caption} {said}")
 
 
 def _stages(steps: Iterable[tuple[str, Step]]) -> Section:

@@ -164,4 +164,4 @@ def test_the_extended_model_of_the_key_figures_is_told_from_the_file() -> None:
     shown = run_report(Result((diagnosed, anew))).key_figures
     assert shown is not None
     assert (shown.rows, shown.caption.startswith("Of what was held out. ")) == (table.rows, True)
-    assert "the model of extend, in its model.json, leaves 0.18, 0.1 N m" in shown.caption
+    assert "that of extend, in its model.json, leaves 0.18, 0.1 N m" in shown.caption
