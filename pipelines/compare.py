@@ -1,29 +1,36 @@
 """Compare two results of the same command: what differs beyond its uncertainty.
 
-Reads    two folders that a command has left, or two result.json, or two model.json
+Reads    two folders that a command has left, or two result.json, or two model.json; of a run also the folder of a stage
 Writes   result.json, report.html
 Source   Miller, Simultaneous Statistical Inference, 1981: many comparisons at a time; cli-contract.md
 
-A figure with a standard deviation differs where it moved farther than chance moves the farthest of so many. Residuals have no
-standard deviation: they are laid side by side, and not judged. Verdicts and findings differ where they are others.
+A law or an effect that only one of the two has is what differs most. A figure with a standard deviation differs where it moved
+farther than chance moves the farthest of so many; an angle on a circle moves the shorter way around. Each figure counts once: not
+again where a finding says what the model says, nor where it follows from another. Residuals have no standard deviation: they are
+laid side by side, and not judged. Verdicts and findings differ where they are others.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
-from pipelines.log.result_figures import fitted, residuals, robot_of
-from pipelines.log.stored_result import StoredResult, read_result
+from pipelines.log.compared import called, label_of, of_other_commands
+from pipelines.log.result_figures import fitted, numbers_of, residuals, robot_of
+from pipelines.log.result_models import less_findings, modelled
+from pipelines.log.run_results import read_any_result
+from pipelines.model.parameter_names import named_in, quantity_of
 from pipelines.report.comparison_report import Answer, Comparison, Figure, Residual, comparison_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage
 
 __all__ = ["STAGE", "Comparison", "Settings", "compute", "read", "report"]
+
+_Figures = Mapping[str, tuple[float, float, str]]  # name -> value, std, unit
 
 
 @dataclass(frozen=True)
@@ -43,18 +50,16 @@ def read(request: Request, settings: Settings) -> Inputs:
     paths = request.paths * 2 if len(request.paths) == 1 else request.paths  # what is named twice is named once by now
     if len(paths) != 2:
         raise UsageError("C02", f"{len(paths)} results", where="compare", remedy="name two: rrrid compare A B")
-    found = tuple(read_result(path) for path in paths)
-    if found[0].command != found[1].command:
-        raise UsageError("C02", f"results of different commands: {found[0].command} and {found[1].command}", where="compare",
-                         remedy="compare two of one command")
-    named = replace(request, paths=tuple(one.path.parent for one in found))
-    robots = [robot for one in found if (robot := robot_of(one.object))]
-    return Inputs(sources=tuple(one.path for one in found), material=found, label=named.paths[1].name,
+    a, b = (read_any_result(path) for path in paths)
+    if a.command != b.command:
+        raise of_other_commands(a, b)
+    robots = [robot for one in (a, b) if (robot := robot_of(one.object))]
+    return Inputs(sources=tuple(dict.fromkeys((a.path, b.path))), material=(a, b), label=label_of(a, b),
                   robot_name=robots[0] if len(set(robots)) == 1 else "several" if robots else "unknown")
 
 
 def compute(inputs: Inputs, settings: Settings) -> Comparison:
-    """Figures against their uncertainty, residuals side by side, verdicts and findings.
+    """What only one has, figures against their uncertainty, residuals side by side, verdicts and findings.
 
     Raises:
         NothingMatched: C06, the two have nothing in common that could be compared.
@@ -64,46 +69,73 @@ def compute(inputs: Inputs, settings: Settings) -> Comparison:
     if not 0.0 < settings.alpha < 1.0:
         raise UsageError("C02", f"alpha {settings.alpha:g}", where="--alpha", remedy="give a probability between 0 and 1")
     a, b = inputs.material
-    names = _names(a, b)
-    figures, alone = _figures(a, b, settings.alpha)
-    mine, theirs = residuals(a.object), residuals(b.object)
-    left = tuple(Residual(name, unit, before, theirs[name][0]) for name, (before, unit) in mine.items() if name in theirs)
+    names = called(a, b)
     try:
         answers = tuple(_answers(a.object, b.object))
+        effects_a, effects_b = _only(a.object, b.object)
+        both = modelled(a.object) & modelled(b.object)
+        first, second = (_counted(less_findings(one.object, both)) for one in (a, b))
     except (KeyError, TypeError, AttributeError) as problem:
         raise InputRejected("S20", f"not what a result of {a.command} holds ({type(problem).__name__}: {problem})",
                             where=f"{names[0]}, {names[1]}", remedy="run the command again") from problem
-    if not (figures or left or answers):
+    figures = _figures(first, second, settings.alpha)
+    mine, theirs = residuals(a.object), residuals(b.object)
+    left = tuple(Residual(name, unit, before, theirs[name][0]) for name, (before, unit) in mine.items() if name in theirs)
+    same = a.object == b.object
+    if not (figures or left or answers or effects_a or effects_b or same):
         raise NothingMatched("C06", f"the two results of {a.command} have no figure in common", where=f"{names[0]}, {names[1]}",
                              remedy="compare results of the same robot and the same settings")
-    differ = any(one.beyond for one in figures) or any(one.differs for one in answers)
-    return Comparison(a.command, names, differ, limit_of(len(figures), settings.alpha), settings.alpha, figures, alone[0], alone[1],
-                      left, answers)
+    differ = any(one.beyond for one in figures) or any(one.differs for one in answers) or bool(effects_a or effects_b)
+    compared = {one.name for one in figures}
+    return Comparison(
+        a.command, names, differ, limit_of(len(figures), settings.alpha), settings.alpha, figures,
+        tuple(name for name in first if name not in compared), tuple(name for name in second if name not in compared), left,
+        answers, effects_a, effects_b, same)
 
 
-def _names(a: StoredResult, b: StoredResult) -> tuple[str, str]:
-    """What the two are called: as much of their paths, from the end, as tells them apart; nothing of where they lie."""
-    parts = [one.path.parts if one.path.name != "result.json" else one.path.parts[:-1] for one in (a, b)]
-    for depth in range(1, 5):
-        names = ["/".join(part[-depth:]) for part in parts]
-        if names[0] != names[1]:
-            return names[0], names[1]
-    return f"{parts[0][-1]} (A)", f"{parts[1][-1]} (B)"
+def _counted(result: Mapping[str, Any]) -> _Figures:
+    """Its figures, without those that follow from others: the order of a second harmonic is twice that of the first."""
+    return {name: figure for name, figure in fitted(result).items() if (kind := quantity_of(name)) is None or not kind.derived}
 
 
-def _figures(a: StoredResult, b: StoredResult, alpha: float) -> tuple[tuple[Figure, ...], tuple[tuple[str, ...], tuple[str, ...]]]:
-    """What both have, the farthest first; and the names of what only one has."""
-    first, second = fitted(a.object), fitted(b.object)
+def _figures(first: _Figures, second: _Figures, alpha: float) -> tuple[Figure, ...]:
+    """What both have, the farthest first."""
     both = [name for name in first if name in second and first[name][2] == second[name][2]]
     limit = limit_of(len(both), alpha)
     found = []
     for name in both:
         (x, std_x, unit), (y, std_y, _) = first[name], second[name]
-        z = standardised(x, y, std_x, std_y)
-        found.append(Figure(name, unit, x, std_x, y, std_y, z, math.isfinite(z) and abs(z) > limit))
-    found.sort(key=lambda one: -abs(one.away))
-    alone = tuple(tuple(name for name in mine if name not in both) for mine in (first, second))
-    return tuple(found), (alone[0], alone[1])
+        kind = quantity_of(name)
+        period = None if kind is None else kind.period
+        z = standardised(x, y, std_x, std_y, period)
+        found.append(Figure(name, unit, x, std_x, y, std_y, z, math.isfinite(z) and abs(z) > limit, period))
+    return tuple(sorted(found, key=lambda one: -abs(one.away)))
+
+
+def _only(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The laws and effects that only one of the two has, "cogging:2", where both say what they have.
+
+    What `estimate-bps` has among its parameters is no list of them: friction that was given to it is not there.
+    """
+    only = set[tuple[str, int | None]](), set[tuple[str, int | None]]()
+    for kind in (_modelled, _chosen):
+        has = kind(a), kind(b)
+        if all(has):
+            for k in (0, 1):
+                only[k].update(has[k] - has[1 - k])
+    first, second = (tuple(_place({"cause": cause, "joint": joint}) for cause, joint in sorted(
+        places, key=lambda one: (one[0], one[1] or 0))) for places in only)
+    return first, second
+
+
+def _modelled(result: Mapping[str, Any]) -> set[tuple[str, int | None]]:
+    """What its models have."""
+    return {(cause, joint) for _, cause, joint in modelled(result)}
+
+
+def _chosen(result: Mapping[str, Any]) -> set[tuple[str, int | None]]:
+    """The law that a friction fit has chosen for each joint."""
+    return {(one.cause, one.joint) for name in numbers_of(result) if (one := named_in(name)) is not None and one.of_law}
 
 
 def _answers(a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Answer]:
@@ -131,7 +163,7 @@ def _place(finding: Mapping[str, Any]) -> str:
 
 
 def report(result: Comparison) -> Report:
-    """The verdict, every figure by how far it moved, residuals, what was said."""
+    """The verdict, what only one has, every figure by how far it moved, residuals, what was said."""
     return comparison_report(result)
 
 

@@ -149,9 +149,19 @@ def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
     named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings
              if not one.doubt and not _once(find_effect(one.cause))]
     if not named:
-        raise NothingMatched("C06", f"diagnose found nothing to extend the model by: {diagnosed.verdict}", where=label,
-                             remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
+        raise NothingMatched("C06", f"{_found_instead(diagnosed)}: there is nothing to extend the model by", where=label,
+                             remedy="to try a cause all the same, name it: rrrid extend LOGS --with CAUSE:JOINT")
     return named
+
+
+def _found_instead(diagnosed: Diagnosed) -> str:
+    """What `diagnose` says, where it names nothing that a model could have."""
+    if diagnosed.verdict == "unknown":
+        return "diagnose found something wrong, and no cause for it"
+    if diagnosed.findings:
+        return "what diagnose found happens once, or is in doubt, and has no place in a model"
+    changed = diagnosed.question == "what has changed"
+    return f"diagnose found nothing {'that has changed since the reference logs' if changed else 'wrong'}"
 
 
 def _once(kind: type[Effect]) -> bool:

@@ -38,6 +38,7 @@ from pipelines.log.places import (
     short_names,
     slug,
     tilde,
+    told_apart,
 )
 from pipelines.log.results import encode, json_text, write_series
 from pipelines.log.robot_files import robot_sources
@@ -127,7 +128,7 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     except RrridError as problem:
         # What knows no file, such as a filter of samples, leaves the place to who knows the inputs.
         problem.where = renamed(problem.where, given) or clean(inputs or f"rrrid {stage.name}")
-        problem.message = renamed(problem.message, given)
+        problem.message, problem.remedy = renamed(problem.message, given), renamed(problem.remedy, given)
         raise
 
 
@@ -231,8 +232,12 @@ def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: 
 
 
 def footer_of(command: str, inputs: Mapping[str, str]) -> dict[str, str]:
-    """What the foot of a report says of where it comes from; `inputs`: path -> SHA-256."""
-    named = {f"input {os.path.basename(path)}": value[:16] for path, value in sorted(inputs.items())[:_LISTED]}
+    """What the foot of a report says of where it comes from; `inputs`: path -> SHA-256.
+
+    Each by the name of its file, or with the folders above it that tell it from others of that name.
+    """
+    names = told_apart(inputs)
+    named = {f"input {names[path]}": value[:16] for path, value in sorted(inputs.items())[:_LISTED]}
     return {"command": f"rrrid {command}", "version": __version__} | named
 
 

@@ -1,4 +1,4 @@
-"""Two results of one arm agree, two of different arms do not, and the figure that moved is named."""
+"""Two results of one arm agree, two of different arms do not; what only one has and what moved is named."""
 
 from __future__ import annotations
 
@@ -45,16 +45,6 @@ def go(tmp_path: Path, a: Path, b: Path, **settings: Any) -> Outcome[Comparison]
     return run_stage(compare.STAGE, Request((a, b), out=tmp_path / "out", no_report=True, check=True), compare.Settings(**settings))
 
 
-def test_the_limit_is_that_of_a_normal_distribution() -> None:
-    """z and its limit against scipy: of n figures none exceeds it with a probability of 1 - α at least."""
-    for count, alpha in ((1, 0.05), (30, 0.01), (400, 0.001)):
-        limit = limit_of(count, alpha)
-        assert math.isclose(limit, stats.norm.isf(alpha / (2 * count)), rel_tol=1e-9)
-        assert (1.0 - 2.0 * stats.norm.sf(limit))**count >= 1.0 - alpha
-    assert standardised(1.0, 6.0, 3.0, 4.0) == 1.0
-    assert math.isnan(standardised(1.0, 2.0, 0.0, 0.0))
-
-
 def test_one_arm_twice_hardly_ever_differs() -> None:
     """400 pairs of results of one arm: with α = 0.05 as many are said to differ as a binomial distribution of 0.05 allows."""
     rng = np.random.default_rng(5)
@@ -65,11 +55,10 @@ def test_one_arm_twice_hardly_ever_differs() -> None:
 
 
 def test_the_same_arm_agrees(tmp_path: Path) -> None:
-    """Two fits of one arm; residuals that differ are shown, not judged. Beside itself a result is called by its folder alone."""
+    """Two fits of one arm; residuals that differ are shown, not judged."""
     outcome = go(tmp_path, written(tmp_path / "monday", 1), written(tmp_path / "friday", 2))
     assert (outcome.result.differ, outcome.exit_code) == (False, 0)
     assert "agree" in outcome.report.verdict
-    assert go(tmp_path, tmp_path / "monday", tmp_path / "monday").result.names == ("monday (A)", "monday (B)")
     assert [(one.name, one.a, one.b) for one in outcome.result.residuals if one.a != one.b] == [
         ("torque rms validate joint 2", 0.01, 0.02)]
 
@@ -92,6 +81,7 @@ def test_findings_that_come_or_go(tmp_path: Path) -> None:
     outcome = go(tmp_path, a, b)
     assert [(one.what, one.a, one.b) for one in outcome.result.answers] == [
         ("verdict", "nothing-wrong", "cause"), ("findings", "none", "cogging:2"), ("standing", "none", "gravity_tilt")]
+    assert "verdict (nothing wrong in a, a cause is named in b)" in outcome.report.verdict
     assert outcome.exit_code == 1
 
 
@@ -118,6 +108,100 @@ def test_models_are_compared(tmp_path: Path, samples: Path) -> None:
         model["base_parameters"][2]["name"]]
 
 
+def model(**effects: dict[str, tuple[float, float]]) -> dict[str, Any]:
+    """A model file with Coulomb friction at joint 1, and at joint 2 these effects: parameter -> value, std."""
+    told = [{"effect": name, "joint": 2, "parameters": {key: {"value": value, "std": std, "unit": "rad", "origin": "fitted"}
+                                                        for key, (value, std) in values.items()}}
+            for name, values in effects.items()]
+    level = {"level": {"value": 1.0, "std": 0.1, "unit": "N m", "origin": "fitted"}}
+    return {"format": "rrrid-model", "name": "arm-1", "robot": 'name = "arm"', "base_parameters": [], "effects": told,
+            "friction": [{"effect": "coulomb", "joint": 1, "parameters": level}]}
+
+
+def extended(folder: Path, seed: int, **effects: dict[str, tuple[float, float]]) -> Path:
+    """A result of extend: the effects as findings, and again in its model; the torque error before and after."""
+    held = model(**effects)
+    findings = [{"cause": one["effect"], "joint": one["joint"], "parameters": one["parameters"]} for one in held["effects"]]
+    rms = {name: {"validate": [error * seed], "floor": [0.01]} for name, error in (("residual_rms", 0.3), ("after_rms", 0.1))}
+    return written(folder, seed, command="extend", parameters=[], findings=findings, model=held, **rms)
+
+
+def test_a_phase_moves_the_shorter_way_around(tmp_path: Path) -> None:
+    """2.40 and -2.96 rad are 0.92 rad apart; what has no period, the rest angle of a spring, moved by 5.4 rad."""
+    phases = ({"phase_2": (2.4024, 0.1439)}, {"phase_2": (-2.9644, 0.0289)})
+    rest = ({"rest_angle": (2.4024, 0.1439)}, {"rest_angle": (-2.9644, 0.0289)})
+    a, b = (extended(tmp_path / name, 1, cogging=phase, spring=angle)
+            for name, phase, angle in zip("ab", phases, rest, strict=True))
+    away = {one.name: (round(one.away, 1), one.period) for one in go(tmp_path, a, b).result.figures}
+    assert away["model cogging joint 2 phase 2"] == (6.2, 2.0 * math.pi)
+    assert away["model spring joint 2 rest angle"] == (-36.6, None)
+
+
+def test_every_figure_counts_once(tmp_path: Path) -> None:
+    """What a finding says again of the model, and orders of harmonics that follow from the first, are no figures of their own: the
+    limit is that of the others. A finding that no model has in both results counts as it stands; of a run too."""
+    wave = dict.fromkeys(("order", "order_2", "order_3", "amplitude", "phase"), (1.0, 0.1))
+    a, b = (extended(tmp_path / name, 1, cogging=wave) for name in "ab")
+    result = go(tmp_path, a, b).result
+    own = {f"cogging joint 2 {name}" for name in ("amplitude", "order", "phase")}
+    assert {one.name for one in result.figures} == {"model coulomb joint 1 level", *(f"model {name}" for name in own)}
+    assert result.limit == limit_of(4)
+    alone = json.loads((b / "result.json").read_text()) | {"model": None}
+    c, d = (written(tmp_path / name, 1, **alone) for name in "cd")
+    assert {one.name for one in go(tmp_path, c, d).result.figures} == own
+    steps = [{"name": name, "exit": 0, "result": json.loads((b / "result.json").read_text()) | more}
+             for name, more in (("diagnose", {"model": None}), ("extend", {}))]
+    e, f = (written(tmp_path / name, 1, command="run", stages=steps, findings=steps[0]["result"]["findings"]) for name in "ef")
+    assert {one.name for one in go(tmp_path, e, f).result.figures} == {f"extend {one.name}" for one in result.figures}
+
+
+def test_both_errors_of_an_extension_are_shown(tmp_path: Path) -> None:
+    """What the nominal model leaves, and what the extended one leaves."""
+    outcome = go(tmp_path, extended(tmp_path / "a", 1), extended(tmp_path / "b", 2))
+    shown = {one.name: (one.a, one.b) for one in outcome.result.residuals}
+    assert shown["nominal model residual rms validate joint 1"] == (0.3, 0.6)
+    assert shown["extended model residual rms validate joint 1"] == (0.1, 0.2)
+
+
+def test_an_effect_that_only_one_has_comes_first(tmp_path: Path) -> None:
+    """Models, whether their numbers have a std or not: the verdict says which has what; so do two extensions, and say it once."""
+    ripple, files = {"amplitude": (0.3, 0.01)}, []
+    for name, effects in (("a", {}), ("b", {"cogging": ripple, "torque_offset": {"offset": (0.1, 0.01)}})):
+        (tmp_path / name).mkdir()
+        files.append(tmp_path / name / "model.json")
+        files[-1].write_text(json.dumps(model(**effects)))
+    outcome = go(tmp_path, *files)
+    has = "cogging at joint 2, and torque offset at joint 2"
+    assert outcome.report.verdict == f"a/model.json and b/model.json differ. b/model.json has {has}, which a/model.json has not."
+    assert (outcome.result.effects_a, outcome.result.effects_b) == ((), ("cogging:2", "torque_offset:2"))
+    assert (outcome.exit_code, outcome.report.sections[0].title) == (1, "Laws and effects that only one has")
+    for file in files:
+        file.write_text(file.read_text().replace('"std": 0.01', '"std": null').replace('"std": 0.1', '"std": null'))
+    assert has in go(tmp_path, *files).report.verdict
+    found = go(tmp_path, extended(tmp_path / "c", 1), extended(tmp_path / "d", 1, cogging=ripple))
+    assert found.report.verdict == "c and d differ. d has cogging at joint 2, which c has not."
+
+
+def test_friction_that_was_given_is_no_law_less(tmp_path: Path) -> None:
+    """An estimate that took its friction from elsewhere has none among its parameters: nothing is said of that."""
+    level = {"name": "coulomb:1:level", "value": 1.0, "std": 0.1, "unit": "N m", "visible": True}
+    a, b = written(tmp_path / "a", 1), written(tmp_path / "b", 2)
+    told = json.loads((b / "result.json").read_text())
+    b = written(tmp_path / "b", 2, parameters=[*told["parameters"], level])
+    assert "agree" in go(tmp_path, a, b).report.verdict
+
+
+def test_one_result_twice_is_said_to_be_one(tmp_path: Path) -> None:
+    """By its folder, by a copy of it, and where it has nothing that could be compared."""
+    a, b = written(tmp_path / "monday", 1), written(tmp_path / "copy", 1)
+    for one, other, words in ((a, a, "monday (A) and monday (B)"), (a, b, "monday and copy")):
+        outcome = go(tmp_path, one, other)
+        assert outcome.report.verdict.startswith(f"{words} are the same result")
+        assert (outcome.result.same, outcome.exit_code) == (True, 0)
+    bare = bad(tmp_path / "bare", '{"command": "inspect"}')
+    assert "the same result" in go(tmp_path, bare, bare).report.verdict
+
+
 def bad(folder: Path, text: str) -> Path:
     folder.mkdir()
     (folder / "result.json").write_text(text)
@@ -138,8 +222,14 @@ def test_on_the_command_line(tmp_path: Path) -> None:
     """Exit 0, 1, 2, 3; a result that was edited is not believed."""
     a, b = written(tmp_path / "a", 1), written(tmp_path / "b", 2, (3, 30.0))
     assert rrrid("compare", "a", "b", "--no-report", cwd=tmp_path).returncode == 0
-    assert (tmp_path / "runs/arm/b/compare/result.json").is_file()
+    assert (tmp_path / "runs/arm/a-and-b/compare/result.json").is_file()
     assert rrrid("compare", "a", "b", "--no-report", "--check", cwd=tmp_path).returncode == 1
+    (tmp_path / "c").mkdir()
+    written(tmp_path / "c", 1, command="extend")
+    for name in "ac":
+        (tmp_path / name / "model.json").write_text("{}")
+    other = rrrid("compare", "a", "c", cwd=tmp_path)
+    assert (other.returncode, "or their models: rrrid compare a/model.json c/model.json" in other.stderr) == (2, True)
     nowhere = rrrid("compare", a, "nowhere", cwd=tmp_path)
     assert (nowhere.returncode, "RRID-C04" in nowhere.stderr) == (2, True)
     (b / "result.json").write_text((b / "result.json").read_text().replace("p4", "p5"))

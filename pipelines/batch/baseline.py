@@ -18,8 +18,10 @@ from pipelines.batch.drift import LIMIT
 from pipelines.batch.parts import Part, place_of
 from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
+from pipelines.fit.differences import difference
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredValue
 from pipelines.model.effects import effect_names, find_effect
+from pipelines.model.parameter_names import quantity_of
 from pipelines.report.diagnosis_words import title_of
 from pipelines.report.figure_words import figure_in_words
 from pipelines.report.style import format_number, unit_in_words
@@ -169,7 +171,7 @@ def _moved(part: Part, baseline: ModelFile) -> Iterator[str]:
     limit = _limit(len(known))
     for name, (value, std) in known.items():
         new, own, unit = part.figures[name]
-        away = _change(name, unit, new, value) / math.hypot(own, std)
+        away = _change(name, new, value) / math.hypot(own, std)
         if abs(away) > limit:
             far = f"{'+' if away > 0.0 else '−'}{format_number(abs(away), 2)} std"
             yield f"{figure_in_words(name)} {_told(new, unit)}, {format_number(value)} before ({far})"
@@ -217,9 +219,10 @@ def _is_of(name: str, one: StoredEffect) -> bool:
     return any(f" {begun}" in f" {name}" for begun in (f"{one.effect}:{one.joint}:", f"{one.effect} joint {one.joint} "))
 
 
-def _change(name: str, unit: str, new: float, old: float) -> float:
+def _change(name: str, new: float, old: float) -> float:
     """How far a figure moved; a phase comes back to where it was after a whole turn."""
-    return math.remainder(new - old, 2.0 * math.pi) if unit == "rad" and "phase" in name else new - old
+    kind = quantity_of(name)
+    return difference(old, new, None if kind is None else kind.period)
 
 
 def _limit(numbers: int) -> float:
@@ -282,7 +285,7 @@ def _otherwise(place: str, parameters: Mapping[str, Any], known: StoredEffect) -
     for name, stored in shared:
         new = parameters[name]
         std = math.hypot(new["std"] or 0.0, stored.std or 0.0)
-        change = _change(name, new["unit"], new["value"], stored.value)
+        change = _change(f"{place}:{name}", new["value"], stored.value)
         if abs(change) > limit * std:
             yield f"{place} {name} {_told(new['value'], new['unit'])}, {format_number(stored.value)} before"
 

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from pipelines.batch.parts import Part
 from pipelines.batch.record import Record
 from pipelines.log.experiment import Array
+from pipelines.model.parameter_names import quantity_of
 
 __all__ = ["LIMIT", "Course", "Drift", "drift_of", "from_others"]
 
@@ -91,11 +92,22 @@ def _figures(done: Sequence[_Seen]) -> tuple[Course, ...]:
         figures = [one.part.figures[name] for one in having]
         if len(having) > 1 and len({unit for _, _, unit in figures}) == 1:
             value, std = np.array([x for x, _, _ in figures]), np.array([s for _, s, _ in figures])
-            chi_square, freedom = _chi_square(value, std), len(having) - 1
-            trend = float((value[-1] - value[0]) / np.hypot(std[-1], std[0]))
-            courses.append(Course(name, figures[0][2], tuple(one.name for one in having), value, std, from_others(value, std),
+            turned = _on_one_turn(name, value, std)
+            chi_square, freedom = _chi_square(turned, std), len(having) - 1
+            trend = float((turned[-1] - turned[0]) / np.hypot(std[-1], std[0]))
+            courses.append(Course(name, figures[0][2], tuple(one.name for one in having), value, std, from_others(turned, std),
                                   chi_square, freedom, _probability(chi_square, freedom), trend))
     return tuple(courses)
+
+
+def _on_one_turn(name: str, value: Array, std: Array) -> Array:
+    """`value` as it is; of an angle on a circle by as many turns that all lie within half a one of where most of them point."""
+    kind = quantity_of(name)
+    if kind is None or kind.period is None:
+        return value
+    turn = 2j * np.pi / kind.period
+    middle = float(np.angle(np.sum(np.exp(turn * value) / std**2)) / abs(turn))
+    return np.asarray(middle + (value - middle + kind.period / 2.0) % kind.period - kind.period / 2.0)
 
 
 def _residuals(done: Sequence[_Seen]) -> tuple[Course, ...]:

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from itertools import islice
@@ -17,7 +18,7 @@ from pipelines.errors import EnvironmentFault, UsageError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 
 __all__ = ["free_name", "given_names", "holds_apart", "keep_apart", "refuse_foreign", "refuse_unwritable", "renamed",
-           "short_names", "slug", "tilde", "written_by"]
+           "short_names", "slug", "tilde", "told_apart", "written_by"]
 
 _MOST_APART = 1000  # outputs in one folder
 _ELSEWHERE = "choose another folder with --out"
@@ -152,6 +153,18 @@ def short_names(paths: Iterable[Path]) -> dict[str, str]:
         while name and (name if number == 1 else f"{name}-{number}") in names.values():
             number += 1
         names[str(root)] = name if number == 1 else f"{name}-{number}"
+    return names
+
+
+def told_apart(paths: Iterable[str]) -> dict[str, str]:
+    """Every path -> its last part, or as many from its end as no other ends in: "monday/model.json" beside "friday/model.json"."""
+    parts = {path: Path(path).parts for path in paths}
+    names, depth = dict[str, str](), 0
+    while left := [path for path in parts if path not in names]:
+        depth += 1
+        ends = Counter(parts[path][-depth:] for path in left)
+        names |= {path: str(Path(*end)) for path in left
+                  if ends[end := parts[path][-depth:]] == 1 or depth >= len(parts[path])}
     return names
 
 

@@ -1,19 +1,24 @@
 """Take out of a stage's result what can be followed from item to item: fitted figures with their std, and residuals.
 
 Any stage's result will do: a figure is what has `value`, `std` and `unit`; a residual is what bears one of a few names. Each
-gets a name in words from where it stands: "p1", "joint 2 viscous", "cogging joint 2 amplitude".
+gets a name in words from where it stands: "p1", "joint 2 viscous", "cogging joint 2 amplitude". What a diagnosis leaves before
+any extension and what it leaves with it are told apart: "nominal model residual rms …", "extended model residual rms …".
 """
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-__all__ = ["fitted", "residuals", "robot_of"]
+__all__ = ["fitted", "numbers_of", "residuals", "robot_of"]
 
-# What a result calls the error that is left, and its unit; arrays are per joint.
-_RESIDUALS: Final = {"torque_rms": "N m", "residual_rms": "N m", "relative_error": "1", "reconstruction_error_max": "rad"}
+# What a result calls the error that is left, its words, and its unit; arrays are per joint.
+_RESIDUALS: Final = {"torque_rms": ("torque rms", "N m"), "residual_rms": ("nominal model residual rms", "N m"),
+                     "after_rms": ("extended model residual rms", "N m"), "relative_error": ("relative error", "1"),
+                     "reconstruction_error_max": ("reconstruction error max", "rad")}
+_SAID_BEFORE: Final = {"after_rms": "floor"}  # it is no model's, and stands with the nominal one already
 _SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
 # Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
 _NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
@@ -27,12 +32,22 @@ _MOST = 400  # figures of one item
 def fitted(result: Mapping[str, Any]) -> dict[str, tuple[float, float, str]]:
     """Name -> (value, std, unit) of every figure of `result` whose std is known."""
     found: dict[str, tuple[float, float, str]] = {}
+    for name, holder in _figures(result):
+        value, std = holder["value"], holder["std"]
+        if _number(value) and _number(std) and std > 0.0 and len(found) < _MOST:
+            found[_free(name, found)] = (float(value), float(std), str(holder["unit"]))
+    return found
+
+
+def numbers_of(result: Mapping[str, Any]) -> tuple[str, ...]:
+    """The name of every figure of `result`, whether anybody knows its std or not."""
+    return tuple(dict.fromkeys(name for name, _ in _figures(result)))
+
+
+def _figures(result: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for name, holder in _walk(_single(result), ()):
         if isinstance(holder, Mapping) and {"value", "std", "unit"} <= set(holder):
-            value, std = holder["value"], holder["std"]
-            if _number(value) and _number(std) and std > 0.0 and len(found) < _MOST:
-                found[_free(name, found)] = (float(value), float(std), str(holder["unit"]))
-    return found
+            yield name, holder
 
 
 def residuals(result: Mapping[str, Any], turning: Sequence[bool] = ()) -> dict[str, tuple[float, str]]:
@@ -44,11 +59,11 @@ def residuals(result: Mapping[str, Any], turning: Sequence[bool] = ()) -> dict[s
     found: dict[str, tuple[float, str]] = {}
     slides = {j + 1 for j, turns in enumerate(turning) if not turns} or _sliding(result)
     for name, holder in _walk(_single(result), ()):
-        for key, unit in _RESIDUALS.items():
+        for key, (called, unit) in _RESIDUALS.items():
             if isinstance(holder, Mapping) and key in holder:
-                for words, joint, value in _leaves(holder[key]):
+                for words, joint, value in _leaves(holder[key], but=_SAID_BEFORE.get(key)):
                     if len(found) < _MOST:
-                        full = " ".join(filter(None, (name, key.replace("_", " "), words)))
+                        full = " ".join(filter(None, (name, called, words)))
                         found[_free(full, found)] = value, _SLIDING.get(unit, unit) if joint in slides else unit
     return found
 
@@ -65,10 +80,20 @@ def _sliding(value: Any) -> set[int]:
 def robot_of(result: Any) -> str:
     """The name of the first robot that a result is of, however deep; "" where it says none."""
     if isinstance(result, Mapping):
+        if "base_parameters" in result and isinstance(result.get("robot"), str):  # a model file, with a whole description
+            return _described(result["robot"])
         if isinstance(result.get("robot"), str):
             return str(result["robot"])
         return next(filter(None, (robot_of(item) for key, item in result.items() if key != _A_MODEL)), "")
     return next(filter(None, map(robot_of, result)), "") if isinstance(result, list) else ""
+
+
+def _described(robot: str) -> str:
+    """The name in a description."""
+    try:
+        return str(tomllib.loads(robot).get("name", ""))
+    except tomllib.TOMLDecodeError:
+        return ""
 
 
 def _single(result: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -107,13 +132,14 @@ def _words(item: Any) -> list[str]:
     return said
 
 
-def _leaves(value: Any, words: tuple[str, ...] = (), joint: int = 0) -> Iterator[tuple[str, int, float]]:
-    """Words, the joint they are of or 0, and the number."""
+def _leaves(value: Any, words: tuple[str, ...] = (), joint: int = 0, but: str | None = None) -> Iterator[tuple[str, int, float]]:
+    """Words, the joint they are of or 0, and the number; without what stands under the key `but`."""
     if _number(value):
         yield " ".join(words), joint, float(value)
     elif isinstance(value, Mapping):
         for key, item in value.items():
-            yield from _leaves(item, (*words, key), joint)
+            if key != but:
+                yield from _leaves(item, (*words, key), joint)
     elif isinstance(value, list):
         for index, item in enumerate(value, 1):
             yield from _leaves(item, (*words, f"joint {index}"), index)

@@ -24,6 +24,12 @@ class StoredResult:
     path: Path
     command: str
     object: dict[str, Any]
+    within: str = ""  # the folder of a stage, below that of the run whose result.json says what the stage found
+
+    @property
+    def folder(self) -> Path:
+        """Where the command has left it."""
+        return self.path.parent / self.within
 
     @property
     def series(self) -> Path:

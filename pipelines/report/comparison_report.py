@@ -1,12 +1,13 @@
-"""The report of a comparison: the verdict, every figure by how far it moved, residuals side by side, what was said."""
+"""The report of a comparison: the verdict, what only one has, every figure by how far it moved, residuals, what was said."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pipelines.report.diagnosis_words import without_keys
+from pipelines.report.diagnosis_words import at_places, without_keys
 from pipelines.report.figure_words import figure_in_words
 from pipelines.report.report import Figure as Picture
 from pipelines.report.report import Report, Section, Table, Tone
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 __all__ = ["Answer", "Comparison", "Figure", "Residual", "comparison_report"]
 
 _SHOWN = 40  # lines of a table or a figure
+_VERDICTS = {"nothing-wrong": "nothing wrong", "cause": "a cause is named", "unknown": "something wrong without a name"}
+_CIRCLE = "A phase or a direction is the same again after a whole turn: it is away by the shorter way around."
+_MODELS = "The nominal model is the one before any extension; the extended model has what was found, and what stands, as well."
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,7 @@ class Figure:
     b_std: float
     away: float  # [std of the difference] b - a
     beyond: bool  # farther than chance moves the farthest of all
+    period: float | None = None  # [unit] of an angle on a circle, of which b - a is the shorter way around; None: of no circle
 
 
 @dataclass(frozen=True)
@@ -71,35 +76,71 @@ class Comparison:
     only_b: tuple[str, ...]
     residuals: tuple[Residual, ...]
     answers: tuple[Answer, ...]
+    effects_a: tuple[str, ...] = ()  # laws and effects that only the first was fitted with, as commands take them
+    effects_b: tuple[str, ...] = ()  # that only the second was fitted with
+    same: bool = False  # the two are one, to the last digit
 
 
 def comparison_report(result: Comparison) -> Report:
     """The verdict first, then the evidence."""
     tone: Tone = "attention" if result.differ else "good"
+    sections = (_effects(result), _answers(result), _figures(result), _residuals(result), _alone(result))
     return Report(f"Comparison of two results of {result.compared}", _verdict(result), tone, None,
-                  tuple(section for section in (_answers(result), _figures(result), _residuals(result), _alone(result)) if section))
+                  tuple(section for section in sections if section))
 
 
 def _verdict(result: Comparison) -> str:
     a, b = result.names
-    beyond = [one for one in result.figures if one.beyond]
-    told = [f"{one.what} ({without_keys(one.a)} in {a}, {without_keys(one.b)} in {b})" for one in result.answers if one.differs]
-    if not beyond and not told:
+    if result.same:
+        return f"{a} and {b} are the same result, to the last digit: there is nothing to compare."
+    if not result.differ:
         return f"{a} and {b} agree: none of {len(result.figures)} figures differs beyond its uncertainty."
-    words = []
+    has = [f"{mine} has {words}, which {other} has not." for mine, other, words in (
+        (a, b, _in_words(result.effects_a)), (b, a, _in_words(result.effects_b))) if words]
+    beyond, words = [one for one in result.figures if one.beyond], []
     if beyond:
         named = ", ".join(f"{figure_in_words(one.name)} by {format_number(abs(one.away), 2)} std" for one in beyond[:3])
         more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
         words.append(f"{len(beyond)} of {len(result.figures)} figures differ beyond their uncertainty: {named}{more}")
+    told = [f"{one.what} ({_spoken(one.a)} in {a}, {_spoken(one.b)} in {b})" for one in result.answers
+            if one.differs and not _said_by(one, result)]
     if told:
         words.append(f"what they say differs: {'; '.join(told[:2])}")
-    return f"{a} and {b} differ. {'; '.join(w[:1].upper() + w[1:] if not i else w for i, w in enumerate(words))}."
+    rest = "; ".join(words)
+    return " ".join(filter(None, (f"{a} and {b} differ.", *has, f"{rest[:1].upper()}{rest[1:]}." if rest else "")))
+
+
+def _in_words(effects: Sequence[str]) -> str:
+    """"Coulomb friction at joints 1 and 3, and cogging at joint 2"."""
+    places = (place.partition(":") for place in effects)
+    *first, last = [words for _, words in at_places((cause, joint) for cause, _, joint in places)] or [""]
+    return f"{', '.join(first)}, and {last}" if first else last
+
+
+def _said_by(one: Answer, result: Comparison) -> bool:
+    """Whether two lists of findings differ by nothing but the effects that only one was fitted with."""
+    apart = set(one.a.split(", ")) ^ set(one.b.split(", "))
+    return apart - {"none"} <= {*result.effects_a, *result.effects_b}
+
+
+def _spoken(answer: str) -> str:
+    return _VERDICTS.get(answer) or without_keys(answer)
+
+
+def _effects(result: Comparison) -> Section | None:
+    if not (result.effects_a or result.effects_b):
+        return None
+    rows = tuple((name, _in_words(effects) or "none")
+                 for name, effects in zip(result.names, (result.effects_a, result.effects_b), strict=True))
+    text = ("They weigh more than any figure: what the other numbers of such a joint mean changes with them. A Coulomb level "
+            "beside Stribeck friction is not the one without.",)
+    return Section("Laws and effects that only one has", text, (Table(("result", "laws and effects"), rows),))
 
 
 def _answers(result: Comparison) -> Section | None:
     if not result.answers:
         return None
-    rows = tuple((one.what, without_keys(one.a), without_keys(one.b)) for one in result.answers)
+    rows = tuple((one.what, _spoken(one.a), _spoken(one.b)) for one in result.answers)
     tones: tuple[Tone, ...] = tuple("attention" if one.differs else "neutral" for one in result.answers)
     return Section("What they say", (), (Table(("what", *_heads(result)), rows, tones=tones),))
 
@@ -121,7 +162,8 @@ def _figures(result: Comparison) -> Section | None:
     text = (f"A figure differs where it moved by more than {format_number(result.limit, 3)} std of the difference. Where nothing "
             f"has changed, that happens to any of these {len(result.figures)} with a probability of "
             f"{format_number(100.0 * result.alpha, 2)} % at most; the errors of the two are taken to be independent, and the "
-            "stated standard deviations to be right.", *((f"{more} more, all nearer, stand in result.json.",) if more > 0 else ()))
+            "stated standard deviations to be right.", *((_CIRCLE,) if any(one.period for one in shown) else ()),
+            *((f"{more} more, all nearer, stand in result.json.",) if more > 0 else ()))
     table = Table(("figure", *_heads(result), "unit", "away [std]", "verdict"), rows, "The farthest first.", tones)
     return Section("Figures", text, (table,), (_picture(result),))
 
@@ -153,6 +195,7 @@ def _residuals(result: Comparison) -> Section | None:
                  for one in changed)
     more = len(result.residuals) - len(changed)
     text = ("No standard deviation is known of these, so that they are not judged.",
+            *((_MODELS,) if any("extended model" in one.name for one in changed) else ()),
             *((f"{more} more stand in result.json.",) if more > 0 else ()))
     table = Table(("residual", *_heads(result), "unit", "change [%]"), rows, "The greatest change first.")
     return Section("Residuals", text, (table,))

@@ -11,6 +11,7 @@ from pipelines.model.diagnosis.responding import BELOW
 from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
 from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
+from pipelines.model.parameter_names import numbered
 from pipelines.report.diagnosis_answers import answer_figures
 from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_words import (
@@ -19,7 +20,6 @@ from pipelines.report.diagnosis_words import (
     in_order,
     meaning_of,
     named,
-    numbered,
     spoken,
     three_digits,
     told_value,

@@ -12,18 +12,18 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, ResidualRms, Value
 from pipelines.model.diagnosis.words import other_joint
 from pipelines.model.effects import effect_names, find_effect
+from pipelines.model.parameter_names import numbered, part_of
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
-__all__ = ["as_sentence", "cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words",
-           "in_order", "meaning_of", "named", "numbered", "per_joint", "spoken", "three_digits", "title_of", "together",
+__all__ = ["as_sentence", "at_places", "cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words",
+           "in_order", "meaning_of", "named", "per_joint", "spoken", "three_digits", "title_of", "together",
            "told_value", "told_values", "torque_errors", "torque_of", "unit_or_dash", "what_stays",
            "without_keys"]
 
 _PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
-_NUMBERED = re.compile(r"(.+)_([2-9]|[1-9][0-9]+)$")  # harmonics, and waves of further orders
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
 
 _FLOORS = {
@@ -66,10 +66,15 @@ def named(cause: str, joint: int | None) -> str:
 
 def together(found: Iterable[Finding | Rejected]) -> list[tuple[str, str]]:
     """(cause, words) of each cause once with all its joints: "Stribeck friction at joints 1 and 3"."""
+    return at_places((one.cause, f"{one.joint or ''}{f' ({other})' if other else ''}") for one in found
+                     for other in (other_joint(one.parameters) if isinstance(one, Finding) else "",))
+
+
+def at_places(places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The same of (cause, joint in words) each; of the whole arm the joint is ""."""
     joints: dict[str, list[str]] = {}
-    for one in found:
-        other = other_joint(one.parameters) if isinstance(one, Finding) else ""
-        joints.setdefault(one.cause, []).append(f"{one.joint or ''}{f' ({other})' if other else ''}")
+    for cause, joint in places:
+        joints.setdefault(cause, []).append(joint)
     return [(cause, _at_joints(cause, own)) for cause, own in joints.items()]
 
 
@@ -123,26 +128,10 @@ def _counted(number: int) -> str:
     return f"{number}{ending}"
 
 
-def numbered(parameter: str) -> tuple[str, int]:
-    """Name and number, 1 where it has none: ("order", 2) of "order_2"."""
-    found = _NUMBERED.match(parameter)
-    return (found[1], int(found[2])) if found else (parameter, 1)
-
-
-def _part(cause: str, parameter: str) -> tuple[str, int]:
-    """The effect's own parameter, and of the how manieth one at its joint it is: its numbers are counted on (`once_each`)."""
-    known = [q.name for q in find_effect(cause).parameters] if cause in effect_names() else []
-    name, number = numbered(parameter)
-    numbers = max((numbered(own)[1] for own in known), default=1)
-    first = (number - 1) % numbers + 1
-    own = name if first == 1 else f"{name}_{first}"
-    return (parameter, 1) if parameter in known or own not in known else (own, (number - 1) // numbers + 1)
-
-
 def meaning_of(cause: str, parameter: str) -> str:
     """What a parameter of an effect stands for, as the effect says; "" where it does not."""
     known = find_effect(cause).parameters if cause in effect_names() else ()
-    own, which = _part(cause, parameter)
+    own, which = part_of(cause, parameter)
     meaning = next((q.meaning for q in known if q.name == own), "")
     if meaning and which > 1:
         meaning = f"{meaning}; of the {_counted(which)} one at this joint"
@@ -190,7 +179,7 @@ def in_order(cause: str, parameters: Mapping[str, Value]) -> list[tuple[str, Val
     place = {name: k for k, name in enumerate(known)}
 
     def rank(parameter: str) -> tuple[int, int, str]:
-        own, which = _part(cause, parameter)
+        own, which = part_of(cause, parameter)
         return which, place.get(own, len(known)), parameter
 
     return sorted(parameters.items(), key=lambda item: rank(item[0]))

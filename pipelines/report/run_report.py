@@ -10,9 +10,11 @@ from pipelines.log.places import slug
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.report.joint_units import units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.run_ledger import ledger_lines, ledger_section
 from pipelines.report.run_result import Group, Result, Step
+from pipelines.report.style import format_number
 
 __all__ = ["run_report"]
 
@@ -89,9 +91,18 @@ def _refusals(group: Group) -> list[str]:
 
 
 def _key_figures(steps: list[Step]) -> Table | None:
-    """Those of the diagnosis, where there is one alone; of a single stage its own."""
+    """Those of the diagnosis, where there is one alone; of a single stage its own.
+
+    Its extended model is not the one in the folder of `extend`, which fits everything again: what that leaves is said below.
+    """
     found = [step for step in steps if isinstance(step.result, Diagnosis)] if len(steps) > 1 else steps
-    return found[0].report.key_figures if len(found) == 1 else None
+    table = found[0].report.key_figures if len(found) == 1 else None
+    anew = next((step.result for step in steps if isinstance(step.result, Extension) and step.result.model is not None), None)
+    if table is None or anew is None or len(steps) == 1:
+        return table
+    left = ", ".join(format_number(float(x), 3) for x in anew.after_rms.validate)
+    said = f"What is called extended is as diagnosed; that of extend, in its model.json, leaves {left} {units_in(anew).torque}."
+    return dataclasses.replace(table, caption=f"{table.caption} {said}")
 
 
 def _stages(steps: Iterable[tuple[str, Step]]) -> Section:

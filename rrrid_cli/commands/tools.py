@@ -21,7 +21,8 @@ _SIGNS = {"ok": "·", "warn": "!", "bad": "x"}
 @with_common_but("robot", "assume_units", "format", "strict")
 def compare(
     common: Common,
-    a: Annotated[Path, typer.Argument(help="A folder that a command has left, its result.json, or a model.json.",
+    a: Annotated[Path, typer.Argument(help="A folder that a command has left, or a stage within that of a run; its result.json, or "
+                                           "a model.json.",
                                       show_default=False, readable=False, metavar="A")],
     b: Annotated[Path, typer.Argument(help="Another one of the same command.", show_default=False, readable=False, metavar="B")],
     alpha: Annotated[float | None, typer.Option(help="How often two results of one arm may be said to differ. [0.01]")] = None,

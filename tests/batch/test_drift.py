@@ -8,7 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from pipelines.batch.drift import drift_of, from_others
+from pipelines.batch.drift import Course, drift_of, from_others
 from pipelines.batch.record import Record
 from pipelines.batch.result import Result
 from pipelines.batch.summary import Summary, summary_report
@@ -47,6 +47,21 @@ def test_a_step_is_dated() -> None:
     assert course.probability is not None
     assert course.probability < 1e-3
     assert course.items == tuple(record.name for record in records)  # by the time of recording, not by name
+
+
+def test_a_phase_that_scatters_about_half_a_turn_has_not_moved() -> None:
+    """3.1, -3.1, … rad are next to each other; one a radian on has moved, and the values stand as they were written."""
+    def course(values: list[float], name: str = "extend model cogging joint 2 phase") -> Course:
+        records = [item_of(str(k), figures={name: (value, 0.05, "rad")}, robot="arm") for k, value in enumerate(values)]
+        return drift_of(records)[0].figures[0]
+
+    near = course([3.1, -3.13, 3.14, -3.1, 3.12])
+    assert (near.moved, list(near.value)) == ((), [3.1, -3.13, 3.14, -3.1, 3.12])
+    assert near.probability is not None
+    assert near.probability > 0.1
+    assert abs(near.trend) < 3.0
+    assert course([3.1, -3.13, 3.14, -2.1, 3.12]).moved == ("3",)
+    assert course([3.1, -3.13, 3.14, -3.1, 3.12], "model spring joint 2 rest angle").moved
 
 
 def test_the_others_weigh_by_their_uncertainty() -> None:

@@ -62,7 +62,18 @@ def test_what_does_harm_to_the_model_is_not_offered() -> None:
     diagnosed: Any = SimpleNamespace(findings=(soft, ripple), verdict="cause")
     assert [one.effect.name for one in extend._found(diagnosed, "logs")] == ["cogging"]
     diagnosed.findings = (soft,)
-    with pytest.raises(NothingMatched, match="nothing to extend the model by"):
+    with pytest.raises(NothingMatched, match=r"happens once, or is in doubt, .*nothing to extend the model by"):
+        extend._found(diagnosed, "logs")
+
+
+@pytest.mark.parametrize(("verdict", "question", "words"), [
+    ("nothing-wrong", "what is wrong", "diagnose found nothing wrong: "),
+    ("nothing-wrong", "what has changed", "diagnose found nothing that has changed since the reference logs: "),
+    ("unknown", "what is wrong", "diagnose found something wrong, and no cause for it: ")])
+def test_why_there_is_nothing_to_add_is_said_in_words(verdict: str, question: str, words: str) -> None:
+    """By no identifier of a verdict."""
+    diagnosed: Any = SimpleNamespace(findings=(), verdict=verdict, question=question)
+    with pytest.raises(NothingMatched, match=f"{words}there is nothing to extend the model by"):
         extend._found(diagnosed, "logs")
 
 

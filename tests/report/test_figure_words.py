@@ -77,11 +77,23 @@ def test_a_joint_that_slides_has_its_own_units() -> None:
     assert [unit for _, unit in residuals({**estimate, "inspected": doctor}).values()] == ["N m", "N m", "1"]
     run = {"stages": [{"name": "estimate-bps", "result": {**estimate, "torque_units": ["N m", "N"]}},
                       {"name": "diagnose", "result": {"residual_rms": {"validate": [0.1, 0.2]}}}]}
-    assert residuals(json.loads(json.dumps(run)))["diagnose residual rms validate joint 2"] == (0.2, "N")
+    assert residuals(json.loads(json.dumps(run)))["diagnose nominal model residual rms validate joint 2"] == (0.2, "N")
+
+
+def test_what_an_extension_leaves_is_not_what_the_nominal_model_left() -> None:
+    """Both are there, each by its name; the floor beside them is that of both, and told once."""
+    nominal, extended = ({"identify": [error], "validate": [2.0 * error], "floor": [0.01]} for error in (0.3, 0.1))
+    assert {name: value for name, (value, _) in residuals({"residual_rms": nominal, "after_rms": extended}).items()} == {
+        "nominal model residual rms identify joint 1": 0.3, "nominal model residual rms validate joint 1": 0.6,
+        "nominal model residual rms floor joint 1": 0.01, "extended model residual rms identify joint 1": 0.1,
+        "extended model residual rms validate joint 1": 0.2}
 
 
 def test_a_robot_is_a_name() -> None:
-    """The one of the stage, of its logs or of those of a run; not the description that a model holds."""
+    """The one of the stage, of its logs or of those of a run; of a model file the one in its description."""
+    described = {"base_parameters": [], "robot": 'name = "arm"\n[[links]]', "name": "a model of it"}
+    assert robot_of(described) == "arm"
+    assert robot_of({**described, "robot": "no = toml = at all"}) == ""
     model = {"model": {"robot": 'name = "arm"\n[[links]]'}}
     for result, name in (({**model, "robot": "arm"}, "arm"), ({**model, "logs": [{"robot": "arm"}]}, "arm"), (model, ""),
                          ({"stages": [{"name": "a", "result": None}, {"result": model}, {"result": {"robot": "arm"}}]}, "arm")):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import Check
+from pipelines.log.model_file import ModelFile
 from pipelines.model.diagnosis.outcome import Extension
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
@@ -149,3 +150,18 @@ def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: dict[str, A
     assert told.verdict == f"Cogging. {said}"
     table = next(section for section in told.sections if section.title == "Stages").tables[0]
     assert "Waist: a long story." in [row[2] for row in table.rows]
+
+
+def test_the_extended_model_of_the_key_figures_is_told_from_the_file() -> None:
+    """They are those of diagnose; what the model.json of extend leaves is said beside them, where there is one."""
+    group = told(RIPPLE)
+    table = Table(("joint", "torque error now [N m]", "extended [N m]"), ((1, 0.5, 0.18), (2, 0.1, 0.1)), "Of what was held out.")
+    diagnosed, extended = group.stages
+    diagnosed = dataclasses.replace(diagnosed, report=Report("", "", key_figures=table))
+    assert run_report(Result((diagnosed, extended))).key_figures == table
+    model = ModelFile("arm", "", ())
+    anew = dataclasses.replace(extended, result=dataclasses.replace(extended.result, model=model, joints=("a", "b")))
+    shown = run_report(Result((diagnosed, anew))).key_figures
+    assert shown is not None
+    assert (shown.rows, shown.caption.startswith("Of what was held out. ")) == (table.rows, True)
+    assert "that of extend, in its model.json, leaves 0.18, 0.1 N m" in shown.caption

@@ -27,7 +27,7 @@ class EncoderEccentricity(Effect):
     title = "Eccentric encoder"
     parameters = (
         Quantity("amplitude", "rad", 0.0, 0.1, "largest error of the angle"),
-        Quantity("phase", "rad", -np.pi, np.pi, "of the error at zero angle"),
+        Quantity("phase", "rad", -np.pi, np.pi, "of the error at zero angle", period=2.0 * np.pi),
     )
     signature = "An error once a turn of the joint, with a part that grows with the square of speed, felt by all rows."
     explanation = "The disc's centre is beside the axis: the head reads the angle seen from there."

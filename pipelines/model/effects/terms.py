@@ -76,6 +76,7 @@ class Quantity:
     derived: bool = False  # follows from the other parameters
     joint: bool = False  # the number of another joint of the arm, 1-based
     unsaid: float | None = None  # what holds where a model file does not say: the law from before the number was known
+    period: float | None = None  # of an angle on a circle: so much more is the same again
 
     def unfit(self, value: float, own: int | None, n_joints: int) -> str:
         """Why no arm of `n_joints` joints can have this value of an effect at joint `own`; empty where it can."""
