@@ -43,12 +43,21 @@ def small_loads(motion: Motion, arm: Arm, wander: Array, sample_time: float, dri
     joints = motion.q.shape[1]
     order = drives.integers(*RIPPLE_ORDERS, size=(2, joints))
     phase = drives.uniform(-np.pi, np.pi, (2, joints))
-    rated = np.array([joint.torque for joint in arm.robot.joints])
     tau = arm.torque(motion)
-    largest = float(np.max(rated[np.isfinite(rated)], initial=0.0)) or float(np.abs(tau).max())
+    largest = _largest(arm, tau)
     ripple = RIPPLE * tau * np.sin(order[0] * motion.q + phase[0])
     cogging = _COGGING * largest * np.sin(order[1] * motion.q + phase[1])
     return np.asarray(ripple + cogging + _wander(wander, len(tau), sample_time, rng))
+
+
+def _largest(arm: Arm, tau: Array) -> Array:
+    """(joints,) the largest rated torque [N m] of the joints that turn, for each that does, and force [N] of those that slide; the
+    largest of `tau` (samples, joints) where none is rated."""
+    rated, turning = np.array([joint.torque for joint in arm.robot.joints]), np.array(arm.robot.revolute)
+    out = np.zeros(len(turning))
+    for kind in (turning, ~turning):
+        out[kind] = np.max(rated[kind & np.isfinite(rated)], initial=0.0) or np.abs(tau[:, kind]).max(initial=0.0)
+    return out
 
 
 def _wander(rms: Array, samples: int, sample_time: float, rng: np.random.Generator) -> Array:
