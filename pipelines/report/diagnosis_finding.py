@@ -55,6 +55,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     if math.isfinite(one.torque_rms):
         text.append(f"Over the logs that were fitted its torque is {torque_of(one, units)} rms{taken_in(one, nominal.identify)}; "
                     "over other motion it may be more or less")
+    text += _larger(one, units)
     if one.origin == "frequency responses":
         text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
                     f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
@@ -70,6 +71,15 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         text.append(f"Or let \"rrrid design-excitation LOG --tell-apart {pair}\" design the motion")
     return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
                    figures=(*answer_figures(number, one), *proof_figures(number, one, units)))
+
+
+def _larger(one: Finding, units: Units) -> list[str]:
+    """Which joints' held-out error is larger with it, beyond its interval: there it is not what the arm does."""
+    torque = one.gain.validate_torque_rms
+    told = [f"of joint {j + 1}, {format_number(float(torque.after[j]), 3)} instead of {format_number(float(torque.before[j]), 3)} "
+            f"{units.at(j + 1).torque} rms" for j in np.flatnonzero(torque.ci95[:, 0] > 0.0).tolist()]
+    where_not = "; ".join(told)
+    return [f"With it the held-out torque error is larger {where_not}: not all of it is what the arm does there"] if told else []
 
 
 def numbers_section(number: int, one: Finding, units: Units = _TURNING, every: Sequence[Finding] = ()) -> Section:

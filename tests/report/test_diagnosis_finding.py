@@ -41,6 +41,17 @@ def test_what_stays_above_the_floor_is_said(origin: str, own: bool, said: str) -
     assert what_stays(there) == said
 
 
+@pytest.mark.parametrize(("low", "said"), [(0.01, True), (-0.01, False)])
+def test_a_joint_that_is_worse_off_with_it_is_named(low: float, said: bool) -> None:
+    """A coupling that takes most of two wrists and adds to the error of the base."""
+    one = finding()
+    change = np.array([[low, 0.4], [-0.1, 0.1], [-0.02, -0.01]])
+    gain = TorqueGain(np.array([1.59, 0.4, 0.02]), np.array([1.83, 0.4, 0.005]), change)
+    text = " ".join(finding_section(1, replace(one, gain=replace(one.gain, validate_torque_rms=gain)), NOMINAL).text)
+    assert ("error is larger of joint 1, 1.83 instead of 1.59 N m rms" in text) is said
+    assert ("error is larger" in text) is said
+
+
 @pytest.mark.parametrize(("torque", "left", "most"), [(4.6, 1.6, True), (0.29, 0.29, False), (0.2, 0.16, False)])
 def test_what_a_model_without_the_finding_imitates_is_said(torque: float, left: float, most: bool) -> None:
     """A torque far larger than all that is left of its joint was mostly in the model already."""
