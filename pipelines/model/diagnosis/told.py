@@ -39,7 +39,7 @@ from pipelines.model.diagnosis.since import Probed
 from pipelines.model.diagnosis.steadied import steady, steady_nominal
 from pipelines.model.diagnosis.unbiased import unbiased
 from pipelines.model.diagnosis.verdict import Ruling
-from pipelines.model.diagnosis.words import how_much, taken_in, where
+from pipelines.model.diagnosis.words import beside, how_much, taken_in, where
 
 __all__ = ["Limits", "diagnosis_of", "limits_of", "sentence", "strongest"]
 
@@ -184,12 +184,11 @@ def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool
     if ruling.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {ruling.reason}."
     first = named[0]
-    more = f"; and {len(named) - 1} more" if len(named) > 1 else ""
     turns = revolute if first.joint is None else revolute[first.joint - 1:first.joint]
     what = " or ".join(dict.fromkeys("N m rms of torque" if one else "N rms of force" for one in turns))
     size = f": {first.torque_rms:.2g} {what}{taken_in(first, left)}" if np.isfinite(first.torque_rms) else ""
-    beside = f" Beside it, {ruling.reason}." if ruling.reason else ""
-    return f"{first.title}{how_much(first)}{where(first)}{size}{more}.{beside}"
+    oddly = f" Beside it, {ruling.reason}." if ruling.reason else ""
+    return f"{first.title}{how_much(first)}{where(first)}{size}{beside(named[1:])}.{oddly}"
 
 
 def strongest(findings: Iterable[Finding]) -> tuple[Finding, ...]:

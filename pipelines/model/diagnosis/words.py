@@ -2,13 +2,14 @@
 
     where(finding)                 " at joint 2 (from joint 1)"
     how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
+    beside(findings)               "; and a torque that is logged late (120 ms) at joint 1"
     taken_in(finding, left)        ", most of which the nominal model had taken in"
     within(title)                  a title, or a sentence, within another
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,11 +18,13 @@ from pipelines.model.diagnosis.result import Finding, Value
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.words import plain_number
 
-__all__ = ["how_much", "other_joint", "taken_in", "where", "within"]
+__all__ = ["beside", "how_much", "other_joint", "taken_in", "where", "within"]
 
 # Units as a technician says them, where others than SI are usual. How far something is tilted is told in degrees.
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 _DEGREE = np.pi / 180.0
+_PERSONS = ("Coulomb", "Stribeck")
+_TOLD = 2  # further findings that a sentence names
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
 
@@ -52,8 +55,17 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
 
 
 def within(words: str) -> str:
-    """A title or a sentence as a part of another: without its capital and its full stop."""
-    return words[:1].lower() + words[1:].rstrip(".")
+    """A title or a sentence as a part of another: without its capital, but that of a person, and its full stop."""
+    return (words if words.startswith(_PERSONS) else words[:1].lower() + words[1:]).rstrip(".")
+
+
+def beside(others: Sequence[Finding]) -> str:
+    """"; and a torque that is logged late (120 ms) at joint 1", and how many more where they are many; or nothing."""
+    told = [f"{within(one.title)}{how_much(one)}{where(one)}" for one in others[:_TOLD]]
+    if len(others) > _TOLD:
+        told.append(f"{len(others) - _TOLD} more")
+    *first, last = told or [""]
+    return f"; {', '.join(first)}{' ' if first else ''}and {last}" if last else ""
 
 
 def taken_in(one: Finding, left: Array) -> str:
