@@ -113,7 +113,7 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
     rows: list[Data | None] = []
     first = 0
     for part in (fitted, judging, referring):
-        _refuse_held(part, held[first:first + len(part)], part is judging)
+        _refuse_held(part, held[first:first + len(part)], part is fitted)
         rows.append(_moving(part, columns, recipe, held[first:first + len(part)], first) if part else None)
         first += len(part)
     data, judge, reference = rows
@@ -122,17 +122,16 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
     return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
 
 
-def _refuse_held(motions: Motions, held: Sequence[Joints], judging: bool) -> None:
-    """T08: of a joint that moves in none of the logs nothing can be fitted, and a log in which none does judges nothing."""
+def _refuse_held(motions: Motions, held: Sequence[Joints], fitted: bool) -> None:
+    """T08: of a joint that moves in none of the fitted logs nothing can be said; logs in which no joint does say nothing."""
     still = np.all(held, axis=0) if motions else np.zeros(1, dtype=bool)
-    if not (still.all() if judging else still.any()):
+    if not (still.any() if fitted else still.all()):
         return
     log = motions[0][0]
-    what = "judge" if judging else f"are fitted, of role '{log.role}',"
     which = "every joint" if still.all() else f"joint {int(np.argmax(still)) + 1}"
-    raise InputRejected("T08", f"{which} is held in the logs that {what} and moves in others", where=log.source or log.name,
-                        remedy="record an excitation in which it moves" if not judging else
-                        "leave that log out, or record one in which the arm moves")
+    raise InputRejected("T08", f"{which} is held in the logs of role '{log.role}', and moves in others",
+                        where=log.source or log.name,
+                        remedy=f"record an excitation of role '{log.role}' in which it moves, or leave out {log.name}")
 
 
 def _moving(motions: Motions, columns: Columns, recipe: Recipe, held: Sequence[Joints], first: int) -> Data:
