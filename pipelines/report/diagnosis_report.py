@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.model.diagnosis.ledger import WEAKER
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Finding, Rejected, Trial
-from pipelines.model.diagnosis.words import how_much, taken_in, where
+from pipelines.model.diagnosis.words import how_much, taken_in, where, within
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
@@ -82,7 +82,7 @@ def _verdict(result: Result) -> str:
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
-    others = f"; and {', '.join(words for _, words in together(more))}" if more else ""
+    others = f"; and {', '.join(_beside(more))}" if more else ""
     size = f", {_size(first, result)}" if math.isfinite(first.torque_rms) else ""
     whole = all_together(result.findings)
     alone = whole is first.gain
@@ -91,6 +91,13 @@ def _verdict(result: Result) -> str:
     rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
     cause = f"{first.title}{how_much(first)}{where(first)}"
     return f"{changed}{cause}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
+
+
+def _beside(more: Sequence[Finding]) -> Iterator[str]:
+    """Every further cause once: with its joints, or, where it is at one place alone, with how much of it there is."""
+    for cause, words in together(more):
+        own = [one for one in more if one.cause == cause]
+        yield f"{within(own[0].title)}{how_much(own[0])}{where(own[0])}" if len(own) == 1 else words
 
 
 def _advice(result: Result) -> tuple[str, ...]:
