@@ -118,7 +118,7 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
         first += len(part)
     data, judge, reference = rows
     assert data is not None  # prepare refuses logs without any to fit
-    refuse_too_few([one.equations for one in data.logs], fitted)
+    refuse_too_few([one.equations for one in data.logs], fitted, 0)  # what so few do not tell, has no name
     return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
 
 

@@ -137,13 +137,16 @@ def with_cutoff(recipe: Recipe, motions: Motions) -> Recipe:
     return replace(recipe, cutoff_hz=highest if felt else None, found=True)
 
 
-def refuse_too_few(equations: Sequence[LogEquations], motions: Motions) -> None:
+def refuse_too_few(equations: Sequence[LogEquations], motions: Motions, fewest: int = _FEWEST) -> None:
     """
+    Args:
+        fewest: equations in all.
+
     Raises:
         InputRejected: T08, too few equations are left for a fit, in all or of a joint.
     """
     _fast_enough(equations, motions)
-    _enough(equations, motions[0][0])
+    _enough(equations, motions[0][0], fewest)
 
 
 def _fast_enough(equations: Sequence[LogEquations], motions: Motions) -> None:
@@ -160,13 +163,13 @@ def _fast_enough(equations: Sequence[LogEquations], motions: Motions) -> None:
                         remedy="give less; one value a joint, where their speeds differ")
 
 
-def _enough(equations: Sequence[LogEquations], log: ExperimentLog) -> None:
+def _enough(equations: Sequence[LogEquations], log: ExperimentLog, fewest: int) -> None:
     counts = np.sum([one.counts * one.repeats for one in equations], axis=0)
     j = int(np.argmin(counts))
     if counts[j] < _FEWEST_OF_JOINT:
         raise InputRejected("T08", f"{counts[j]:.0f} equations of joint {j + 1} are left", where=log.source or log.name,
                             remedy="lower --min-speed or --decimate, or record longer")
-    if counts.sum() < _FEWEST:
+    if counts.sum() < fewest:
         raise InputRejected("T08", f"{counts.sum():.0f} equations are left, too few for a fit", where=log.source or log.name,
                             remedy="lower --decimate, filter higher with --filter, or record longer")
 
