@@ -231,7 +231,7 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
                             remedy="write the values in those units")
     if unfit := [why for q, _, v in given if (why := q.unfit(v.value, stored.joint, len(revolute)))]:
         raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(unfit)}", where=where,
-                            remedy="write the number of another joint")
+                            remedy="write another number")
     return Acting(effect(joint=stored.joint).at({p.name: p.value for p in parameters}), parameters)
 
 

@@ -105,10 +105,10 @@ def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: 
 
 
 def _refuse_unfit(text: str, kind: type[Effect], values: dict[str, float], joint: int | None, joints: int, where: str) -> None:
-    """C02, a number that names a joint which the arm does not have."""
+    """C02, a number that names a joint or a link which the arm does not have."""
     for quantity in kind.parameters:
         if why := quantity.unfit(values[quantity.name], joint, joints):
-            raise UsageError("C02", f"'{text}': {why}", where=where, remedy=f"give {quantity.name} another joint of the arm")
+            raise UsageError("C02", f"'{text}': {why}", where=where, remedy=f"give {quantity.name} another number")
 
 
 def _number(text: str, name: str, where: str) -> float:

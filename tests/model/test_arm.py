@@ -129,6 +129,8 @@ def test_through_a_model_file_and_back(arm: Arm, motion: Motion) -> None:
 
 CROSSTALK = StoredEffect("encoder_crosstalk", 1, {"coefficient": StoredValue(0.1, None, "1", "fitted"),
                                                   "from_joint": StoredValue(9.0, None, "1", "fitted")})
+LENGTH = StoredEffect("link_length", None, {"error": StoredValue(0.01, None, "m", "fitted"),
+                                            "link": StoredValue(3.0, None, "1", "fitted")})
 VISCOUS = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.1, None, "N m s/rad", "fitted")})
 
 
@@ -144,6 +146,7 @@ VISCOUS = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.1, None, "N m
      "in N m, not N m s/rad"),
     ({"effects": (CROSSTALK,)}, "from_joint = 9 is no other joint of this arm, which has 3"),
     ({"effects": (replace(CROSSTALK, effect="torque_crosstalk"),)}, "from_joint = 9 is no other joint"),
+    ({"effects": (LENGTH,)}, "link = 3 is no link with a joint beyond it on this arm, which has 3"),
     ({"base_parameters": ()}, "p1, p2"),
     ({"base_parameters": (StoredParameter("p16", 1.0, None, "kg", True, "fitted", ""),)}, "p16"),
     ({"robot": "name = 1"}, "robot description"),

@@ -31,7 +31,7 @@ class LinkLength(Effect):
     scope = "arm"
     parameters = (
         Quantity("error", "m", -1.0, 1.0, "true length minus that of the description"),
-        Quantity("link", "1", 1.0, 100.0, "which link, counted from the base", shape=True, discrete=True),
+        Quantity("link", "1", 1.0, 100.0, "which link, counted from the base", shape=True, discrete=True, link=True),
     )
     signature = "Gravity and inertia of the links beyond do not agree with each other."
     explanation = "The drawing, the calibration or the robot description has another length than the arm."

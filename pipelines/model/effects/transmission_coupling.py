@@ -28,7 +28,7 @@ class TransmissionCoupling(Effect):
     name = "transmission_coupling"
     title = "A motor that turns with two joints"
     parameters = (
-        Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True),
+        Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
         Quantity("inertia", "kg m^2", 0.0, 100.0, "of the motor, at joint side"),
         Quantity("viscous", "N m s/rad", 0.0, 500.0, "viscous friction of the motor, at joint side"),
         Quantity("coulomb", "N m", 0.0, 500.0, "dry friction of the motor, at joint side"),
