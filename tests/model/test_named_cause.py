@@ -50,6 +50,7 @@ def test_units_follow_the_kind_of_joint() -> None:
     ("torque_crosstalk:2:coefficient=0.1,from_joint=1.5", "C02", "no other joint"),
     ("transmission_coupling:2:inertia=0.1,with_joint=7", "C02", "no other joint of this arm, which has 3; it takes 1 or 3"),
     ("transmission_coupling:2:inertia=0.1,with_joint=2", "C02", "no other joint"),
+    ("encoder_eccentricity:3:amplitude=0.001", "C02", "joint 3 slides, and only one that turns"),
     ("link_length:error=0.01,link=9", "C02", "no link with a joint beyond it on this arm, which has 3; it takes 1 or 2"),
     ("link_length:error=0.01,link=3", "C02", "no link with a joint beyond it"),
     ("link_length:error=0.01,link=1.5", "C02", "no link with a joint beyond it"),

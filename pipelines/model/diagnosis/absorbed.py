@@ -153,7 +153,7 @@ def absorbed(two: Sessions, arm: Arm, families: Sequence[Family] = (), usual: fl
     if move is None:
         return None
     places = [kind_at.full() for kind in all_effects() if kind.evidence == "base parameters" and kind.name not in without
-              for kind_at in kind.everywhere(arm.n_joints)]
+              for kind_at in kind.everywhere(arm.robot.revolute)]
     found = [*(_tried(effect, two, arm, move, _EXPLAINS, 1) for effect in places),
              *(_tried(effect, two, arm, move, _ALONE, None) for effect in _laws(two, one, families, arm, move))]
     best = chosen([one for one in found if one is not None], move)

@@ -86,7 +86,7 @@ def families(laws: Sequence[Effect], motion: Motion, arm: Arm, without: Sequence
     for kind in all_effects():
         if kind.name in nominal or kind.name in without or kind.evidence in ("none", "base parameters"):
             continue
-        for effect in kind.everywhere(arm.n_joints):
+        for effect in kind.everywhere(arm.robot.revolute):
             found.append(Family(kind.name, effect.joint, _shapes(effect, laws, motion, arm)))
     return tuple(found)
 

@@ -41,13 +41,13 @@ class Cogging(Effect):
     parameters = (
         Quantity("order", "1/rev", 0.25, 1000.0, "waves in one turn of the joint", shape=True),
         Quantity("amplitude", "N m", 0.0, 50.0, "of the first wave"),
-        Quantity("phase", "rad", -math.pi, math.pi, "angle of the first wave at the joint's zero"),
+        Quantity("phase", "rad", -math.pi, math.pi, "angle of the first wave at the joint's zero", angle=True),
         Quantity("order_2", "1/rev", 0.5, 2000.0, "twice the order", derived=True),
         Quantity("amplitude_2", "N m", 0.0, 50.0, "of the second harmonic"),
-        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic"),
+        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", angle=True),
         Quantity("order_3", "1/rev", 0.75, 3000.0, "three times the order", derived=True),
         Quantity("amplitude_3", "N m", 0.0, 50.0, "of the third harmonic"),
-        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic"),
+        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", angle=True),
     )
     signature = "A torque that repeats along the turn of the joint, the same at every speed and in both directions."
     explanation = "Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: each once or many times a turn."

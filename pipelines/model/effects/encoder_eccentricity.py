@@ -27,7 +27,7 @@ class EncoderEccentricity(Effect):
     title = "Eccentric encoder"
     parameters = (
         Quantity("amplitude", "rad", 0.0, 0.1, "largest error of the angle"),
-        Quantity("phase", "rad", -np.pi, np.pi, "of the error at zero angle"),
+        Quantity("phase", "rad", -np.pi, np.pi, "of the error at zero angle", angle=True),
     )
     signature = "An error once a turn of the joint, with a part that grows with the square of speed, felt by all rows."
     explanation = "The disc's centre is beside the axis: the head reads the angle seen from there."
@@ -36,6 +36,7 @@ class EncoderEccentricity(Effect):
     size = "amplitude"
     twins = ("cogging", "spring", "gravity_tilt")
     misread = True
+    turns = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         q, v, u = (self.own(x) for x in (motion.q, motion.dq, motion.ddq))

@@ -31,7 +31,8 @@ class GravityTilt(Effect):
     scope = "arm"
     parameters = (
         Quantity("angle", "rad", 0.0, 1.5, "between true and nominal gravity"),
-        Quantity("direction", "rad", -math.pi, math.pi, "of the horizontal part of true gravity, from the base's x axis"),
+        Quantity("direction", "rad", -math.pi, math.pi, "of the horizontal part of true gravity, from the base's x axis",
+                 angle=True),
         Quantity("waist_sine", "N m", -1e4, 1e4, "S: weight of what joint 1 carries, as far as a level arm does not tell"),
         Quantity("waist_cosine", "N m", -1e4, 1e4, "C: the same, a quarter of a turn on"),
     )

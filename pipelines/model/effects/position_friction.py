@@ -39,12 +39,12 @@ class PositionFriction(Effect):
     parameters = (
         Quantity("amplitude", "N m", 0.0, 20.0, "by how much friction rises and falls along the turn"),
         Quantity("order", "1/rev", 0.25, 100.0, "waves in one turn of the joint", shape=True),
-        Quantity("phase", "rad", -math.pi, math.pi, "angle of the wave at the joint's zero"),
+        Quantity("phase", "rad", -math.pi, math.pi, "angle of the wave at the joint's zero", angle=True),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
         Quantity("amplitude_2", "N m", 0.0, 20.0, "of the second harmonic", unsaid=0.0),
-        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", unsaid=0.0),
+        Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", unsaid=0.0, angle=True),
         Quantity("amplitude_3", "N m", 0.0, 20.0, "of the third harmonic", unsaid=0.0),
-        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", unsaid=0.0),
+        Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", unsaid=0.0, angle=True),
     )
     signature = "Friction whose size changes with the angle of the joint, always against the motion."
     explanation = "A bent shaft, an uneven seal or bearing, cables that press in some postures."

@@ -76,6 +76,7 @@ class Quantity:
     derived: bool = False  # follows from the other parameters
     joint: bool = False  # the number of another joint of the arm, 1-based
     link: bool = False  # the number of a link with a joint beyond it, counted from the base
+    angle: bool = False  # of a wave or a direction: rad whether its joint turns or slides, and the same again after a turn
     unsaid: float | None = None  # what holds where a model file does not say: the law from before the number was known
 
     def among(self, own: int | None, n_joints: int) -> tuple[int, ...] | None:
@@ -94,10 +95,10 @@ class Quantity:
         return f"{self.name} = {value:g} {what} this arm, which has {n_joints}{takes}"
 
     def unit_at(self, revolute: bool) -> str:
-        """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m."""
-        if revolute:
+        """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m, and waves in 2π m."""
+        if revolute or self.angle:
             return self.unit
-        return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m")
+        return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m").replace("1/rev", "1/(2 pi m)")
 
 
 @dataclass(frozen=True)

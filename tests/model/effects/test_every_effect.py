@@ -145,7 +145,7 @@ def test_twins_exist(kind: type[Effect], shared: Path) -> None:
 @every_effect
 def test_place(kind: type[Effect], arm: Arm) -> None:
     """It stands at every joint once, or once for the arm; a wrong place is refused."""
-    everywhere = kind.everywhere(arm.n_joints)
+    everywhere = kind.everywhere(arm.robot.revolute)
     joints = [effect.joint for effect in everywhere]
     assert joints in ([[1, 2, 3], [2, 3]] if kind.scope == "joint" else [[None]])
     for joint in (None, 0) if kind.scope == "joint" else (1,):
