@@ -20,9 +20,9 @@ from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.joined import once_each
 from pipelines.model.diagnosis.ledger import Tried
-from pipelines.model.diagnosis.numbers import acting, parameters
+from pipelines.model.diagnosis.numbers import acting, parameters, told
 from pipelines.model.diagnosis.refit import Refined
-from pipelines.model.diagnosis.result import RIVALS, Answer, Finding, Gain, Rejected, Rival, Value
+from pipelines.model.diagnosis.result import RIVALS, Answer, Finding, Gain, Rejected, Rival
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.verdict import Ruling, explained
 
@@ -89,11 +89,8 @@ def held_finding(part: Part, nominal: Array, floor: Array, draw: bool, answers: 
     torque = torque if data.known is None else torque - data.known
     size, joint, of_rated = _size(torque, data, effect.joint, floor)
     seen = float(np.linalg.norm(before.fit.project(torque)) / max(float(np.linalg.norm(torque * before.weights)), 1e-300))
-    units = {p.name: p.unit for p in acting.parameters}
-    std = {p.name: p.std for p in acting.parameters}
-    numbers = {name: Value(value, std.get(name), units.get(name, "1")) for name, value in effect.reported(acting.values).items()}
-    return Finding(effect.name, effect.joint, effect.title, numbers, explained(before.rms, after.rms, nominal, floor), seen, (),
-                   None, part.gain, "frequency responses", size, of_rated, proof(before, after, joint + 1) if draw else None,
+    return Finding(effect.name, effect.joint, effect.title, told(acting), explained(before.rms, after.rms, nominal, floor), seen,
+                   (), None, part.gain, "frequency responses", size, of_rated, proof(before, after, joint + 1) if draw else None,
                    part.doubt, tuple(answers) if draw else ())
 
 
