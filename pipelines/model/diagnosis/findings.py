@@ -30,9 +30,9 @@ __all__ = ["Causes", "agreement", "extended_arm", "findings", "held_finding", "r
 
 _AGREE = (0.4, 2.5)  # of its amplitude, that each log must ask for by itself
 _BLOCKS = 10  # of one log, that must agree as logs do
-_TELLS = 9.0  # variances of the amplitude that a log asks for by itself, that this has to lie from none for the log to be asked
+_TELLS = 9.0  # squared distance of the amplitude from none, in variances of what a log would ask for, for the log to be asked
 # That variance, in those of white noise: rows next to each other share the noise of the low-pass and what the model lacks. By their
-# own correlation it is 1.3 to 2.9 for most causes on logs of nothing but noise, 1.7 to 20 on two of the test bench, 5 in the middle.
+# own correlation it is 1.3 to 2.9 for most causes on logs of noise alone, 1.7 to 20 on two of the test bench, 5 in the middle.
 _ALIKE = 10.0
 
 
