@@ -216,9 +216,10 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
                             f"{did_you_mean(stored.effect, effect_names())}", where=where,
                             remedy="update rrrid, or correct the name")
     effect = find_effect(stored.effect)
-    if stored.joint not in (range(1, len(revolute) + 1) if effect.scope == "joint" else (None,)):
+    if stored.joint not in (effect.joints(revolute) if effect.scope == "joint" else (None,)):
         raise InputRejected("S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where,
-                            remedy=f"it belongs to one {effect.scope}, and the arm has {len(revolute)} joints")
+                            remedy=f"it belongs to one {effect.scope}{' that turns' if effect.turns else ''}, "
+                            f"and the arm has {len(revolute)} joints")
     kind_of_joint = stored.joint is None or revolute[stored.joint - 1]
     unsaid = {q.name: StoredValue(q.unsaid, None, q.unit_at(kind_of_joint), "assumed") for q in effect.parameters
               if q.unsaid is not None}
@@ -231,7 +232,7 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
                             remedy="write the values in those units")
     if unfit := [why for q, _, v in given if (why := q.unfit(v.value, stored.joint, len(revolute)))]:
         raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(unfit)}", where=where,
-                            remedy="write the number of another joint")
+                            remedy="write another number")
     return Acting(effect(joint=stored.joint).at({p.name: p.value for p in parameters}), parameters)
 
 

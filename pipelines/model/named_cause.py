@@ -28,7 +28,7 @@ def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") ->
     name, *rest = text.split(":")
     refuse_unknown(text, where)
     kind = find_effect(name)
-    joint, numbers = _place(text, kind, rest, len(revolute), where)
+    joint, numbers = _place(text, kind, rest, revolute, where)
     values = _values(text, kind, kind(joint=joint), numbers, where)
     _refuse_unfit(text, kind, values, joint, len(revolute), where)
     return Acting.of(kind(joint=joint), values, origin="assumed", revolute=joint is None or revolute[joint - 1])
@@ -43,7 +43,7 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
     name, *rest = text.split(":")
     refuse_unknown(text, where)
     kind = find_effect(name)
-    joint, numbers = _place(text, kind, rest, len(revolute), where)
+    joint, numbers = _place(text, kind, rest, revolute, where)
     effect = kind(joint=joint)
     if not numbers:
         return effect, {}
@@ -71,7 +71,7 @@ def refuse_unknown(text: str, where: str) -> None:
                          remedy="'rrrid extend --help' lists all causes")
 
 
-def _place(text: str, kind: type[Effect], rest: list[str], joints: int, where: str) -> tuple[int | None, str]:
+def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bool], where: str) -> tuple[int | None, str]:
     """The joint, and the text of the numbers."""
     belongs = f"write {kind.name}:JOINT:NAME=VALUE" if kind.scope == "joint" else f"write {kind.name}:NAME=VALUE"
     numbers = rest.pop() if rest and "=" in rest[-1] else ""
@@ -81,9 +81,13 @@ def _place(text: str, kind: type[Effect], rest: list[str], joints: int, where: s
         raise UsageError("C02", f"'{text}': {kind.name} takes {what}", where=where, remedy=belongs)
     if not rest:
         return None, numbers
-    if not (rest[0].isascii() and rest[0].isdigit()) or not 1 <= int(rest[0][:6]) <= joints:
-        raise UsageError("C02", f"'{rest[0]}' is no joint of this arm", where=where, remedy=f"give one of 1 to {joints}")
-    return int(rest[0]), numbers
+    if not (rest[0].isascii() and rest[0].isdigit()) or not 1 <= int(rest[0][:6]) <= len(revolute):
+        raise UsageError("C02", f"'{rest[0]}' is no joint of this arm", where=where, remedy=f"give one of 1 to {len(revolute)}")
+    joint, able = int(rest[0]), kind.joints(revolute)
+    if joint not in able:
+        raise UsageError("C02", f"'{text}': joint {joint} slides, and only one that turns can have it", where=where,
+                         remedy=f"give one of {', '.join(map(str, able))}" if able else "name another cause")
+    return joint, numbers
 
 
 def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: str) -> dict[str, float]:
@@ -105,10 +109,10 @@ def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: 
 
 
 def _refuse_unfit(text: str, kind: type[Effect], values: dict[str, float], joint: int | None, joints: int, where: str) -> None:
-    """C02, a number that names a joint which the arm does not have."""
+    """C02, a number that names a joint or a link which the arm does not have."""
     for quantity in kind.parameters:
         if why := quantity.unfit(values[quantity.name], joint, joints):
-            raise UsageError("C02", f"'{text}': {why}", where=where, remedy=f"give {quantity.name} another joint of the arm")
+            raise UsageError("C02", f"'{text}': {why}", where=where, remedy=f"give {quantity.name} another number")
 
 
 def _number(text: str, name: str, where: str) -> float:

@@ -14,7 +14,7 @@ __all__ = ["limits_sections"]
 
 _WAY = {"injected": "hidden", "analytic": "worked out"}  # how a detection limit was found
 _AT = {  # what of a cause's shape a technician can use; the rest is the form of its law
-    "order": "{size} waves a turn", "from_joint": "from joint {size}", "with_joint": "with joint {size}", "link": "of link {size}",
+    "order": "{size} waves {per}", "from_joint": "from joint {size}", "with_joint": "with joint {size}", "link": "of link {size}",
     "speed": "speed {size} {unit}", "distance": "travel {size} {unit}", "time_constant": "time constant {size} {unit}",
     "duration": "lasting {size} {unit}", "frequency": "{size} {unit}", "gap": "free play {size} {unit}",
     "limit": "at {size} {unit}"}
@@ -43,7 +43,8 @@ def limits_sections(result: Diagnosis) -> list[Section]:
 
 def _shape(at: Mapping[str, Value]) -> str:
     """For which waves, joint, speed or time it is, in words."""
-    return ", ".join(_AT[name].format(size=format_number(value.value, 3), unit=format_unit(value.unit))
+    return ", ".join(_AT[name].format(size=format_number(value.value, 3), unit=format_unit(value.unit),
+                                      per="a turn" if value.unit == "1/rev" else "in 2π m")
                      for name, value in at.items() if name in _AT and isinstance(value.value, int | float))
 
 

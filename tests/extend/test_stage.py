@@ -19,7 +19,7 @@ from pipelines.model.named_cause import wanted_cause
 from pipelines.model.simulation import Experiment, simulate
 from pipelines.stage import Outcome, Request, run_stage
 from pipelines.stored.redraw import redraw
-from tests.diagnose.sessions import session, written
+from tests.diagnose.sessions import healthy_again, session, written
 
 
 def extended(folder: Path, out: Path, *causes: str, model: Path | None = None) -> Outcome[extend.Extension]:
@@ -117,9 +117,20 @@ def test_a_start_is_where_the_search_begins() -> None:
 
 @pytest.mark.parametrize(("causes", "words"), [
     ((), "no cause"), (("cogs:1",), "cogging"), (("cogging",), "takes a joint"), (("cogging:7",), "1 to 3"),
-    (("coulomb:1",), "has it already"), (("payload",), "base parameters"), (("contact",), "happens once")])
+    (("coulomb:1",), "has it already"), (("payload",), "name reference logs"), (("contact",), "happens once"),
+    (("transmission_coupling:1",), "write transmission_coupling:2 or transmission_coupling:3"),
+    (("three_sigmoid:2",), "law of friction")])
 def test_causes_that_no_model_takes_are_refused(causes: tuple[str, ...], words: str, tmp_path: Path) -> None:
     folder = written(tmp_path / "logs", [replace(session()[0], role="identify")])
     with pytest.raises(UsageError) as refused:
         extended(folder, tmp_path / "out", *causes)
-    assert words in str(refused.value)
+    assert words in str(refused.value).lower()
+
+
+def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_say(tmp_path: Path) -> None:
+    """They were there to be asked: nobody is told to name some."""
+    folder = written(tmp_path / "logs", (*session(), *healthy_again(session(seed=5))))
+    outcome = extended(folder, tmp_path / "out", "payload")
+    ((cause, reason),) = [(one.cause, one.reason) for one in outcome.result.rejected]
+    assert (cause, outcome.result.findings, outcome.exit_code) == ("payload", (), 1)
+    assert "the base parameters have not moved" in reason

@@ -11,10 +11,11 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue, model_text, parse_model
-from pipelines.log.robot import Joint
+from pipelines.log.robot import Joint, LinkParameters, RobotDescription
 from pipelines.log.robot_files import load_robot
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Predict, Quantity
+from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.parameter import Parameter
 from pipelines.model.rigid.body import Array, Motion
@@ -129,6 +130,8 @@ def test_through_a_model_file_and_back(arm: Arm, motion: Motion) -> None:
 
 CROSSTALK = StoredEffect("encoder_crosstalk", 1, {"coefficient": StoredValue(0.1, None, "1", "fitted"),
                                                   "from_joint": StoredValue(9.0, None, "1", "fitted")})
+LENGTH = StoredEffect("link_length", None, {"error": StoredValue(0.01, None, "m", "fitted"),
+                                            "link": StoredValue(3.0, None, "1", "fitted")})
 VISCOUS = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.1, None, "N m s/rad", "fitted")})
 
 
@@ -144,6 +147,7 @@ VISCOUS = StoredEffect("viscous", 1, {"coefficient": StoredValue(0.1, None, "N m
      "in N m, not N m s/rad"),
     ({"effects": (CROSSTALK,)}, "from_joint = 9 is no other joint of this arm, which has 3"),
     ({"effects": (replace(CROSSTALK, effect="torque_crosstalk"),)}, "from_joint = 9 is no other joint"),
+    ({"effects": (LENGTH,)}, "link = 3 is no link with a joint beyond it on this arm, which has 3"),
     ({"base_parameters": ()}, "p1, p2"),
     ({"base_parameters": (StoredParameter("p16", 1.0, None, "kg", True, "fitted", ""),)}, "p16"),
     ({"robot": "name = 1"}, "robot description"),
@@ -176,6 +180,29 @@ def test_units_follow_the_kind_of_joint() -> None:
     assert Quantity("b", "N m s/rad", 0, 1, "").unit_at(revolute=False) == "N s/m"
     assert Quantity("b", "N m s/rad", 0, 1, "").unit_at(revolute=True) == "N m s/rad"
     assert Quantity("J", "kg m^2", 0, 1, "").unit_at(revolute=False) == "kg"
+    assert Quantity("k", "1/rev", 0, 1, "").unit_at(revolute=False) == "1/(2 pi m)"
+    assert Quantity("x", "rad", 0, 1, "").unit_at(revolute=False) == "m"
+
+
+def test_a_wave_along_a_slide_has_its_phase_in_rad() -> None:
+    """Its amplitude is a force and its waves are counted in 2π metres; where in a wave one is, is no length."""
+    units = {p.name: p.unit for p in Acting.of(Cogging(2), dict.fromkeys((q.name for q in Cogging.parameters), 1.0),
+                                               revolute=False).parameters}
+    assert {units[f"phase{tail}"] for tail in ("", "_2", "_3")} == {"rad"}
+    assert (units["amplitude"], units["order"], units["order_2"]) == ("N", "1/(2 pi m)", "1/(2 pi m)")
+
+
+def test_a_model_with_an_eccentric_encoder_at_a_slide_is_refused() -> None:
+    """Its error goes once a turn, and a slide has none."""
+    rail = RobotDescription("rail", (0.0, 0.0, -9.81), "dh", (Joint("rail", "prismatic"),))
+    arm = Arm.from_links(replace(rail, joints=(replace(rail.joints[0], link=LinkParameters(1.0, (0.0,) * 3, (0.0,) * 6)),)))
+    stored = StoredEffect("encoder_eccentricity", 1, {"amplitude": StoredValue(1e-3, None, "m", "fitted"),
+                                                      "phase": StoredValue(0.0, None, "rad", "fitted")})
+    with pytest.raises(InputRejected, match="cannot be at joint 1"):
+        Arm.from_model(replace(arm.to_model(), effects=(stored,)))
+
+
+def test_a_prismatic_joint_is_told_from_a_turning_one() -> None:
     assert Joint("rail", "prismatic").revolute is False
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.model.named_cause import acting_cause
+from pipelines.model.named_cause import acting_cause, wanted_cause
 
 REVOLUTE = (True, True, False)
 
@@ -48,6 +48,12 @@ def test_units_follow_the_kind_of_joint() -> None:
     ("encoder_crosstalk:1:from_joint=9", "C02", "no other joint of this arm, which has 3"),
     ("torque_crosstalk:2:coefficient=0.1,from_joint=2", "C02", "no other joint"),
     ("torque_crosstalk:2:coefficient=0.1,from_joint=1.5", "C02", "no other joint"),
+    ("transmission_coupling:2:inertia=0.1,with_joint=7", "C02", "no other joint of this arm, which has 3; it takes 1 or 3"),
+    ("transmission_coupling:2:inertia=0.1,with_joint=2", "C02", "no other joint"),
+    ("encoder_eccentricity:3:amplitude=0.001", "C02", "joint 3 slides, and only one that turns"),
+    ("link_length:error=0.01,link=9", "C02", "no link with a joint beyond it on this arm, which has 3; it takes 1 or 2"),
+    ("link_length:error=0.01,link=3", "C02", "no link with a joint beyond it"),
+    ("link_length:error=0.01,link=1.5", "C02", "no link with a joint beyond it"),
 ])
 def test_anything_else_is_refused(text: str, code: str, words: str) -> None:
     """With a code, and a hint where a name is nearly right."""
@@ -55,3 +61,13 @@ def test_anything_else_is_refused(text: str, code: str, words: str) -> None:
         acting_cause(text, REVOLUTE)
     assert refused.value.code == f"RRID-{code}"
     assert refused.value.remedy
+
+
+@pytest.mark.parametrize("text", ["transmission_coupling:2:with_joint=7", "transmission_coupling:2:with_joint=2",
+                                  "link_length:link=3", "link_length:link=0.5", "encoder_crosstalk:1:from_joint=9"])
+def test_a_start_is_held_to_the_arm_as_well(text: str) -> None:
+    """What a fit starts from names a joint or a link that there is."""
+    with pytest.raises(UsageError, match="RRID-C02"):
+        wanted_cause(text, REVOLUTE)
+    assert wanted_cause("transmission_coupling:2:with_joint=3", REVOLUTE)[1] == {"with_joint": 3.0}
+    assert wanted_cause("link_length:link=2", REVOLUTE)[1] == {"link": 2.0}

@@ -211,11 +211,13 @@ def test_limits_are_told_for_what_a_technician_can_see() -> None:
     """At how many waves a turn, from which joint: not by which form of a law."""
     at = {"order": Value(106.918, None, "1/rev"), "sharpness": Value(111.0, None, "s/rad"), "inner_loops": Value(0, None, "1")}
     found = (Detectable("cogging", 1, "amplitude", Value(0.1, None, "N m"), at),
+             Detectable("cogging", 3, "amplitude", Value(0.1, None, "N"), {"order": Value(40.0, None, "1/(2 pi m)")}),
              Detectable("presliding", 2, "force", Value(0.1, None, "N m"), {"elastic": Value(-1.0, None, "1")}),
              Detectable("stribeck", 2, "amplitude", Value(0.1, None, "N m"), {"speed": Value(0.0341, None, "rad/s")}))
     page = diagnosis_report(Result(**(NOTHING | {"detectable": found})))
     (table,) = (section.tables[0] for section in page.sections if section.title == "What would have been found")
-    assert [row[table.columns.index("at")] for row in table.rows] == ["107 waves a turn", "", "speed 0.0341 rad/s"]
+    assert [row[table.columns.index("at")] for row in table.rows] == [
+        "107 waves a turn", "40 waves in 2π m", "", "speed 0.0341 rad/s"]
 
 
 @pytest.mark.parametrize(("left", "said"), [

@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.arm import Arm
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.candidates import Family, lay_family, lay_one, place_of
 from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.linear import covariance, deviations
+from pipelines.model.diagnosis.linear import covariance
 from pipelines.model.diagnosis.nominal import Fit, fit_columns
-from pipelines.model.diagnosis.result import Value
+from pipelines.model.diagnosis.numbers import of_amplitudes
 from pipelines.model.diagnosis.screen import gains_of
 from pipelines.model.diagnosis.standing import Mask, apart
 from pipelines.model.effects import all_effects
@@ -78,16 +78,18 @@ class Sessions:
 class Absorbed:
     """A cause that the base parameters show."""
 
-    effect: Effect
-    values: dict[str, float]
-    parameters: dict[str, Value]
-    std: dict[str, float]  # of the values that were fitted
+    acting: Acting
+    numbers: int  # amplitudes that were fitted
     explained: float  # of the difference between one set of base parameters and two
     gain: float  # squared weighted residual that it takes away beside one set, in parts of that difference
     moves: Array | None = None  # (base parameters,) moved beside the cause's own torque, by what its values do not say
     unknowns: int = 0  # numbers behind `moves`
     rivals: tuple[Effect, ...] = ()  # elsewhere, or of other kind, that explain it as well: no name then
     times: float = 1.0  # what two sets of base parameters leave, one set for both leaves: the residual, not squared
+
+    @property
+    def effect(self) -> Effect:
+        return self.acting.effect
 
     @property
     def far(self) -> bool:
@@ -112,7 +114,7 @@ class Absorbed:
     @property
     def count(self) -> int:
         """Numbers that were fitted."""
-        return len(self.std) + len(self.effect.free) + self.unknowns
+        return self.numbers + len(self.effect.free) + self.unknowns
 
     @property
     def unsure(self) -> str:
@@ -153,7 +155,7 @@ def absorbed(two: Sessions, arm: Arm, families: Sequence[Family] = (), usual: fl
     if move is None:
         return None
     places = [kind_at.full() for kind in all_effects() if kind.evidence == "base parameters" and kind.name not in without
-              for kind_at in kind.everywhere(arm.n_joints)]
+              for kind_at in kind.everywhere(arm.robot.revolute)]
     found = [*(_tried(effect, two, arm, move, _EXPLAINS, 1) for effect in places),
              *(_tried(effect, two, arm, move, _ALONE, None) for effect in _laws(two, one, families, arm, move))]
     best = chosen([one for one in found if one is not None], move)
@@ -212,17 +214,15 @@ def _tried(effect: Effect, two: Sessions, arm: Arm, move: Move, least: float, nu
     share = 1.0 - (left - _power(two.fit(moved=True, more=columns))) / move.power
     every = fit.beta[-len(columns):]
     amplitudes = every[:own]
-    std = deviations(fit.table * fit.weights, fit.residual)[-len(columns):][:own]
-    if share < least or not (np.abs(amplitudes) >= _SURE * std)[:numbers].any():
+    spread = covariance(fit.table * fit.weights, fit.residual)[-len(columns):, -len(columns):][:own, :own]
+    if share < least or not (np.abs(amplitudes) > _SURE * np.sqrt(np.maximum(np.diag(spread), 0.0)))[:numbers].any():
         return None
-    values = effect.values(amplitudes)
-    if not effect.possible(values):
+    if not effect.possible(effect.values(amplitudes)):
         return None
-    names = [q.name for q in effect.parameters if not q.shape]
     gain = (power - left) / move.power
     moves = None if moving is None else moving @ every[own:]
-    return Absorbed(effect, values, _reported(effect, amplitudes, std), dict(zip(names, std.tolist(), strict=False)), share, gain,
-                    moves, unknowns=len(columns) - own)
+    acting = of_amplitudes(effect, amplitudes, spread, arm.robot.revolute)
+    return Absorbed(acting, own, share, gain, moves, unknowns=len(columns) - own)
 
 
 def chosen(found: Sequence[Absorbed], move: Move) -> Absorbed | None:
@@ -254,17 +254,3 @@ def _place(effect: Effect) -> str:
     """"torque_gain:2", "link_length of link 2"."""
     numbers = [q.name for q in effect.parameters if q.shape and q.discrete] if effect.joint is None else []
     return place_of(effect.name, effect.joint) + "".join(f" of {name} {getattr(effect, name):g}" for name in numbers)
-
-
-def _reported(effect: Effect, amplitudes: Array, std: Array) -> dict[str, Value]:
-    here, above = effect.reported(effect.values(amplitudes)), effect.reported(effect.values(amplitudes + std))
-    units, given = {q.name: q.unit for q in effect.parameters}, {q.name for q in effect.parameters if q.shape}
-    found: dict[str, Value] = {}
-    for name, value in here.items():
-        if name in given:
-            found[name] = Value(value, None, units[name])
-            continue
-        unit = next((unit for own, unit in units.items() if own == name or own.startswith(f"{name}_")), "1")
-        off = np.abs(np.atleast_1d(above[name]) - np.atleast_1d(value))
-        found[name] = Value(value, tuple(off.tolist()) if isinstance(value, tuple) else float(off[0]), unit)
-    return found

@@ -86,7 +86,7 @@ def families(laws: Sequence[Effect], motion: Motion, arm: Arm, without: Sequence
     for kind in all_effects():
         if kind.name in nominal or kind.name in without or kind.evidence in ("none", "base parameters"):
             continue
-        for effect in kind.everywhere(arm.n_joints):
+        for effect in kind.everywhere(arm.robot.revolute):
             found.append(Family(kind.name, effect.joint, _shapes(effect, laws, motion, arm)))
     return tuple(found)
 
@@ -102,9 +102,10 @@ def _shapes(effect: Effect, laws: Sequence[Effect], motion: Motion, arm: Arm) ->
 
 
 def whole_motion(data: Data) -> Motion:
-    """The motions of all logs one behind the other: for ranges, never for slopes."""
+    """The motions of all logs one behind the other, time from the start of each: for ranges, never for slopes."""
     motions = [one.motion for one in data.logs]
-    whole = Motion(*(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("t", "q", "dq", "ddq")))
+    t = np.concatenate([motion.t - motion.t[0] for motion in motions])  # logs of one session may share its clock
+    whole = Motion(t, *(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq")))
     asked = [motion.tau for motion in motions if motion.tau is not None]
     return replace(whole, tau=np.concatenate(asked)) if len(asked) == len(motions) else whole
 

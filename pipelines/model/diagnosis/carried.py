@@ -23,6 +23,7 @@ from pipelines.model.diagnosis.gains import Simulation, farther, gain_of, simula
 from pipelines.model.diagnosis.held_out import held_out_left
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.nominal import rigid_rows
+from pipelines.model.diagnosis.numbers import told
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Finding, ResidualRms
 from pipelines.model.rigid.body import Motion
@@ -70,20 +71,19 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     bare_left = before.left if judge is None else judge.y - bare.torque(judge)
     left = bare_left, held_out_left(done, None, blocks) if judge is None else bare_left - _torque(moved, done, judge)
     torque = torque_gain_of(rows, *left)
-    acting = Acting.of(effect, moved.values, moved.std, revolute=effect.joint is None or bare.arm.robot.revolute[effect.joint - 1])
     masses = np.zeros(len(whole.base)) if moved.moves is None else moved.moves
-    arms = [acted(arm, standing) for arm in (bare.arm, _with_base(bare.arm, masses).extended(acting))]
+    arms = [acted(arm, standing) for arm in (bare.arm, _with_base(bare.arm, masses).extended(moved.acting))]
     simulated = simulation_errors(arms, prepared.judging or prepared.motions)
     doubt = "" if (torque.ci95[:, 1] < 0.0).any() else "what moved in the base parameters does not show on held-out torque"
     doubt = doubt or worse_log(rows, *left) or farther(*simulated)
     size, joint, of_rated = _size(load, data)
-    finding = Finding(effect.name, effect.joint, effect.title, moved.parameters, moved.explained, 0.0, (), None,
+    finding = Finding(effect.name, effect.joint, effect.title, told(moved.acting), moved.explained, 0.0, (), None,
                       gain_of(torque, *simulated), "base parameters", size, of_rated,
                       proof(before, done, joint + 1) if draw else None)
     by = masses.copy()
     by[list(done.model.columns.kept)] -= shift
     arm = _with_base(whole, by)
-    return Carried(finding, replace(arm, effects=(*arm.effects, acting)), arms[0], left[0], doubt, tuple(simulated),
+    return Carried(finding, replace(arm, effects=(*arm.effects, moved.acting)), arms[0], left[0], doubt, tuple(simulated),
                    shift)
 
 
@@ -110,7 +110,7 @@ def _torque(moved: Absorbed, done: Refined, data: Data) -> Array:
     arm = done.model.nominal
 
     def torque(motion: Motion) -> Array:
-        own = moved.effect.torque(motion, arm, moved.values)
+        own = moved.effect.torque(motion, arm, moved.acting.values)
         return own if moved.moves is None else own + arm.body.regressor(motion.q, motion.dq, motion.ddq) @ moved.moves
 
     return data.lay(torque)

@@ -11,17 +11,16 @@ farther from the measured one.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from pipelines.errors import UsageError
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.absorbed import Absorbed
 from pipelines.model.diagnosis.beside import Held, acted, judged
-from pipelines.model.diagnosis.candidates import Family, families, place_of, whole_motion
+from pipelines.model.diagnosis.candidates import place_of
 from pipelines.model.diagnosis.carried import carried
 from pipelines.model.diagnosis.case import Case
 from pipelines.model.diagnosis.chance import BY_CHANCE
@@ -47,27 +46,15 @@ from pipelines.model.diagnosis.thresholds import Thresholds
 from pipelines.model.diagnosis.unasked import FewerTerms
 from pipelines.model.diagnosis.unbiased import unbiased
 from pipelines.model.diagnosis.verdict import Ruling
-from pipelines.model.effects.base import Effect
+from pipelines.model.diagnosis.wanted import Wanted, wanted_families
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
 
-__all__ = ["Extended", "Wanted", "extend"]
+__all__ = ["Extended", "extend"]
 
 _STANDS = "the reference logs show it too, so that it stands in the model already, as it was"
-_NOT_MOVED = "beside the other causes the base parameters have not moved as it moves them"
+_NOT_MOVED = "since the reference logs the base parameters have not moved as it moves them"
 _ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """A cause to extend the model by, and where its non-linear numbers start."""
-
-    effect: Effect
-    start: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def place(self) -> str:
-        return place_of(self.effect.name, self.effect.joint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +113,7 @@ def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSet
     rest = [one for one in wanted if one.place not in given]
     stands = given - {one.place for one in first.held.acting}
     taken_in = [one for one in rest if ask is not None and one.effect.evidence == "base parameters"]
-    every = _families(case, [one for one in rest if one not in taken_in])
+    every = wanted_families(case, [one for one in rest if one not in taken_in])
     left, refused = list(every), dict[tuple[str, int | None], str]()
     while True:
         say(f"fitting {', '.join(place_of(f.cause, f.joint) for f in left) or 'the nominal model'}")
@@ -140,8 +127,6 @@ def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSet
     moved = seen if isinstance(seen, Absorbed) and any(_is(one, seen) for one in rest) else None
     refused = {place: why for place, why in refused.items() if moved is None or place != (moved.effect.name, moved.effect.joint)}
     unmoved = [one for one in taken_in if moved is None or not _is(one, moved)]
-    if unmoved and not every:
-        _family(case, unmoved[0])  # alone it is a slip of who asked
     refused |= {(one.effect.name, one.effect.joint): _NOT_MOVED for one in unmoved}
     refused |= {(one.effect.name, one.effect.joint): _STANDS for one in wanted if one.place in stands}
     return _told(found, named, refused, replace(first, held=replace(first.held, case=case, prepared=prepared)), moved, chosen)
@@ -171,32 +156,6 @@ def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory,
     since = since_reference(prepared, prepared.reference, chosen, case.beside) if case.beside else memory.since(prepared, chosen)
     case = replace(since.case, changed=None, nameable=_ALL)
     return case, replace(prepared, data=case.data, judge=case.judge), since.absorbed
-
-
-def _families(case: Case, wanted: Sequence[Wanted]) -> tuple[Family, ...]:
-    """One of each place, with all starts that were given there."""
-    there: dict[str, list[Family]] = {}
-    for one in wanted:
-        there.setdefault(one.place, []).append(_family(case, one))
-    return tuple(replace(some[0], shapes=tuple(dict.fromkeys(shape for family in some for shape in family.shapes)))
-                 for some in there.values())
-
-
-def _family(case: Case, one: Wanted) -> Family:
-    laws = case.model.columns.laws
-    every = families(laws, whole_motion(case.data), case.model.arm)
-    mine = next((f for f in every if (f.cause, f.joint) == (one.effect.name, one.effect.joint)), None)
-    if mine is None and one.effect.name in {law.name for law in laws}:
-        raise UsageError("C02", f"{one.place}: the nominal model has it already", where="--with",
-                         remedy="name a cause that the nominal model lacks")
-    if mine is None:
-        raise UsageError("C02", f"{one.place}: the base parameters take it up, and no reference logs show that they moved as it "
-                         "moves them", where="--with", remedy="name reference logs from before it: --reference PATH")
-    if mine.event:
-        raise UsageError("C02", f"{one.place} happens once: no model of the arm holds it", where="--with",
-                         remedy="leave the moment out of the logs instead")
-    shape: dict[str, Any] = dict(one.start)
-    return replace(mine, shapes=tuple(dict.fromkeys(replace(s, **shape) for s in mine.shapes)))
 
 
 def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: bool = True,

@@ -191,7 +191,7 @@ def _given(case: Case, now: Refined, one: Screened, amplitudes: Array) -> Effect
 
 
 def _happened(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried:
-    """An event: in one log, which no other can confirm; or in all at the same time, where the held-out ones do."""
+    """An event: in one log, which no other can confirm; or in all at the same time from their start, where the held-out ones do."""
     log, effect = one.logs[0], one.shape[0].full()
     whole = laid_whole(case.data, effect, now.model.arm)
     table = whole if log is None else np.where(case.data.log_of == log - case.data.first, whole, 0.0)

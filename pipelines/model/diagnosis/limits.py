@@ -126,7 +126,7 @@ def not_testable(data: Data, fit: Fit, columns: Columns, screened: Sequence[Scre
         if kind.name in without:
             continue
         if kind.evidence == "base parameters" and not reference:
-            found += [_absorbed(effect, data, fit, columns, arm, "") for effect in kind.everywhere(arm.n_joints)]
+            found += [_absorbed(effect, data, fit, columns, arm, "") for effect in kind.everywhere(arm.robot.revolute)]
         elif kind.evidence == "residual" and kind.needs and kind.scope == "joint":
             found += _common(kind, data, fit, columns, arm)
     return tuple(found)
@@ -147,13 +147,13 @@ def _absorbed(effect: Effect, data: Data, fit: Fit, columns: Columns, arm: Arm, 
 def _common(kind: type[Effect], data: Data, fit: Fit, columns: Columns, arm: Arm) -> list[NotTestable]:
     """A cause at all joints alike, where the model hides it though it shows at one joint."""
     def together(motion: Motion) -> Array:
-        return np.asarray(sum(effect.columns(motion, arm) for effect in kind.everywhere(arm.n_joints)))
+        return np.asarray(sum(effect.columns(motion, arm) for effect in kind.everywhere(arm.robot.revolute)))
 
     table = data.lay(together)
     left = np.linalg.norm(fit.project(table)) / max(float(np.linalg.norm(table * fit.weights)), 1e-300)
     if left >= _VISIBLE:
         return []
-    one = kind.everywhere(arm.n_joints)[0]
+    one = kind.everywhere(arm.robot.revolute)[0]
     return [NotTestable(kind.name, None, f"where it is the same at all joints, absorbed by "
                         f"{', '.join(_hiding(table, fit, columns))}; needs {' and '.join(kind.needs)}", one.experiment)]
 

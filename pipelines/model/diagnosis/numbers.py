@@ -1,58 +1,68 @@
-"""The numbers of a finding as it reports them, with their standard deviations.
+"""The numbers of a cause as it reports them, with their standard deviations.
 
-    parameters(done, place)         {"order": Value(18.0, 0.01, "1/rev"), …} of effect number `place`
+    told(acting)                    {"order": Value(18.0, 0.01, "1/rev"), …} of an effect whose numbers are known
+    parameters(done, place)         the same of effect number `place` of a fitted model
+    of_amplitudes(effect, a, C)     an effect whose amplitudes alone were fitted, with the deviations of its numbers
 
 Covariance is that of all numbers of the model together, by the sandwich of `Refined.covariance`; what is reported follows from
-them to first order. What follows mostly from a number that these logs do not tell from others is not known at all: ± ∞. The inertia
-of a motor that turns with the last two of parallel joints, say, is a part of theirs.
+them to first order (the delta method): √(s C sᵀ), s the slopes. What follows mostly from a number that these logs do not tell from
+others is not known at all: ± ∞. The inertia of a motor that turns with the last two of parallel joints, say, is a part of theirs.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.exact import Named, number_moved
+from pipelines.model.diagnosis.exact import number_moved
 from pipelines.model.diagnosis.refit import Refined
 from pipelines.model.diagnosis.result import Value
+from pipelines.model.effects.base import Effect, Values
 
-__all__ = ["acting", "of_no_size", "parameters", "standard_deviations", "too_slight"]
+__all__ = ["acting", "of_amplitudes", "of_no_size", "parameters", "standard_deviations", "told", "too_slight"]
 
-_STEP = 1e-4
+Mask = npt.NDArray[np.bool_]
+
+_STEP = 1e-4  # of an amplitude or of its deviation, whichever is larger: an angle between two small ones turns fast
 # Deviations from zero: of 410 named causes of the test bench the least true one of one number was 6.9, a false gain 4.9; delays of
 # two arms in order 2.3 and 3.5.
 _STDS = 5.0
 _SURE = 2.0  # deviations by which it is less
 
 
-def parameters(done: Refined, place: int, covariance: Array | None = None) -> dict[str, Value]:
-    """What is reported of effect number `place`, named as in causes.md."""
-    one = done.model.effects[place]
-    whole = done.covariance() if covariance is None else covariance
-    index = done.of_effect(place)
-    names = [done.names[k - len(done.model.beta)][2] for k in index]
-    own, unseen = whole[np.ix_(index, index)], np.isin(index, done.unseen)
-    here = _reported(one)
-    slopes: dict[str, Array] = {name: np.zeros((len(value), len(names))) for name, value in here.items()}
-    for k, name in enumerate(names):
-        step = _step(one, name)
-        there = _reported(number_moved(one, name, step))
-        for key in here:
-            slopes[key][:, k] = _difference(there[key], here[key]) / step
+def told(acting: Acting) -> dict[str, Value]:
+    """What is reported of an effect, named as in causes.md; numbers that go together are one, with a deviation for each."""
     found = {}
-    for key, value in here.items():
-        std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes[key], own, slopes[key]), 0.0))
-        std = np.where(_untold(slopes[key], unseen), np.inf, std)
-        plain = one.effect.reported(one.values)[key]
-        unit = _unit(one, key, done.model.columns.body.robot.revolute)
-        fixed = not slopes[key].any()
-        if isinstance(plain, tuple):
-            found[key] = Value(tuple(value.tolist()), None if fixed else tuple(std.tolist()), unit)
-        else:
-            found[key] = Value(plain, None if fixed else float(std[0]), unit)
+    for name, value in acting.effect.reported(acting.values).items():
+        own = [p for p in acting.parameters if p.name == name] or [p for p in acting.parameters if p.name.startswith(f"{name}_")]
+        std: float | tuple[float, ...] | None = own[0].std
+        if isinstance(value, tuple):
+            known = [p.std for p in own]
+            std = None if all(x is None for x in known) else tuple(np.inf if x is None else x for x in known)
+        found[name] = Value(value, std, own[0].unit)
     return found
+
+
+def parameters(done: Refined, place: int, covariance: Array | None = None) -> dict[str, Value]:
+    """What is reported of effect number `place`."""
+    return told(_with(done, place, _of_effect(done, place, done.covariance() if covariance is None else covariance)))
+
+
+def of_amplitudes(effect: Effect, amplitudes: Array, covariance: Array, revolute: Sequence[bool]) -> Acting:
+    """`effect`, on an arm of such joints, by amplitudes and their covariance; the shape was not fitted with them.
+
+    Amplitudes of no variance were not seen.
+    """
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    steps = [_step(*each) for each in zip(amplitudes.tolist(), std.tolist(), strict=True)]
+    moved = [effect.values(amplitudes + step * one) for step, one in zip(steps, np.eye(len(steps)), strict=True)]
+    values = effect.values(amplitudes)
+    known = _finite(_deviations(effect, values, moved, steps, covariance, std == 0.0))
+    return Acting.of(effect, values, known, revolute=_turning(effect, revolute))
 
 
 def of_no_size(done: Refined) -> list[int]:
@@ -78,52 +88,56 @@ def _sizes(done: Refined) -> list[tuple[int, float, float]]:
 
 def standard_deviations(done: Refined, place: int, covariance: Array) -> dict[str, float]:
     """Of every parameter of effect number `place` that is fitted, and that these logs tell."""
-    one = done.model.effects[place]
-    index = done.of_effect(place)
-    names = [done.names[k - len(done.model.beta)][2] for k in index]
-    own, unseen = covariance[np.ix_(index, index)], np.isin(index, done.unseen)
-    here, found = one.values, {}
-    moved = [number_moved(one, name, _step(one, name)).values for name in names]
-    for key, value in here.items():
-        slope = np.array([(there[key] - value) / _step(one, name) for there, name in zip(moved, names, strict=True)])
-        if slope.any() and np.isfinite(slope).all() and not _untold(slope, unseen):
-            found[key] = float(np.sqrt(max(slope @ own @ slope, 0.0)))
-    return found
+    return _finite(_of_effect(done, place, covariance))
 
 
 def acting(done: Refined, place: int, covariance: Array) -> Acting:
     """Effect number `place` with its numbers and their standard deviations, for a model."""
+    return _with(done, place, standard_deviations(done, place, covariance))
+
+
+def _with(done: Refined, place: int, std: dict[str, float]) -> Acting:
     one = done.model.effects[place]
-    joint = one.effect.joint
-    turning = joint is None or done.model.columns.body.robot.revolute[joint - 1]
-    return Acting.of(one.effect, one.values, standard_deviations(done, place, covariance), revolute=turning)
+    return Acting.of(one.effect, one.values, std, revolute=_turning(one.effect, done.model.columns.body.robot.revolute))
 
 
-def _untold(slopes: Array, unseen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """(…,) of `slopes` (…, numbers): whether one of those `unseen` (numbers,) moves it more than all that are seen."""
-    size = np.abs(slopes)
-    return np.asarray(np.where(unseen, size, 0.0).max(axis=-1) > np.where(unseen, 0.0, size).max(axis=-1))
+def _turning(effect: Effect, revolute: Sequence[bool]) -> bool:
+    return effect.joint is None or revolute[effect.joint - 1]
 
 
-def _reported(one: Named) -> dict[str, Array]:
-    return {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in one.effect.reported(one.values).items()}
+def _of_effect(done: Refined, place: int, covariance: Array) -> dict[str, float]:
+    one = done.model.effects[place]
+    index = done.of_effect(place)
+    names = [done.names[k - len(done.model.beta)][2] for k in index]
+    own, unseen = covariance[np.ix_(index, index)], np.isin(index, done.unseen)
+    std = np.sqrt(np.maximum(np.diag(own), 0.0)).tolist()
+    steps = [_step(one.amplitudes[int(name)], known) if name.isdigit() else _STEP for name, known in zip(names, std, strict=True)]
+    moved = [number_moved(one, name, step).values for name, step in zip(names, steps, strict=True)]
+    return _deviations(one.effect, one.values, moved, steps, own, unseen)
 
 
-def _difference(there: Array, here: Array) -> Array:
-    """An angle may come round."""
-    apart = there - here
-    return np.where(np.abs(apart) > np.pi, (apart + np.pi) % (2.0 * np.pi) - np.pi, apart) if np.abs(here).max() <= np.pi else apart
+def _deviations(effect: Effect, here: Values, moved: Sequence[Values], steps: Sequence[float], covariance: Array, unseen: Mask,
+                ) -> dict[str, float]:
+    """Of every parameter that follows from numbers that were fitted: `moved` are the values with one after the other of them moved
+    by its step."""
+    found = {}
+    for q in effect.parameters:
+        apart = np.array([there[q.name] - here[q.name] for there in moved])
+        slope = (apart if q.period is None else apart - q.period * np.rint(apart / q.period)) / steps
+        if slope.any() and np.isfinite(slope).all():
+            found[q.name] = np.inf if _untold(slope, unseen) else float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+    return found
 
 
-def _step(one: Named, name: str) -> float:
-    if name.isdigit():
-        return _STEP * (max(abs(a) for a in one.amplitudes) or 1.0)
-    return _STEP
+def _finite(std: dict[str, float]) -> dict[str, float]:
+    return {name: x for name, x in std.items() if np.isfinite(x)}
 
 
-def _unit(one: Named, name: str, revolute: tuple[bool, ...]) -> str:
-    for quantity in one.effect.parameters:
-        if quantity.name == name or quantity.name.startswith(f"{name}_"):
-            return quantity.unit_at(one.effect.joint is None or revolute[one.effect.joint - 1])
-    return "1"
+def _untold(slope: Array, unseen: Mask) -> bool:
+    """Whether a number that is `unseen` moves it more than all that are seen."""
+    size = np.abs(slope)
+    return bool(np.where(unseen, size, 0.0).max() > np.where(unseen, 0.0, size).max())
 
+
+def _step(amplitude: float, std: float) -> float:
+    return _STEP * (max(abs(amplitude), std) or 1.0)

@@ -22,7 +22,8 @@ from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.inputs import Prepared, narrowed
 from pipelines.model.diagnosis.linear import deviations
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
-from pipelines.model.diagnosis.result import Answer, NotTestable, Standing, Value
+from pipelines.model.diagnosis.numbers import told
+from pipelines.model.diagnosis.result import Answer, NotTestable, Standing
 
 __all__ = ["BELOW", "Responding", "responding"]
 
@@ -72,14 +73,14 @@ def responding(case: Case, prepared: Prepared, without: Sequence[str] = (), only
     if prepared.reference is None:
         return Responding(stiff, beside(case, prepared, stiff.named))
     new, old, open_ = _apart(stiff, compliance(logs.frf_before, arm, without), prepared.reference, arm, prepared)
-    told = []
+    stands = []
     for acting in (*old, *open_):
         case, prepared, share = _taken_out(case, prepared, acting, arm, both=acting in old)
         if acting in old:
-            told.append(_standing(acting, share))
+            stands.append(Standing(acting.effect.name, acting.effect.joint, told(acting), share))
     left = tuple(NotTestable(one.effect.name, one.effect.joint, _OPEN, f"{one.effect.experiment} Before and after.")
                  for one in open_)
-    return Responding(stiff, beside(case, prepared, new), tuple(told), left)
+    return Responding(stiff, beside(case, prepared, new), tuple(stands), left)
 
 
 def _told_apart(case: Case, prepared: Prepared, named: Sequence[Acting]) -> tuple[Case, Prepared]:
@@ -138,10 +139,3 @@ def _taken_out(case: Case, prepared: Prepared, acting: Acting, arm: Arm, both: b
     columns, fit = fit_nominal(data, prepared.columns)
     case = replace(case, data=data, judge=judge, model=Exact.start(columns, fit), weight=fit.weight, beside=(*case.beside, acting))
     return case, prepared, share
-
-
-def _standing(acting: Acting, share: float) -> Standing:
-    known = {p.name: p for p in acting.parameters}
-    numbers = {name: Value(value, known[name].std if name in known else None, known[name].unit if name in known else "1")
-               for name, value in acting.effect.reported(acting.values).items()}
-    return Standing(acting.effect.name, acting.effect.joint, numbers, share)

@@ -24,10 +24,11 @@ from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.injection import Probe
 from pipelines.model.diagnosis.inputs import Prepared
-from pipelines.model.diagnosis.linear import deviations
+from pipelines.model.diagnosis.linear import covariance
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal, law_slopes, orthonormal, rows_of
+from pipelines.model.diagnosis.numbers import of_amplitudes, told
 from pipelines.model.diagnosis.refit import Refined
-from pipelines.model.diagnosis.result import Standing, Value
+from pipelines.model.diagnosis.result import Standing
 from pipelines.model.diagnosis.screen import Screened
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.standing import Chance, Chosen, Mask, apart, bounds, changes, fit_changed, joined, standing_set
@@ -82,7 +83,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     common = _torques(data, standing, arm)
     whole = fit_columns(data, np.concatenate([apart(nominal, later), common]))
     alone = fit_columns(reference, np.concatenate([nominal, common])[:, ~later])
-    sizes = _sizes(alone, whole.beta[2 * len(nominal):], standing)
+    sizes, spreads = _sizes(alone, whole, standing)
     before_and_after = [one.effect for one in standing]
     now = less(prepared.data, _known(prepared.data, standing, sizes, arm), before_and_after)
     judge = prepared.judge and less(prepared.judge, _known(prepared.judge, standing, sizes, arm), before_and_after)
@@ -113,7 +114,8 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         others = np.concatenate([apart(nominal, later), slopes])
         return share_before(lay_one(data, effects[place].effect, arm), data, later, others, common, found.weight)
 
-    acting = tuple(_acting(one, size, arm) for one, size in zip(standing, sizes, strict=True))
+    acting = tuple(of_amplitudes(one.effect, size, spread, arm.robot.revolute)
+                   for one, size, spread in zip(standing, sizes, spreads, strict=True))
     model = replace(Exact.start(columns, start), standing=tuple(one for one in acting if one.effect.adds))
     kept = len(columns.kept)
 
@@ -133,8 +135,9 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     def moved(found: Refined, laws: Sequence[Family]) -> Absorbed | Unexplained | None:
         return absorbed(sessions(found), arm, laws, chance.moved(kept) if laws else 0.0, chosen.without)
 
-    pairs = list(zip(standing, sizes, strict=True))
-    return Since(case, floor, left, tuple(_told(one, size, arm) for one, size in pairs), case.beside, moved, chance, probed,
+    shown = tuple(Standing(own.effect.name, own.effect.joint, told(own), one.gain)
+                  for one, own in zip(standing, acting, strict=True))
+    return Since(case, floor, left, shown, case.beside, moved, chance, probed,
                  partial(floor_by_speed, reference, left), tuple(stood))
 
 
@@ -190,16 +193,22 @@ def _torques(data: Data, standing: Sequence[Chosen], arm: Arm) -> Array:
     return np.concatenate([np.zeros((0, data.rows)), *(lay_one(data, one.effect, arm) for one in standing)])
 
 
-def _sizes(alone: Fit, shared: Array, standing: Sequence[Chosen]) -> list[Array]:
-    """Amplitudes of each: `shared` by before and after, which tell an offset from weight better than the reference logs do `alone`,
-    as far as these allow them; else theirs, for the later logs have what has changed as well."""
-    count = len(shared)
-    own = alone.beta[len(alone.beta) - count:]
-    std = deviations(alone.table * alone.weights, alone.residual)[len(alone.beta) - count:]
-    ends = np.cumsum([len(one.amplitudes) for one in standing])[:-1]
-    parts = zip(*(np.split(x, ends) for x in (own, std, shared)), strict=True) if standing else ()
-    return [both if (np.abs(both - mine) <= np.maximum(_ALLOWED * wide, _SHARE * np.abs(mine))).all() else mine
-            for mine, wide, both in parts]
+def _sizes(alone: Fit, whole: Fit, standing: Sequence[Chosen]) -> tuple[list[Array], list[Array]]:
+    """Amplitudes of each and their covariance, the last of either fit: of the `whole`, of before and after, which tells an offset
+    from weight better than the reference logs do `alone`, as far as these allow them; else theirs, for the later logs have what has
+    changed as well. What has changed pulls the shared ones a little, too: how far the two are apart belongs to their deviations."""
+    sizes, spreads = [], []
+    left = sum(len(one.amplitudes) for one in standing)
+    every = [(fit.beta, covariance(fit.table * fit.weights, fit.residual)) for fit in (alone, whole)] if standing else []
+    for one in standing:
+        own = slice(-left, len(one.amplitudes) - left or None)
+        (mine, narrow), (both, wide) = ((beta[own], spread[own, own]) for beta, spread in every)
+        allowed = np.maximum(_ALLOWED * np.sqrt(np.maximum(np.diag(narrow), 0.0)), _SHARE * np.abs(mine))
+        shared = bool((np.abs(both - mine) <= allowed).all())
+        sizes.append(both if shared else mine)
+        spreads.append(wide + np.outer(both - mine, both - mine) if shared else narrow)
+        left -= len(one.amplitudes)
+    return sizes, spreads
 
 
 def _known(data: Data, standing: Sequence[Chosen], sizes: Sequence[Array], arm: Arm) -> Array:
@@ -208,16 +217,3 @@ def _known(data: Data, standing: Sequence[Chosen], sizes: Sequence[Array], arm: 
     for one, size in zip(standing, sizes, strict=True):
         torque += size @ lay_one(data, one.effect, arm)
     return torque
-
-
-def _acting(one: Chosen, size: Array, arm: Arm) -> Acting:
-    joint = one.effect.joint
-    return Acting.of(one.effect, one.effect.values(size), revolute=joint is None or arm.robot.revolute[joint - 1])
-
-
-def _told(one: Chosen, size: Array, arm: Arm) -> Standing:
-    turning = one.effect.joint is None or arm.robot.revolute[one.effect.joint - 1]
-    units = {q.name: q.unit_at(turning) for q in one.effect.parameters}
-    values = one.effect.reported(one.effect.values(size))
-    numbers = {name: Value(value, None, units.get(name, "1")) for name, value in values.items()}
-    return Standing(one.effect.name, one.effect.joint, numbers, one.gain)

@@ -88,6 +88,7 @@ class Effect(ABC):
     shapeless: ClassVar[bool] = False  # its law is the machine's to the last: it leaves no rest for another to mend
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
     slight: ClassVar[float] = 0.0  # of its amplitude, if it has one alone: what surely is less, instruments in order have as well
+    turns: ClassVar[bool] = False  # only a joint that turns can have it
     ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken
 
     def __post_init__(self) -> None:
@@ -179,9 +180,14 @@ class Effect(ABC):
         return x
 
     @classmethod
-    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
-        """One at every joint, or the one of the whole arm."""
-        return tuple(cls(joint=k + 1) for k in range(n_joints)) if cls.scope == "joint" else (cls(),)
+    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
+        """One at every joint that can have it, of joints that turn (`revolute`) or slide; or the one of the whole arm."""
+        return tuple(cls(joint=k) for k in cls.joints(revolute)) if cls.scope == "joint" else (cls(),)
+
+    @classmethod
+    def joints(cls, revolute: Sequence[bool]) -> tuple[int, ...]:
+        """Those that can have it, 1-based."""
+        return tuple(k for k, turns in enumerate(revolute, 1) if turns or not cls.turns)
 
     def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
         """Of its torque on its own joint, by the logarithm of each non-linear number, in order: (samples, numbers) [N m].

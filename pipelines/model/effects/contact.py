@@ -25,7 +25,8 @@ _PLACES = 8
 class Contact(Effect):
     """τ = -Jᵀ F sin(π (t - t0)/D) while 0 < t - t0 < D: a push F on the tip, in the base frame, that grows and fades.
 
-    Time is that of the log. It belongs to one log: what a fit of the arm should do is to leave out its samples (`acting`).
+    t is the time since the start of the log: what comes again wherever the same motion is repeated comes at the same t, whatever
+    the clocks say. It belongs to one log: what a fit of the arm should do is to leave out its samples (`acting`).
     """
 
     start: float = 0.0  # t0 [s]
@@ -35,7 +36,7 @@ class Contact(Effect):
     title = "A touch at the tip"
     scope = "arm"
     parameters = (
-        Quantity("start", "s", -1e12, 1e12, "time of the log at which it begins", shape=True),
+        Quantity("start", "s", -1e12, 1e12, "when it begins, from the start of its log", shape=True),
         Quantity("duration", "s", 0.02, 10.0, "how long it lasts", shape=True),
         Quantity("force", "N", 0.0, 1e5, "the largest", derived=True),
         *(Quantity(f"force_{axis}", "N", -1e5, 1e5, f"{axis} of the largest, in the base frame") for axis in "xyz"),
@@ -48,32 +49,37 @@ class Contact(Effect):
     per_log = ("start", "duration", "force", "force_x", "force_y", "force_z")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self._columns(motion, chain_of(arm.body))
+        return self._columns(motion.q, motion.t - motion.t[0], chain_of(arm.body))
 
-    def _columns(self, motion: Motion, chain: SerialChain) -> Array:
-        table = np.zeros((3, *motion.q.shape[::-1])).transpose(2, 1, 0)  # samples side by side
-        during = np.flatnonzero(self.acting(motion))
+    def _columns(self, q: Array, t: Array, chain: SerialChain) -> Array:
+        """(samples, joints, 3) at angles `q` (samples, joints), `t` (samples,) since the start of the log."""
+        table = np.zeros((3, *q.shape[::-1])).transpose(2, 1, 0)  # samples side by side
+        during = np.flatnonzero(self._acting(t))
         if len(during):
-            window = np.sin(math.pi * (motion.t[during] - self.start) / self.duration)
-            table[during] = -window[:, None, None] * jacobian(chain, motion.q[during])[:, :3].transpose(0, 2, 1)
+            window = np.sin(math.pi * (t[during] - self.start) / self.duration)
+            table[during] = -window[:, None, None] * jacobian(chain, q[during])[:, :3].transpose(0, 2, 1)
         return table
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         shaped, chain, force = self.at(values), chain_of(arm.body), self.amplitudes(values)
 
-        def load(motion: Motion, _: Array) -> Array:
-            if not shaped.acting(motion).any():
+        def load(motion: Motion, states: Array) -> Array:
+            t = motion.t - states[:, 0]  # its memory is when the log began
+            if not shaped._acting(t).any():
                 return np.zeros_like(motion.q)
-            return np.asarray(shaped._columns(motion, chain) @ force)
+            return np.asarray(shaped._columns(motion.q, t, chain) @ force)
 
-        return Hooks(load=load)
+        return Hooks(load=load, states=1, start=lambda motion, _: motion.t[:, None], update=lambda motion, _, states: states)
 
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_]:
-        return np.asarray((motion.t > self.start) & (motion.t < self.start + self.duration))
+        return self._acting(motion.t - motion.t[0])
+
+    def _acting(self, t: Array) -> npt.NDArray[np.bool_]:
+        return np.asarray((t > self.start) & (t < self.start + self.duration))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Windows of 0.2 s that overlap by half."""
-        for start in np.arange(motion.t[0], motion.t[-1] - 0.1, 0.1).tolist():
+        for start in np.arange(0.0, np.ptp(motion.t) - 0.1, 0.1).tolist():
             yield replace(self, start=start, duration=0.2)
 
     def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
@@ -86,7 +92,7 @@ class Contact(Effect):
             centre = int(np.argmax(mean))
             mean[max(0, centre - 2 * width):centre + 2 * width] = -1.0
             for duration in (0.1, 0.2, 0.3):
-                yield replace(self, start=float(motion.t[centre]) - 0.5 * duration, duration=duration)
+                yield replace(self, start=float(motion.t[centre] - motion.t[0]) - 0.5 * duration, duration=duration)
 
     def amplitudes(self, values: Values) -> Array:
         return np.array([values[f"force_{axis}"] for axis in "xyz"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -37,8 +37,8 @@ class EncoderCrosstalk(Effect):
     misread = True
 
     @classmethod
-    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
-        return super().everywhere(n_joints) if n_joints > 1 else ()
+    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
+        return super().everywhere(revolute) if len(revolute) > 1 else ()
 
     def __post_init__(self) -> None:
         super().__post_init__()

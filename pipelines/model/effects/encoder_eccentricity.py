@@ -36,6 +36,7 @@ class EncoderEccentricity(Effect):
     size = "amplitude"
     twins = ("cogging", "spring", "gravity_tilt")
     misread = True
+    turns = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         q, v, u = (self.own(x) for x in (motion.q, motion.dq, motion.ddq))

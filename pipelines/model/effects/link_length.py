@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -31,7 +31,7 @@ class LinkLength(Effect):
     scope = "arm"
     parameters = (
         Quantity("error", "m", -1.0, 1.0, "true length minus that of the description"),
-        Quantity("link", "1", 1.0, 100.0, "which link, counted from the base", shape=True, discrete=True),
+        Quantity("link", "1", 1.0, 100.0, "which link, counted from the base", shape=True, discrete=True, link=True),
     )
     signature = "Gravity and inertia of the links beyond do not agree with each other."
     explanation = "The drawing, the calibration or the robot description has another length than the arm."
@@ -41,8 +41,8 @@ class LinkLength(Effect):
     twins = ("rotor_inertia", "payload", "encoder_crosstalk")
 
     @classmethod
-    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
-        return (cls(),) if n_joints > 1 else ()
+    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
+        return (cls(),) if len(revolute) > 1 else ()
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         either = [self._altered(arm, by) for by in (_STEP, -_STEP)]

@@ -75,20 +75,30 @@ class Quantity:
     discrete: bool = False  # a shape that is a whole number, such as another joint: chosen, never moved a little
     derived: bool = False  # follows from the other parameters
     joint: bool = False  # the number of another joint of the arm, 1-based
+    link: bool = False  # the number of a link with a joint beyond it, counted from the base
     unsaid: float | None = None  # what holds where a model file does not say: the law from before the number was known
-    period: float | None = None  # of an angle on a circle: so much more is the same again
+    period: float | None = None  # of an angle on a circle, rad whether its joint turns or slides: so much more is the same again
+
+    def among(self, own: int | None, n_joints: int) -> tuple[int, ...] | None:
+        """Which joints or links of an arm of `n_joints` joints it may be, of an effect at joint `own`; None: it is neither."""
+        if self.joint:
+            return tuple(k for k in range(1, n_joints + 1) if k != own)
+        return tuple(range(1, n_joints)) if self.link else None
 
     def unfit(self, value: float, own: int | None, n_joints: int) -> str:
         """Why no arm of `n_joints` joints can have this value of an effect at joint `own`; empty where it can."""
-        if not self.joint or (value in range(1, n_joints + 1) and value != own):
+        among = self.among(own, n_joints)
+        if among is None or value in among:
             return ""
-        return f"{self.name} = {value:g} is no other joint of this arm, which has {n_joints}"
+        what = "is no other joint of" if self.joint else "is no link with a joint beyond it on"
+        takes = f"; it takes {' or '.join(map(str, among))}" if among else ""
+        return f"{self.name} = {value:g} {what} this arm, which has {n_joints}{takes}"
 
     def unit_at(self, revolute: bool) -> str:
-        """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m."""
-        if revolute:
+        """Its unit at a joint of this kind: a prismatic one has m and N where a revolute one has rad and N m, and waves in 2π m."""
+        if revolute or self.period is not None:
             return self.unit
-        return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m")
+        return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m").replace("1/rev", "1/(2 pi m)")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -40,8 +40,8 @@ class TorqueCrosstalk(Effect):
             object.__setattr__(self, "from_joint", float(self.joint - 1 or 2))
 
     @classmethod
-    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
-        return super().everywhere(n_joints) if n_joints > 1 else ()
+    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
+        return super().everywhere(revolute) if len(revolute) > 1 else ()
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self.predicted(motion, arm)[:, int(self.from_joint) - 1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -28,7 +28,7 @@ class TransmissionCoupling(Effect):
     name = "transmission_coupling"
     title = "A motor that turns with two joints"
     parameters = (
-        Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True),
+        Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
         Quantity("inertia", "kg m^2", 0.0, 100.0, "of the motor, at joint side"),
         Quantity("viscous", "N m s/rad", 0.0, 500.0, "viscous friction of the motor, at joint side"),
         Quantity("coulomb", "N m", 0.0, 500.0, "dry friction of the motor, at joint side"),
@@ -47,8 +47,8 @@ class TransmissionCoupling(Effect):
             object.__setattr__(self, "with_joint", float(self.joint - 1 or 2))
 
     @classmethod
-    def everywhere(cls, n_joints: int) -> tuple[Self, ...]:
-        return tuple(cls(joint=k) for k in range(2, n_joints + 1))
+    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
+        return tuple(cls(joint=k) for k in range(2, len(revolute) + 1))
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         other, ratio = int(self.with_joint) - 1, self._ratio(arm)

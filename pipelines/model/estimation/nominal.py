@@ -44,11 +44,11 @@ def nominal_columns(robot: RobotDescription, *, friction: bool = True, offset: b
     if symmetric and not {p.name for p in body.parameters}.issuperset(_SYMMETRIC):
         raise UsageError("C02", "only the RRR arm has p4 and p15", where="--symmetric", remedy="leave it out")
     names = [name for name, wanted in (("coulomb", friction), ("viscous", friction), ("torque_offset", offset)) if wanted]
-    laws = [effect for name in names for effect in find_effect(name).everywhere(robot.n_joints)]
+    laws = [effect for name in names for effect in find_effect(name).everywhere(robot.revolute)]
     kept = tuple(i for i, p in enumerate(body.parameters) if not (symmetric and p.name in _SYMMETRIC))
     arm = Arm(robot.name, body, tuple(Parameter(p.name, 0.0, None, p.unit, origin="assumed") for p in body.parameters))
     if geared(robot) if rotor_inertia is None else rotor_inertia:
-        laws += _seen_beside(body, find_effect("rotor_inertia").everywhere(robot.n_joints), arm)
+        laws += _seen_beside(body, find_effect("rotor_inertia").everywhere(robot.revolute), arm)
     return Columns(body, kept, tuple(sorted(laws, key=lambda law: (law.joint or 0,
                                                                    names.index(law.name) if law.name in names else 9))),
                    arm)

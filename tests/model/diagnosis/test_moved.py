@@ -16,6 +16,7 @@ from pipelines.model.diagnosis import changed as changed_module
 from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.numbers import told
 from pipelines.model.diagnosis.refit import refine
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
@@ -182,8 +183,11 @@ def test_a_longer_link_is_told_by_the_masses_beyond_it(error: float) -> None:
     since = since_reference(prepared, prepared.reference, every)
     found = since.absorbed(refine(since.case.model, since.case.data, since.case.weight, steps=0), since.case.families)
     assert isinstance(found, Absorbed)
-    assert (found.effect.name, found.values["link"], found.unsure) == ("link_length", 2.0, "")
-    assert abs(found.values["error"] - error) < min(3.0 * found.std["error"], 0.5 * abs(error))
+    numbers = told(found.acting)
+    assert (found.effect.name, numbers["link"].value, found.unsure) == ("link_length", 2, "")
+    assert isinstance(numbers["error"].value, float)
+    assert isinstance(numbers["error"].std, float)
+    assert abs(numbers["error"].value - error) < min(3.0 * numbers["error"].std, 0.5 * abs(error))
 
 
 def test_the_model_of_a_longer_link_is_as_right_as_one_fitted_after_it() -> None:
@@ -211,7 +215,7 @@ def test_a_load_at_the_elbow_is_no_longer_link(mass: float) -> None:
 
 
 def story(effect: Effect, explained: float, numbers: int) -> Absorbed:
-    return Absorbed(effect, {}, {}, dict.fromkeys(map(str, range(numbers)), 1.0), explained, explained)
+    return Absorbed(Acting(effect, ()), numbers, explained, explained)
 
 
 def test_a_longer_link_has_to_explain_as_much_as_the_best() -> None:
@@ -220,7 +224,8 @@ def test_a_longer_link_has_to_explain_as_much_as_the_best() -> None:
     found = chosen([story(Payload(), 0.999, 10), link], Move(1.0, 1.0, 5e4))
     assert found is not None
     assert (found.effect.name, found.rivals) == ("payload", ())
-    found = chosen([story(Payload(), 0.9851, 10), link, replace(link, effect=LinkLength(link=3.0))], Move(1.0, 1.0, 5e4))
+    other = replace(link, acting=Acting(LinkLength(link=3.0), ()))
+    found = chosen([story(Payload(), 0.9851, 10), link, other], Move(1.0, 1.0, 5e4))
     assert found is not None
     assert "link_length of link 2 or link_length of link 3 or payload" in found.unsure
 

@@ -16,10 +16,11 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis import responding
 from pipelines.model.diagnosis.compliance import Compliance, compared
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.extend import Wanted, extend
+from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.wanted import Wanted
 from pipelines.model.effects.base_resonance import BaseResonance
 from pipelines.report.diagnosis_finding import finding_section
 from tests.diagnose.sessions import but, healthy_again, session

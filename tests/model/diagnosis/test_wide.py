@@ -64,7 +64,7 @@ def test_what_an_error_of_an_angle_does_elsewhere_does_not_grow_with_its_joint(
     quiet = noise * np.array([1.0, 1.0, 1e-3])[fit.data.joint]
     fits = tuple(fit_columns(fit.data, fit.table, one, fit.weight) for one in quiet)
     every = tuple(Family(name, 3, tuple(effect.shapes(whole_motion(fit.data), arm))) for name in ("encoder_eccentricity", "spring")
-                  for effect in find_effect(name).everywhere(3) if effect.joint == 3)
+                  for effect in find_effect(name).everywhere((True,) * 3) if effect.joint == 3)
     bounds = Thresholds.of_twin(*Twin(fits, (0,), np.zeros(3)).weighted(fit.weight), every, arm)
     grown = bounds.at(fit.weight * np.array([1.0, 1.0, 10.0])).own / bounds.own
     assert grown[1] == pytest.approx(100.0)

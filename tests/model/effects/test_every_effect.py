@@ -145,7 +145,7 @@ def test_twins_exist(kind: type[Effect], shared: Path) -> None:
 @every_effect
 def test_place(kind: type[Effect], arm: Arm) -> None:
     """It stands at every joint once, or once for the arm; a wrong place is refused."""
-    everywhere = kind.everywhere(arm.n_joints)
+    everywhere = kind.everywhere(arm.robot.revolute)
     joints = [effect.joint for effect in everywhere]
     assert joints in ([[1, 2, 3], [2, 3]] if kind.scope == "joint" else [[None]])
     for joint in (None, 0) if kind.scope == "joint" else (1,):
@@ -165,6 +165,36 @@ def test_columns(kind: type[Effect], arm: Arm, motion: Motion) -> None:
         assert np.abs(columns).max() > 0
     np.testing.assert_array_equal(motion.q, before[0])
     np.testing.assert_array_equal(motion.dq, before[1])
+
+
+@every_effect
+def test_time_counts_from_the_start_of_the_log(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """Logs of one session may share its clock, and begin at any time of it: an effect does there what it does from zero on."""
+    later = replace(motion, t=motion.t + 300.0)
+    for shape, found in zip(*(placed(kind).shapes(one, arm) for one in (motion, later)), strict=True):
+        here = shape.columns(motion, arm)
+        for there in (shape.columns(later, arm), found.columns(later, arm)):
+            np.testing.assert_allclose(there, here, rtol=1e-6, atol=1e-6 * np.abs(here).max())
+
+
+@pytest.mark.parametrize(("cause", "values"), [
+    ("contact", {"start": 0.8, "duration": 0.3, "force": 5.0, "force_x": 0.0, "force_y": 3.0, "force_z": 4.0}),
+    ("viscous_drift", {"relative_change": 0.5, "time_constant": 0.7})])
+def test_a_simulation_counts_time_from_the_start_of_the_log_as_well(cause: str, values: dict[str, float], arm: Arm,
+                                                                    motion: Motion) -> None:
+    """A run from any sample on knows when the log began: its load is the torque that the log shows there."""
+    later = replace(motion, t=motion.t + 300.0)
+    effect = placed(find_effect(cause)).at(values)
+    hooks = effect.simulate(arm, values)
+    assert hooks.load is not None
+    assert hooks.start is not None
+    first = Motion(later.t[:1], motion.q[:1], motion.dq[:1], motion.ddq[:1])
+    states = np.repeat(hooks.start(first, np.zeros((1, 3))), 400, axis=0)
+    some = slice(700, 1100)
+    part = Motion(later.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
+    expected = effect.torque(motion, arm, values)[some]
+    assert np.abs(expected).max() > 0.0
+    np.testing.assert_allclose(hooks.load(part, states), expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("kind", [kind for kind in all_effects() if kind.from_motion], ids=lambda kind: kind.name)

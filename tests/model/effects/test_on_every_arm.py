@@ -15,6 +15,7 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.rigid.body import Array, Motion
@@ -52,7 +53,7 @@ def motion(arm: Arm) -> Motion:
 @every_effect
 def test_an_effect_works_on_it(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """At every place: shapes, columns, the exact form, which for a weak effect is of first order, and the simulation."""
-    for effect in kind.everywhere(arm.n_joints):
+    for effect in kind.everywhere(arm.robot.revolute):
         shapes = tuple(effect.shapes(motion, arm))
         assert shapes
         for shape in {shapes[0], shapes[0].full()}:
@@ -75,13 +76,19 @@ def weak(shape: Effect, columns: Array) -> Array:
     return np.full(columns.shape[2], 1e-5)
 
 
+def test_an_encoder_is_eccentric_where_a_joint_turns() -> None:
+    """Its error goes once a turn; of a slide's metres a sine says nothing."""
+    assert [one.joint for one in EncoderEccentricity.everywhere((True, False, True))] == [1, 3]
+    assert [one.joint for one in Coulomb.everywhere((True, False, True))] == [1, 2, 3]
+
+
 def test_a_shared_motor_turns_as_the_transmission_says() -> None:
     """Motor 2 turns with q2 - 3 q1 (N = [[50, 0], [-30, 10]]): friction follows v2 - 3 v1, and joint 1 feels it -3 times."""
     joints = (Joint("a", a=0.3, link=LinkParameters(1.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1, 0.0, 0.0, 0.0))),) * 2
     robot = RobotDescription("two", (0.0, 0.0, -9.81), "dh", joints, drive=Drive(((50.0, 0.0), (-30.0, 10.0))))
     arm, rng = Arm.from_links(robot), np.random.default_rng(4)
     motion = Motion(np.arange(5.0), *rng.normal(size=(3, 5, 2)))
-    (effect,) = TransmissionCoupling.everywhere(2)
+    (effect,) = TransmissionCoupling.everywhere((True, True))
     shape = next(iter(effect.shapes(motion, arm)))
     torque = shape.torque(motion, arm, {"with_joint": 1.0, "inertia": 0.0, "viscous": 2.0, "coulomb": 0.0, "sharpness": 100.0})
     speed = motion.dq[:, 1] - 3.0 * motion.dq[:, 0]
