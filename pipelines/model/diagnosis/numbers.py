@@ -123,7 +123,7 @@ def _deviations(effect: Effect, here: Values, moved: Sequence[Values], steps: Se
     found = {}
     for q in effect.parameters:
         apart = np.array([there[q.name] - here[q.name] for there in moved])
-        slope = (apart if q.period is None else apart - q.period * np.rint(apart / q.period)) / steps
+        slope = np.asarray(apart if q.period is None else apart - q.period * np.rint(apart / q.period)) / np.array(steps)
         if slope.any() and np.isfinite(slope).all():
             found[q.name] = np.inf if _untold(slope, unseen) else float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
     return found
