@@ -23,6 +23,7 @@ from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.log.results import encode
 from pipelines.log.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
+from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.estimation.balance import power_balance
 from pipelines.model.estimation.checks import consistency
 from pipelines.model.estimation.compare import compare
@@ -45,7 +46,6 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 FITTED = ("excitation", "free")
 _COURSES = 3  # logs drawn
-_FEWEST_BLOCKS = 2
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,7 @@ class Settings:
 
 def read(request: Request, settings: Settings) -> Inputs:
     """The logs, and the model whose friction is to be taken."""
+    refuse_strange(settings)
     inputs = read_logs(request, settings)
     if settings.model is None:
         return inputs
@@ -95,17 +96,16 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
             together; T04, no stretch of a log can be used; T08, too few
             equations are left; D14, a log that is fitted shall judge as well.
     """
+    refuse_strange(settings)
     identify, validate = _chosen(inputs, settings.allow_same)
     given = _friction_of(inputs.material, identify[0])
     columns = nominal_columns(identify[0].robot, friction=given is None, offset=settings.offset,
                               rotor_inertia=settings.rotor_inertia, symmetric=settings.symmetric)
     recipe = Recipe(settings.reconstruction, settings.filter, settings.decimate, settings.min_speed,
                     None if given is None else given.friction_torque)
-    if settings.blocks < _FEWEST_BLOCKS:
-        raise UsageError("C02", f"{settings.blocks} blocks", where="--blocks", remedy="give 2 or more")
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
-        recipe.check(log)
+        refuse_unfit(settings, log)
     motions, said = _examined(identify, settings)
     judges, said_too = _examined(validate, settings)
     recipe = with_cutoff(recipe, motions)

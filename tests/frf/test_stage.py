@@ -169,7 +169,8 @@ def test_the_direct_method_is_warned_of() -> None:
     assert "direct method is biased, though its coherence looks fine" in words
 
 
-@pytest.mark.parametrize("settings", [Settings(estimator="wavelet"), Settings(resolution=1e-4), Settings(low=90.0, high=20.0)])
+@pytest.mark.parametrize("settings", [Settings(estimator="wavelet"), Settings(resolution=1e-4), Settings(low=90.0, high=20.0),
+                                      Settings(postures=(0,)), Settings(postures=(1, -4)), replace(QUICK, postures=(2,))])
 def test_settings_that_make_no_sense(settings: Settings) -> None:
     """C02, named."""
     with pytest.raises(UsageError) as caught:
