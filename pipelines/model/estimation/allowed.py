@@ -34,7 +34,8 @@ class Asked(Protocol):
 def refuse_strange(asked: Asked) -> None:
     """C02: a number that no log can be done with; told before any log is opened."""
     if asked.blocks < _FEWEST_BLOCKS:
-        raise UsageError("C02", f"{asked.blocks} {'block' if asked.blocks == 1 else 'blocks'}", where="--blocks", remedy="give 2 or more")
+        blocks = "1 block" if asked.blocks == 1 else f"{asked.blocks} blocks"
+        raise UsageError("C02", blocks, where="--blocks", remedy="give 2 or more")
     if not all(0.0 <= speed < np.inf for speed in asked.min_speed):
         raise UsageError("C02", "a speed that is no number from zero up", where="--min-speed", remedy="give 0 or more [rad/s]")
     if asked.decimate is not None and asked.decimate < 1:
