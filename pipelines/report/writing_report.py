@@ -133,7 +133,7 @@ def _where_section(result: Result) -> Section:
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (one.label, one.start, one.end, *(_short(100 * x) for x in one.relative_error)) for one in log.letters[:_MOST_LETTERS])
     table = Table(("where", "from [s]", "to [s]", *(f"{name} [%]" for name in result.joints)), rows,
-                  "What the model leaves in each, rms, over the torque of the whole log.")
+                  "What the model leaves in each, rms, over the torque of the whole log.", keeps_empty=True)
     figure = error_map_figure(log, result.joints)
     return Section("Where the torque is missed", text, (table,), () if figure is None else (figure,))
 
