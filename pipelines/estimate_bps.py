@@ -33,6 +33,8 @@ from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
 from pipelines.model.estimation.result import Result
+from pipelines.model.estimation.words import columns_in_words
+from pipelines.model.excited import REMEDY
 from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.parameter import Uncertainty
@@ -172,7 +174,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         friction="fitted" if fitted.recipe.known is None else "given",
         friction_of="" if fitted.recipe.known is None else "fit-friction" if settings.model is None else Path(settings.model).name,
         physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
-        unresolved=str(found.unresolved) if found.unresolved.parameters else "",
+        unresolved=found.unresolved.told(columns_in_words(names)),
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
@@ -224,8 +226,7 @@ def _sources(motions: Motions) -> tuple[Source, ...]:
 def _checks(result: Result) -> tuple[Check, ...]:
     found = list(result.doctor)
     if result.unresolved:
-        found.append(Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True,
-                              remedy="move the joints concerned further and faster, in more postures"))
+        found.append(Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True, remedy=REMEDY))
     if result.consistency is not None and not result.consistency.consistent:
         links = ", ".join(result.consistency.violating)
         found.append(Check.of("D15", "warn", f"no links that could exist have these parameters ({result.consistency.distance:.1f} "
