@@ -42,12 +42,12 @@ def pace(s: Subject) -> list[Check]:
         return s.ok("S08", f"speeds up to {fastest:.3g} {unit}, at {rate:.3g} Hz", signal="t")
     factor = _UNITS[fits[0]]
     return [s.say("S08", "warn",
-                  f"sampled every {s.log.sample_time:.4g} s, and no joint is faster than {fastest:.2g} {unit}; hardly any arm is so "
-                  f"slow: with steps in {fits[0]}, joint {place + 1} would reach {fastest * factor:.2g} {unit} at "
+                  f"sampled every {s.log.sample_time:.4g} s, and no joint is faster than {fastest:.2g} {unit}; hardly any arm is "
+                  f"so slow: with steps in {fits[0]}, joint {place + 1} would reach {fastest * factor:.2g} {unit} at "
                   f"{rate * factor:.4g} Hz",
                   signal="t",
-                  remedy=f'if its time is in {fits[0]}, declare unit = "{fits[0]}" in [time] of its recipe and import it anew; if the '
-                         "arm did creep, all is right")]
+                  remedy=f'if its time is in {fits[0]}, declare unit = "{fits[0]}" in [time] of its recipe and import it anew; if '
+                         "the arm did creep, all is right")]
 
 
 PACE_CHECKS = (pace,)
