@@ -28,7 +28,7 @@ from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.allowed import refuse_strange
-from pipelines.model.excitation.apart import Pair, judged_again, refuse_hidden, told_apart
+from pipelines.model.excitation.apart import Pair, judged_again, refuse_hidden, refuse_one, told_apart
 from pipelines.model.excitation.bounds import parse_bounds
 from pipelines.model.excitation.design import Design, Effort, design
 from pipelines.model.excitation.doubts import doubts
@@ -139,7 +139,12 @@ def read(request: Request, settings: Settings) -> Inputs:
     sources = [*logs.sources, *(path.absolute() for path in sources)]
     return Inputs(logs.logs, logs.rejected, logs.checks, tuple(sources), logs.hashes, robot=robot,
                   material=Material(robot, arm, bounds, recipe, modes, request.tell, why),
-                  label=settings.purpose, robot_name=robot.name)
+                  label=_label(settings), robot_name=robot.name)
+
+
+def _label(settings: Settings) -> str:
+    """What the design is for, in the name of its default folder: a plan for another purpose is another plan."""
+    return "-".join((settings.purpose, *settings.tell_apart)).replace(":", "-")
 
 
 def _arm(model: str | None, robot: RobotDescription) -> Arm | None:
@@ -222,7 +227,9 @@ def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
         raise UsageError("C02", "a motion that tells causes apart starts and ends at rest", where="--no-rest",
                          remedy="leave it out")
     (a, first), (b, second) = (wanted_cause(text, robot.revolute, "--tell-apart") for text in settings.tell_apart)
-    return Pair(a, b, (first, second))
+    pair = Pair(a, b, (first, second))
+    refuse_one(pair, settings.tell_apart)
+    return pair
 
 
 def _result(task: Task, found: Design, settings: Settings, given: Material, after: tuple[str, ...], mode: float | None) -> Result:

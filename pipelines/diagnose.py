@@ -10,7 +10,6 @@ before any physics is blamed.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -26,14 +25,13 @@ from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.named_cause import refuse_unknown
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
-
-_FEWEST_BLOCKS = 2
 
 
 @dataclass(frozen=True)
@@ -84,9 +82,10 @@ def beside(settings: Settings, request: Request) -> Beside:
     """The model whose friction laws are to be taken, and stored thresholds.
 
     Raises:
-        UsageError: C04, no such file.
+        UsageError: C01, C02, a setting that makes no sense, which no run should begin with; C04, no such file.
         InputRejected: a model (S18) or a calibration (S19, F05, F11) that cannot be used.
     """
+    _refuse_strange(settings)
     stored, arm = None, None
     sources: tuple[Path, ...] = ()
     folders: tuple[Path, ...] = ()
@@ -120,6 +119,8 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
         raise UsageError("C02", "a model or a calibration is named that was not read", where="diagnose",
                          remedy="hand on what diagnose.beside reads, as material")
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
+    for log in (*chosen.identify, *chosen.validate, *chosen.reference):
+        refuse_unfit(settings, log)
     if given.arm is not None and given.arm.n_joints != chosen.identify[0].n_joints:
         raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has "
                          f"{chosen.identify[0].n_joints}", where="--model", remedy="give a model of this robot")
@@ -155,16 +156,13 @@ def _refuse_strange(settings: Settings) -> None:
         if ":" in cause:
             raise UsageError("C02", f"'{cause}': a cause is left out as a whole, at every joint", where="--without",
                              remedy=f"write {cause.split(':')[0]}")
-    if settings.blocks < _FEWEST_BLOCKS:
-        raise UsageError("C02", f"{settings.blocks} blocks", where="--blocks", remedy="give 2 or more")
+    refuse_strange(settings)
     if settings.replicas < 0 or settings.replicas > 1000:
         raise UsageError("C02", f"{settings.replicas} replicas", where="--replicas", remedy="give 0 to 1000")
     if settings.most < 1:
         raise UsageError("C02", f"{settings.most} findings at most", where="--most", remedy="give 1 or more")
     if settings.seed < 0:
         raise UsageError("C02", f"the seed {settings.seed} is negative", where="--seed", remedy="give 0 or more")
-    if settings.filter is not None and not (math.isfinite(settings.filter) and settings.filter > 0.0):
-        raise UsageError("C02", f"a low-pass at {settings.filter:g} Hz", where="--filter", remedy="give a frequency above 0")
 
 
 def write(result: Result, folder: Path, request: Request) -> None:

@@ -23,6 +23,7 @@ from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.log.results import encode
 from pipelines.log.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
+from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.estimation.balance import power_balance
 from pipelines.model.estimation.checks import consistency
 from pipelines.model.estimation.compare import compare
@@ -32,6 +33,8 @@ from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
 from pipelines.model.estimation.result import Result
+from pipelines.model.estimation.words import columns_in_words
+from pipelines.model.excited import REMEDY
 from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.parameter import Uncertainty
@@ -45,7 +48,6 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 FITTED = ("excitation", "free")
 _COURSES = 3  # logs drawn
-_FEWEST_BLOCKS = 2
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,7 @@ class Settings:
 
 def read(request: Request, settings: Settings) -> Inputs:
     """The logs, and the model whose friction is to be taken."""
+    refuse_strange(settings)
     inputs = read_logs(request, settings)
     if settings.model is None:
         return inputs
@@ -95,17 +98,16 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
             together; T04, no stretch of a log can be used; T08, too few
             equations are left; D14, a log that is fitted shall judge as well.
     """
+    refuse_strange(settings)
     identify, validate = _chosen(inputs, settings.allow_same)
     given = _friction_of(inputs.material, identify[0])
     columns = nominal_columns(identify[0].robot, friction=given is None, offset=settings.offset,
                               rotor_inertia=settings.rotor_inertia, symmetric=settings.symmetric)
     recipe = Recipe(settings.reconstruction, settings.filter, settings.decimate, settings.min_speed,
                     None if given is None else given.friction_torque)
-    if settings.blocks < _FEWEST_BLOCKS:
-        raise UsageError("C02", f"{settings.blocks} blocks", where="--blocks", remedy="give 2 or more")
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
-        recipe.check(log)
+        refuse_unfit(settings, log)
     motions, said = _examined(identify, settings)
     judges, said_too = _examined(validate, settings)
     recipe = with_cutoff(recipe, motions)
@@ -172,7 +174,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         friction="fitted" if fitted.recipe.known is None else "given",
         friction_of="" if fitted.recipe.known is None else "fit-friction" if settings.model is None else Path(settings.model).name,
         physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
-        unresolved=str(found.unresolved) if found.unresolved.parameters else "",
+        unresolved=found.unresolved.told(columns_in_words(names)),
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
@@ -224,8 +226,7 @@ def _sources(motions: Motions) -> tuple[Source, ...]:
 def _checks(result: Result) -> tuple[Check, ...]:
     found = list(result.doctor)
     if result.unresolved:
-        found.append(Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True,
-                              remedy="move the joints concerned further and faster, in more postures"))
+        found.append(Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True, remedy=REMEDY))
     if result.consistency is not None and not result.consistency.consistent:
         links = ", ".join(result.consistency.violating)
         found.append(Check.of("D15", "warn", f"no links that could exist have these parameters ({result.consistency.distance:.1f} "

@@ -35,6 +35,7 @@ from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.wanted import Wanted
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
@@ -81,6 +82,7 @@ def read(request: Request, settings: Settings) -> Inputs:
         raise UsageError("C02", "no cause", where="--with", remedy="name one, as diagnose does: --with cogging:2")
     for text in settings.causes:
         refuse_unknown(text, "--with")
+    refuse_strange(settings)
     inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
                                               "reference": settings.reference})
     if settings.model is None:
@@ -99,8 +101,11 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         UsageError: C01, C02, causes or settings that do not fit, logs of several robots, a model of another one.
         InputRejected: as `diagnose`.
     """
+    refuse_strange(settings)
     given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
+    for log in (*chosen.identify, *chosen.validate, *chosen.reference):
+        refuse_unfit(settings, log)
     robot = chosen.identify[0].robot
     if given.arm is not None and given.arm.n_joints != robot.n_joints:
         raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has {robot.n_joints}",

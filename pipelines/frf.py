@@ -10,6 +10,7 @@ known. The direct and the indirect method stand beside it. Base, joint, delay an
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -85,13 +86,23 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     if not 0.1 <= settings.low < settings.high:
         raise UsageError("C02", f"modes from {settings.low:g} to {settings.high:g} Hz", where="--low, --high",
                          remedy="give two frequencies, the lower one first, from 0.1 Hz on")
+    _refuse_no_posture(settings, 0)
     logs = _chosen(inputs)
     arm = inputs.material if isinstance(inputs.material, Arm) and inputs.material.n_joints == logs[0].n_joints else None
     said = tuple(check for log in logs for check in _examined(log))
     found = frf_findings(logs, arm, How(settings.estimator, settings.resolution), (settings.low, settings.high))
     postures = tuple(posture_of(seen) for seen in found.seen)
+    _refuse_no_posture(settings, max(Counter(posture.joint for posture in postures).values()))
     return Result(logs[0].robot_name, tuple(m for seen in found.seen for m in methods_of(seen)), postures, classified(found),
                   undecided(found), settings.postures, (*said, *_complaints(found, settings)))
+
+
+def _refuse_no_posture(settings: Settings, most: int) -> None:
+    """C02: a number that no posture can have, or none of the `most` that a joint was recorded in; 0: not known yet."""
+    if wrong := [number for number in settings.postures if number < 1 or 0 < most < number]:
+        there = f"give 1 to {most}" if most else "they are counted from 1"
+        raise UsageError("C02", f"no joint has a posture {wrong[0]}", where="--posture",
+                         remedy=f"{there}, as they stand in the report under 'How it was measured'")
 
 
 def _chosen(inputs: Inputs) -> list[ExperimentLog]:

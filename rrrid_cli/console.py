@@ -83,9 +83,10 @@ def say_verdict(report: Report, stream: Any = None) -> None:
 
 def _say_table(table: Table, stream: Any) -> None:
     """The rows of a table; its head as well, where a row is more than a name and a figure."""
-    from pipelines.report.cells import column_texts
+    from pipelines.report.cells import column_texts, filled
     from pipelines.report.style import format_number, format_unit
 
+    table = filled(table)
     if len(table.columns) <= 2:  # a figure is not like the one below it
         say_table((), [[clean(c, 60) if isinstance(c, str) else format_number(c) for c in row] for row in table.rows], stream)
     elif table.rows:

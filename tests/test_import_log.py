@@ -291,3 +291,13 @@ def test_s07_radians_of_motors_declared_as_degrees_are_noticed(folder: Path) -> 
     (found,) = [c for c in outcome.checks if c.code == "RRID-S07"]
     assert "start at 32, 32, 32 times pi/2" in found.message
     assert outcome.report.tone == "attention"
+
+
+def test_s08_milliseconds_declared_as_seconds_are_asked_about(folder: Path) -> None:
+    """A warning: nothing in the recording contradicts it, but no arm is that slow. Declared as they are there is none."""
+    write(folder, text(good() | {"t": np.arange(1200) * 1.0}))
+    (check,) = run(folder).checks
+    assert (check.code, check.level, check.gate) == ("RRID-S08", "warn", False)
+    assert "with steps in ms, joint" in check.message
+    assert 'unit = "ms"' in check.remedy
+    assert not run(folder, RECIPE.replace('unit = "s"', 'unit = "ms"')).checks

@@ -12,7 +12,7 @@ Directions are those of columns scaled to unit length: what one of them weighs i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,10 +56,18 @@ class Unresolved:
         return bool(self.parameters)
 
     def __str__(self) -> str:
-        words = [f"no sample shows {', '.join(self.never_moved)}"] if self.never_moved else []
-        words += [f"{', '.join(group[:-1])} and {group[-1]} cannot be separated" if len(group) > 1
-                  else f"{group[0]} is lost in the noise" for group in self.confused]
-        return "; ".join(words)
+        return self.told({})
+
+    def told(self, called: Mapping[str, str]) -> str:
+        """In a sentence, each parameter as it is `called` there; by its name where nothing is said of it."""
+        def words(names: Sequence[str]) -> list[str]:
+            return [called.get(name, name) for name in names]
+
+        said = [f"no sample shows {', '.join(words(self.never_moved))}"] if self.never_moved else []
+        for group in map(words, self.confused):
+            said.append(f"{', '.join(group[:-1])} and {group[-1]} cannot be separated" if len(group) > 1 else
+                        f"{group[0]} is lost in the noise")
+        return "; ".join(said)
 
 
 def condition_number(statistics: Statistics, columns: Sequence[int] | None = None) -> float:

@@ -50,11 +50,14 @@ def select_joints(log: ExperimentLog, joints: tuple[int, ...], robot: RobotDescr
         InputRejected: S02, the log is about a joint that is not chosen.
     """
     columns, where = _columns(log), log.source or log.name
-    if len(set(joints)) != len(joints) or not all(1 <= joint <= columns for joint in joints):
-        raise UsageError("C02", f"'{','.join(map(str, joints))}' are no joints of a log with {columns} of them", where=where,
-                         remedy="give each of --joints once, counted from 1")
+    absent = [str(joint) for joint in joints if not 1 <= joint <= columns]
+    if absent or len(set(joints)) != len(joints):
+        why = (f"a log with {columns} joints has no joint {' or '.join(absent)}" if absent else
+               f"'{','.join(map(str, joints))}' names a joint twice")
+        raise UsageError("C02", why, where=where, remedy="give each of --joints once, counted from 1")
     if robot is None and log.n_joints != len(joints):
-        raise UsageError("C02", f"{len(joints)} joints are chosen, but the log describes a robot of {log.n_joints}", where=where,
+        chosen = "1 joint is" if len(joints) == 1 else f"{len(joints)} joints are"
+        raise UsageError("C02", f"{chosen} chosen, but the log describes a robot of {log.n_joints}", where=where,
                          remedy="describe the arm that is left with --robot")
     if log.joint is not None and log.joint not in joints:
         raise InputRejected("S02", f"the log moves joint {log.joint}, which --joints leaves out", where=where,

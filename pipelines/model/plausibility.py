@@ -21,13 +21,14 @@ from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
 from pipelines.model.clock_offset import clock_offset
 from pipelines.model.commanded import against_command
 from pipelines.model.evidence import Evidence
+from pipelines.model.excited import excited
 from pipelines.model.mix_ups import encoder_scale, position_columns, torque_columns
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
 
-__all__ = ["excitation_condition", "mismatches", "plausibility", "plausibility_findings"]
+__all__ = ["mismatches", "plausibility", "plausibility_findings"]
 
 _DOUBLED = 3.0  # 2² - 1: growth of the squared residual when the residual doubles
 _SURE = 5.0  # standard deviations
@@ -38,7 +39,6 @@ _TIMED = 1.0  # samples; a wider bound cannot tell an offset of one sample
 # Times the bound of a drift, beyond which a log is refused and not only warned of: what friction remembers of a reversal, which no
 # row of the model has, drifted by 1.3 bounds in an arm in order, and a log that is refused is lost.
 _DRIFTS = 2.0
-_CONDITION = 1e4  # of unit columns: what 0.01 % of noise in the motion makes of a parameter
 
 
 def plausibility(subject: Subject) -> tuple[Check, ...]:
@@ -51,8 +51,12 @@ def plausibility_findings(subject: Subject) -> tuple[Check | NotTested, ...]:
     evidence = _evidence(subject)
     if not isinstance(evidence, Evidence):
         return _by_either(subject, evidence)
-    misplaced = _misplaced(evidence)
-    return misplaced or (*_by_either(subject, _fitting(evidence)), *_excited(evidence))
+    if misplaced := _misplaced(evidence):
+        return misplaced
+    found = _by_either(subject, _fitting(evidence))
+    if any(isinstance(check, Check) and check.gate and check.level != "ok" for check in found):
+        return found  # what such a torque leaves is no noise to hold the columns against
+    return (*found, *excited(subject))
 
 
 def mismatches(subject: Subject) -> tuple[Check, ...]:
@@ -243,38 +247,3 @@ def _clock(e: Evidence) -> Sequence[Check | NotTested]:
     if found.bound > _TIMED:
         return e.subject.cannot_tell("T06", f"{words}: an offset of one sample would not show", signal="tau")
     return e.subject.ok("T06", f"{words}, drift {drift}", signal="tau")
-
-
-def _excited(e: Evidence) -> list[Check]:
-    """D09: an excitation shows every base parameter."""
-    if e.subject.log.experiment != "excitation":
-        return []
-    condition, hidden = excitation_condition(e)
-    if not hidden:
-        return e.subject.ok("D09", f"every base parameter and friction shows, condition number {condition:.3g} (unit columns)")
-    return [e.subject.say("D09", "warn",
-                          f"insufficient excitation: {', '.join(hidden)} cannot be told (condition number {condition:.3g})",
-                          gate=True,
-                          remedy="move all joints at once, over more of their range and with more frequencies")]
-
-
-def excitation_condition(e: Evidence) -> tuple[float, list[str]]:
-    """Condition number of the unit columns of (8) with friction, and the parameters that its small directions mix."""
-    motion, n = e.motion, e.n_joints
-    weight = 1.0 / np.maximum(np.std(motion.tau, axis=0), 1e-12)
-    rigid = (e.body.regressor(motion.q, motion.dq, motion.ddq) * weight[:, None]).reshape(len(motion.t) * n, -1)
-    own = np.zeros((len(motion.t), n, 2 * n))
-    each = np.arange(n)
-    own[:, each, each] = motion.dq * weight
-    own[:, each, n + each] = motion.coulomb * weight
-    columns = np.concatenate([rigid, own.reshape(len(rigid), -1)], axis=1)
-    names = [p.name for p in e.body.parameters] + [f"{what} of joint {j + 1}" for what in ("viscous", "Coulomb") for j in range(n)]
-    size = np.linalg.norm(columns, axis=0)
-    unit = columns / np.where(size > 0, size, 1.0)
-    _, s, vt = np.linalg.svd(np.linalg.qr(unit, mode="r"))
-    small = vt[s < s[0] / _CONDITION]
-    mixed = (np.abs(small) > 0.2).any(axis=0) if len(small) else np.zeros(len(names), dtype=bool)
-    at_rest = e.subject.travel < np.maximum(1e-3, 50.0 * np.array([step or 0.0 for step in e.subject.steps]))
-    unmoved = np.concatenate([np.zeros(rigid.shape[1], dtype=bool), at_rest, at_rest])
-    hidden = [name for name, bad in zip(names, mixed | unmoved | (size == 0), strict=True) if bad]
-    return float(s[0] / max(s[-1], 1e-300)), hidden

@@ -2,18 +2,20 @@
 
     texts = column_texts(cells)             equally many decimals, so that numbers stand point under point
     if are_numbers(texts): …                set to the right
+    filled(table)                           without the figures that no row has
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
-from pipelines.report.report import Cell
+from pipelines.report.report import Cell, Table
 from pipelines.report.style import format_decimals, format_number, printable
 
-__all__ = ["are_numbers", "column_texts"]
+__all__ = ["are_numbers", "column_texts", "filled"]
 
 _NUMBER: Final = re.compile(r"\(?[−+-]?\d[\d\s.,]*(e[+-]?\d+)?(\s*±\s*[\d\s.,∞]+)?\)?(\s*×\s*10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\s*%)?|[–—-]|")
 _DIGITS = 6  # of the longest number that is still filled up with decimals
@@ -38,3 +40,16 @@ def column_texts(cells: Sequence[Cell], words: Callable[[str], str] = printable)
 def are_numbers(texts: Sequence[str]) -> bool:
     """Whether a column is one of numbers, with or without a deviation, a power of ten, a percent sign."""
     return any(texts) and all(_NUMBER.fullmatch(text) for text in texts)
+
+
+def filled(table: Table) -> Table:
+    """`table` as it is shown: a column that is empty in every row says nothing, and takes room from those that do."""
+    if table.keeps_empty or len(table.columns) <= 2 or not table.rows:  # of two columns the first names what the second says
+        return table
+    kept = [0, *(place for place in range(1, len(table.columns)) if any(_says_something(row[place]) for row in table.rows))]
+    return replace(table, columns=tuple(table.columns[place] for place in kept),
+                   rows=tuple(tuple(row[place] for place in kept) for row in table.rows))
+
+
+def _says_something(cell: Cell) -> bool:
+    return bool(cell.strip()) if isinstance(cell, str) else format_number(cell) != format_number(None)

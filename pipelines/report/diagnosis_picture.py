@@ -64,7 +64,8 @@ def _tells(one: Evidence) -> Table:
     names = sorted({c.against for c in one.curves}, key=lambda name: -max(share.get((name, j), 0.0) for j in joints))
     rows = tuple((name, *(round(100.0 * share[name, j], 1) if (name, j) in share else None for j in joints)) for name in names)
     return Table(("signal", *(f"joint {j} [%]" for j in joints)), rows,
-                 "Of the residual's power, what survives averaging in bins of each signal: that much may depend on it.")
+                 "Of the residual's power, what survives averaging in bins of each signal: that much may depend on it.",
+                 keeps_empty=True)
 
 
 def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:

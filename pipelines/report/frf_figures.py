@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.frf.result import COHERENCE, Curve, Method, ModeFound, Posture
+from pipelines.model.frf.result import COHERENCE, Curve, Method, ModeFound, Posture, same_bins
 from pipelines.report import style
 from pipelines.report.figures import Array
 from pipelines.report.report import Figure
@@ -48,7 +48,8 @@ def bode_figure(joint: int, drawn: Sequence[tuple[Posture, Mapping[str, Method]]
         grid[0, -1].legend(loc="lower left", fontsize="small")
 
     return Figure(f"bode-{joint}", f"Joint {joint}: input to position, with 95 % bands. Vertical lines: resonances "
-                  f"(solid) and antiresonances (dashed). Grey: coherence under {COHERENCE:g}, not reliable.", draw, (6.4, 5.6))
+                  f"(solid) and antiresonances (dashed). Grey: coherence under {COHERENCE:g}, not reliable. Beside the default "
+                  "stand the other methods where v excites the joint and their own coherence is not under that.", draw, (6.4, 5.6))
 
 
 def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Method]) -> None:
@@ -63,10 +64,14 @@ def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Meth
     for name in ("direct", "indirect", "closed-loop"):
         if (method := methods.get(name)) is not None:
             color, width, line = _LOOKS[name]
-            curve = method.curve
-            size.loglog(curve.frequency, np.abs(curve.value), color=color, linewidth=width, linestyle=line, label=_label(name))
-            phase.semilogx(curve.frequency, _phase(curve.value), color=color, linewidth=width, linestyle=line)
-            coherence.semilogx(curve.frequency, curve.coherence, color=color, linewidth=min(width, 1.0), linestyle=line)
+            curve, own = method.curve, method.curve.coherence
+            excited = same_bins(f, curve.frequency, default.resolution)[1]
+            judged = excited & ((own >= COHERENCE) | (name == "closed-loop"))
+            shown = np.where(judged, curve.value, np.nan)
+            size.loglog(curve.frequency, np.abs(shown), color=color, linewidth=width, linestyle=line, label=_label(name))
+            phase.semilogx(curve.frequency, _phase(shown), color=color, linewidth=width, linestyle=line)
+            own = np.where(excited, own, np.nan)
+            coherence.semilogx(curve.frequency, own, color=color, linewidth=min(width, 1.0), linestyle=line)
     band = _CONFIDENCE * default.curve.std
     size.fill_between(f, np.maximum(np.abs(value) - band, 1e-3 * np.abs(value)), np.abs(value) + band, color=style.SKY, alpha=0.5,
                       linewidth=0.0)

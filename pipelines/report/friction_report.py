@@ -164,7 +164,7 @@ def _summary(result: Result) -> Section:
         meanings.append((f"gravity, {name}", _GRAVITY[name]))
     text = ("Compare curves, not labels: several sets of numbers give one curve.",)
     table = Table(("parameter", *(joint.name for joint in result.joints), "unit"), tuple(rows),
-                  "As Table III of Kostić et al. 2004: value ± std.")
+                  "As Table III of Kostić et al. 2004: value ± std.", keeps_empty=True)
     return Section("Parameters", text, (table, Table(("parameter", "what it is"), tuple(meanings))))
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.log.atomic import write_file
-from pipelines.report.cells import are_numbers, column_texts
+from pipelines.report.cells import are_numbers, column_texts, filled
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.settled import settle
 from pipelines.report.side_by_side import Picture, drawn
@@ -116,6 +116,7 @@ def _section_words(section: Section) -> dict[str, object]:
 
 def _table_words(table: Table) -> dict[str, object]:
     """Cells as text, with the kind of each column."""
+    table = filled(table)
     rows = list(zip(*(column_texts(cells, _prose) for cells in zip(*table.rows, strict=True)), strict=True))
     columns = []
     for place, heading in enumerate(table.columns):

@@ -18,12 +18,16 @@ Cell = str | int | float | None  # of a table
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under named columns. A unit stands in a column's name: "torque [N m]". Numbers are formatted when drawn."""
+    """Rows under named columns. A unit stands in a column's name: "torque [N m]". Numbers are formatted when drawn.
+
+    A figure that no row has is no column where it is shown, unless it `keeps_empty` ones.
+    """
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     caption: str = ""
     tones: tuple[Tone, ...] = ()  # one a row, where rows are good or bad
+    keeps_empty: bool = False  # columns are joints, or results side by side: that nothing is known of one is an answer
 
 
 @dataclass(frozen=True)

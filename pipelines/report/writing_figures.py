@@ -68,6 +68,8 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
         return None
     a, b = plane(course.tip)
     every = max(1, -(-len(course.t) // _SEGMENTS))
+    missed = course.left if course.missed is None else course.missed  # none: a result of an earlier version
+    filtered = "" if course.missed is None or found.low_pass_hz is None else ", after the low-pass as in the text above"
 
     def draw(drawing: Drawing) -> None:
         from matplotlib.collections import LineCollection
@@ -77,8 +79,8 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
         lines = np.stack([points[:-1], points[1:]], axis=1)
         down = (np.ones(len(course.tip)) if course.drawn is None else course.drawn)[::every][:len(lines)] > 0.0
         for j, axis in enumerate(axes):
-            size = _largest_of(np.nan_to_num(np.abs(course.left[:, j])), every)
-            top = float(np.quantile(size, 0.99)) or 1.0
+            size = _largest_of(np.nan_to_num(np.abs(missed[:, j])), every)
+            top = float(size.max()) or 1.0  # the largest sample that the text names
             drawn = LineCollection(list(lines), cmap="magma_r", linewidths=np.where(down, 2.0, _FAINT).tolist())
             drawn.set_array(size[:len(lines)])
             drawn.set_clim(-0.15 * top, top)  # the lightest colour is no colour on white
@@ -95,7 +97,7 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
         axes[-1].set_xlabel(f"{_AXES[a]} [m]")
 
     return Figure(f"where-{found.name}",
-                  f"Where on its way the tip is when the model misses torque{_ways(course.drawn, 'thin')}.", draw,
+                  f"Where on its way the tip is when the model misses torque{filtered}{_ways(course.drawn, 'thin')}.", draw,
                   (6.0, 0.7 + 1.35 * len(joints)))
 
 

@@ -128,11 +128,12 @@ def _where_section(result: Result) -> Section:
     kinds = {"letters": f"letters, read back from the reference: '{log.text}'", "strokes": "stretches between standstills",
              "time": "stretches of time"}
     worst = [_worst(log, one, result.joints[one.joint - 1]) for one in log.largest]
-    text = (f"By {kinds[log.marks]}. Log {log.name}, after the low-pass.", *worst)
+    filtered = "" if log.low_pass_hz is None else ", after the low-pass"
+    text = (f"By {kinds[log.marks]}. Log {log.name}{filtered}.", *worst)
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (one.label, one.start, one.end, *(_short(100 * x) for x in one.relative_error)) for one in log.letters[:_MOST_LETTERS])
     table = Table(("where", "from [s]", "to [s]", *(f"{name} [%]" for name in result.joints)), rows,
-                  "What the model leaves in each, rms, over the torque of the whole log.")
+                  "What the model leaves in each, rms, over the torque of the whole log.", keeps_empty=True)
     figure = error_map_figure(log, result.joints)
     return Section("Where the torque is missed", text, (table,), () if figure is None else (figure,))
 

@@ -120,6 +120,7 @@ def test_what_shows_in_no_motion_is_named_before_the_search(tmp_path: Path, monk
     monkeypatch.setattr(design_excitation, "design", None)
     with pytest.raises(UsageError, match=": rotor_inertia:1 shows in no motion") as told:
         designed(tmp_path / "out", "spring:2", "rotor_inertia:1")
+    assert "'What these logs cannot tell'" in told.value.remedy  # the section's name, not the field's
     assert told.value.code == "RRID-C02"
     assert not (tmp_path / "out").exists()
 
@@ -142,11 +143,36 @@ def test_a_seed_and_a_number_of_evaluations_give_it_again(both: dict[str, Outcom
     (("spring:2",), {}, "two causes"), (("spring:2", "cogs:2"), {}, "cogging"), (("spring:2", "torque_offset:7"), {}, "1 to 3"),
     (("spring:2", "torque_offset:2"), {"purpose": "hold"}, "excitation"),
     (("spring:2", "torque_offset:2"), {"rest": False}, "at rest"),
-    (("spring:2", "rotor_inertia:1"), {}, "no motion")])
+    (("spring:2", "rotor_inertia:1"), {}, "no motion"),
+    (("spring:2", "spring:2"), {}, "spring:2 and spring:2 are one cause"),
+    (("cogging:2:order=7", "cogging:2"), {}, "one is the other with a number given")])
 def test_what_cannot_be_told_apart_is_refused(causes: tuple[str, ...], more: dict[str, object], words: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError) as refused:
         designed(tmp_path / "out", *causes, **more)
     assert words in str(refused.value)
+
+
+def test_equal_causes_are_refused_before_the_search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One wave is not another: only what is the same, or holds the same, is refused."""
+    monkeypatch.setattr(design_excitation, "refuse_hidden", lambda *given: pytest.fail("was not refused at once"))
+    with pytest.raises(UsageError) as refused:
+        designed(tmp_path / "out", "spring:2", "spring:2")
+    assert refused.value.code == "RRID-C02"
+    monkeypatch.undo()
+    assert designed(tmp_path / "waves", "cogging:2:order=7", "cogging:2:order=12", evaluations=2).result.apart is not None
+
+
+def test_a_plan_that_tells_apart_and_a_plain_one_lie_beside_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither takes the default folder of the other, in whichever order they are made."""
+    monkeypatch.chdir(tmp_path)
+    folders = []
+    for causes in ((), ("spring:2", "torque_offset:2"), ("spring:2", "cogging:2:order=7")):
+        settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=2, rehearse=False, tell_apart=causes)
+        folders.append(run_stage(design_excitation.STAGE, Request((), no_report=True), settings).folder)
+    assert [str(one) for one in folders[:2]] == ["runs/rrr-tue/excitation/design-excitation",
+                                                 "runs/rrr-tue/excitation-spring-2-torque_offset-2/design-excitation"]
+    assert len(set(folders)) == 3
+    assert all((one / "trajectory.h5").is_file() for one in folders)
 
 
 def test_a_log_names_the_robot_that_it_is_of(both: dict[str, Outcome[Result]], tmp_path: Path) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines import diagnose
+from pipelines import diagnose, run
 from pipelines.errors import UsageError
+from pipelines.model.diagnosis.memory import Memory
 from pipelines.stage import Outcome, Request, run_stage
 from tests.diagnose.sessions import but, session, written
 
@@ -125,10 +126,23 @@ def test_paths_go_before_what_logs_say_of_themselves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("settings", "words"), [
-    ({"without": ("cogs",)}, "cogging"), ({"blocks": 1}, "blocks"), ({"replicas": -1}, "replicas"), ({"seed": -1}, "seed"),
-    ({"filter": 0.0}, "low-pass"), ({"most": 0}, "findings")])
-def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path) -> None:
+    ({"without": ("cogs",)}, "cogging"), ({"blocks": 1}, "1 block"), ({"replicas": -1}, "replicas"), ({"seed": -1}, "seed"),
+    ({"filter": 0.0}, "low-pass"), ({"most": 0}, "findings"), ({"min_speed": (-1.0,)}, "--min-speed"),
+    ({"min_speed": (math.nan,)}, "--min-speed"), ({"min_speed": (0.1, 0.2)}, "--min-speed: 2 values for 3 joints"),
+    ({"decimate": 0}, "--decimate"), ({"decimate": -3}, "--decimate"), ({"filter": 450.0}, "sampled at 1000 Hz")])
+def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
+                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before any log is examined, let alone simulated."""
+    monkeypatch.setattr(Memory, "examined", lambda *given: pytest.fail("was not refused at once"))
     folder = written(tmp_path / "logs", session())
     with pytest.raises(UsageError) as refused:
         asked(folder, tmp_path / "out", **settings)
     assert words in str(refused.value)
+
+
+def test_a_run_refuses_them_before_its_first_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "_stages", lambda *given: pytest.fail("was not refused at once"))
+    folder = written(tmp_path / "logs", session())
+    settings = run.Settings(stages={"diagnose": diagnose.Settings(min_speed=(-1.0,))})
+    with pytest.raises(UsageError, match="--min-speed"):
+        run_stage(run.STAGE, Request((folder,), out=tmp_path / "out", no_report=True), settings)

@@ -15,6 +15,7 @@ from pipelines.errors import UsageError
 from pipelines.log.files import open_log
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.named_cause import wanted_cause
 from pipelines.model.simulation import Experiment, simulate
 from pipelines.stage import Outcome, Request, run_stage
@@ -134,3 +135,18 @@ def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_sa
     ((cause, reason),) = [(one.cause, one.reason) for one in outcome.result.rejected]
     assert (cause, outcome.result.findings, outcome.exit_code) == ("payload", (), 1)
     assert "the base parameters have not moved" in reason
+
+
+@pytest.mark.parametrize(("settings", "words"), [
+    ({"blocks": 0}, "--blocks"), ({"min_speed": (-1.0,)}, "--min-speed"), ({"min_speed": (0.1, 0.2)}, "2 values for 3 joints"),
+    ({"decimate": 0}, "--decimate"), ({"filter": -3.0}, "--filter"), ({"filter": 450.0}, "sampled at 1000 Hz")])
+def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
+                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    """C02, by the option's name, before any log is examined."""
+    monkeypatch.setattr(Memory, "examined", lambda *given: pytest.fail("was not refused at once"))
+    folder = written(tmp_path / "logs", session())
+    with pytest.raises(UsageError) as refused:
+        run_stage(extend.STAGE, Request((folder,), out=tmp_path / "out", no_report=True),
+                  extend.Settings(causes=("cogging:2",), **settings))  # type: ignore[arg-type]
+    assert words in str(refused.value)
+    assert refused.value.code == "RRID-C02"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Drawing
 
 from pipelines import frf
 from pipelines.errors import InputRejected, NothingMatched, UsageError
@@ -18,6 +19,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.frf.result import Posture
 from pipelines.model.parameter import Parameter
 from pipelines.model.rigid.choose import rigid_body
+from pipelines.report.frf_figures import draw_bode
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from sample_logs.bench_session import controllers_model, machine
 from tests.cli.commands import rrrid
@@ -169,7 +171,28 @@ def test_the_direct_method_is_warned_of() -> None:
     assert "direct method is biased, though its coherence looks fine" in words
 
 
-@pytest.mark.parametrize("settings", [Settings(estimator="wavelet"), Settings(resolution=1e-4), Settings(low=90.0, high=20.0)])
+def test_what_v_does_not_excite_is_not_drawn(outcome: Outcome[frf.Result]) -> None:
+    """v ends at 250 Hz, and averaged spectra of the input go on: beyond, they hold noise. No curve goes beyond the last line of v,
+    and none is drawn where its own coherence is too low for the table beside it."""
+    methods = {one.method: one for one in outcome.result.responses if one.posture[2] == outcome.result.postures[0].posture[2]}
+    end, direct = methods["closed-loop"].curve.frequency[-1], methods["direct"].curve
+    beyond = direct.frequency > end + 1.0
+    assert beyond.any()  # the stored response still has it
+    axes = Drawing().subplots(3)
+    draw_bode(axes, outcome.result.postures[0], methods)
+    for axis in axes:
+        for line in axis.lines:
+            drawn = np.asarray(line.get_xydata())
+            drawn = drawn[np.isfinite(drawn).all(axis=1)]
+            assert drawn[:, 0].max(initial=0.0) <= end + 0.2 or len(drawn) <= 2  # marks of modes and of the bound are two points
+    (orange,) = [line for line in axes[0].lines if line.get_label() == "direct"]
+    x, y = (np.asarray(part) for part in orange.get_data())
+    assert (direct.coherence[np.isfinite(y)] >= 0.7).all()
+    assert x.size == direct.frequency.size
+
+
+@pytest.mark.parametrize("settings", [Settings(estimator="wavelet"), Settings(resolution=1e-4), Settings(low=90.0, high=20.0),
+                                      Settings(postures=(0,)), Settings(postures=(1, -4)), replace(QUICK, postures=(2,))])
 def test_settings_that_make_no_sense(settings: Settings) -> None:
     """C02, named."""
     with pytest.raises(UsageError) as caught:

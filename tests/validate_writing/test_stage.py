@@ -9,18 +9,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure as Drawing
 
 from pipelines import validate_writing
 from pipelines.errors import InputRejected, NothingMatched, RrridError, UsageError
 from pipelines.log.canonical import digest_of
+from pipelines.log.derive import recording
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log, write_log
 from pipelines.log.model_file import Source, model_text, read_model, write_model
 from pipelines.log.robot import format_robot
+from pipelines.model.arm import Arm
+from pipelines.model.estimation.outcome import torques
+from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.parameter import Uncertainty
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
+from pipelines.model.writing.first_validation import first_validation
 from pipelines.model.writing.recognise import read_letters
+from pipelines.report.writing_figures import error_map_figure
 from pipelines.stage import Outcome, Request, run_stage
 from pipelines.validate_writing import STAGE, Result, Settings
 from sample_logs.make_model import synthetic_arm
@@ -59,6 +67,26 @@ def test_the_ends_of_a_log_are_no_place_where_a_model_is_worst(plain: Outcome[Re
         said = next(section.text for section in sections if section.title == "Where the torque is missed")[1:]
         assert len(said) == 3
         assert all(("tip at" in line) is says and ("says nothing of the model" in line) is not says for line in said)
+
+
+def test_the_map_shows_what_the_text_beside_it_says(plain: Outcome[Result]) -> None:
+    """A hum of 150 Hz on the torque, above the low-pass: neither the largest sample in words nor the darkest colour has it."""
+    log = open_log(plain.folder / "logs/writing-1.h5").log
+    arm = Arm.from_model(read_model("rrr"))
+    motion = reconstruct(recording(log), Reconstruction())
+    parts = torques(arm, log, motion)
+    hum = 3.0 * np.sin(2.0 * np.pi * 150.0 * log.t)[:, None]
+    found = first_validation(with_signal(log, tau=log.tau + hum), motion, arm, parts)
+    figure = error_map_figure(found, plain.result.joints)
+    assert figure is not None
+    assert "after the low-pass" in figure.caption
+    drawing = Drawing()
+    figure.draw(drawing)
+    paths = [next(one for one in axis.collections if isinstance(one, LineCollection)) for axis in drawing.axes[:3]]
+    for worst, path in zip(found.largest, paths, strict=True):
+        darkest = path.get_clim()[1]
+        assert darkest == pytest.approx(path.get_array().max(), rel=1e-9)
+        assert abs(worst.error) * 0.95 <= darkest < abs(worst.error) + 1.0
 
 
 def test_what_the_contract_promises(plain: Outcome[Result]) -> None:

@@ -16,6 +16,7 @@ from typing import Final
 
 from pipelines.errors import Check
 from pipelines.log.doctor.checks_motion import MOTION_CHECKS, both_ways
+from pipelines.log.doctor.checks_pace import PACE_CHECKS
 from pipelines.log.doctor.checks_signal import SIGNAL_CHECKS
 from pipelines.log.doctor.checks_subject import NotTested, Subject
 from pipelines.log.doctor.checks_time import CLOCK_CHECKS, MOTION_BAND, TIME_CHECKS
@@ -27,7 +28,7 @@ __all__ = ["CHECKS", "LogCheck", "NotTested", "Subject", "check_log", "check_tog
 
 LogCheck = Callable[[Subject], Sequence[Check | NotTested]]
 
-CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, MOTION_BAND, *UNIT_CHECKS, *SIGNAL_CHECKS, *MOTION_CHECKS)
+CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, *PACE_CHECKS, MOTION_BAND, *UNIT_CHECKS, *SIGNAL_CHECKS, *MOTION_CHECKS)
 
 
 # What follows from an input that is rejected for another reason is not worth a word of its own.

@@ -179,7 +179,7 @@ def _cut(recording: Recording, cuts: Sequence[int]) -> tuple[tuple[Recording, ..
     parts = [recording.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, recording.t.size], strict=True)]
     kept = tuple(part for part in parts if part.t.size >= max(FEWEST, _SHORTEST_PART * recording.t.size / len(parts)))
     dropped = recording.t.size - sum(part.t.size for part in kept)
-    return kept, (f"split into {len(kept)} part{'s' if len(kept) != 1 else ''}"
+    return kept, (f"{'one part is kept' if len(kept) == 1 else f'split into {len(kept)} parts'}"
                   f"{f', {dropped} samples of short parts left out' if dropped else ''}")
 
 

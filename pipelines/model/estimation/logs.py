@@ -13,7 +13,7 @@ from pipelines.fit.statistics import Triangles, gather
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.estimation.blocks import Stretches, by_blocks, by_stretches
-from pipelines.model.estimation.conditioning import HIGHEST, condition, cutoff_at, wanted_cutoff
+from pipelines.model.estimation.conditioning import condition, cutoff_at, wanted_cutoff
 from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
@@ -40,20 +40,6 @@ class Recipe:
     min_speed: tuple[float, ...] = (0.0,)
     known: Callable[[Motion], Array] | None = None  # torque (samples, joints) [N m] that is subtracted: of a given friction
     found: bool = False  # the cut-off, or that there is none, came of the fitted logs; one of a lower rate does without
-
-    def check(self, log: ExperimentLog) -> None:
-        """C02: what no log of this rate and so many joints can be done with."""
-        if len(self.min_speed) not in (1, log.n_joints):
-            raise UsageError("C02", f"{len(self.min_speed)} values for {log.n_joints} joints", where="--min-speed",
-                             remedy="give one, or one a joint")
-        if not all(0.0 <= speed < np.inf for speed in self.min_speed):
-            raise UsageError("C02", "a speed that is no number from zero up", where="--min-speed", remedy="give 0 or more [rad/s]")
-        if self.decimation is not None and self.decimation < 1:
-            raise UsageError("C02", f"every {self.decimation}th sample", where="--decimate", remedy="give 1 or more")
-        highest = HIGHEST / log.sample_time
-        if self.cutoff_hz is not None and not self.found and not 0.0 < self.cutoff_hz < highest:
-            raise UsageError("C02", f"a low-pass at {self.cutoff_hz:g} Hz for {log.name}, sampled at {1.0 / log.sample_time:g} Hz",
-                             where="--filter", remedy=f"give a frequency above 0 and below {HIGHEST:g} of the rate, {highest:g} Hz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +101,8 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
     """Fit the logs; the cut-off, where it is not given, is the highest that any of them asks for, and the same for all.
 
     Raises:
-        UsageError: C02, a recipe that does not fit them.
         InputRejected: T04, a log without a stretch that can be used; T08, too few equations.
     """
-    for log, _ in motions:
-        recipe.check(log)
     recipe = with_cutoff(recipe, motions)
     equations = equations_of(motions, recipe, columns, rows)
     refuse_too_few(equations, motions)
@@ -182,8 +165,6 @@ def judge(fitted: Fitted, motions: Motions, blocks: int, rows: Sequence[Rows] | 
         apart = by_blocks(found.equations, found.statistics.samples, blocks, max(one.guard for one in fitted_to),
                           triangles=isinstance(found.statistics, Triangles), weighted=fitted.weighted)
         return Judged(_of_whole_torque(apart.errors, fitted_to), "blocks", apart, (), ())
-    for log, _ in motions:
-        fitted.recipe.check(log)
     equations = equations_of(motions, fitted.recipe, found.columns, rows)
     apart = by_stretches(Stacked(equations), sum(one.samples for one in equations), max(blocks, _STRETCHES), found.beta)
     return Judged(_of_whole_torque(apart.errors, equations), "logs", apart, motions, tuple(equations))

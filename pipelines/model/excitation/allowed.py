@@ -71,8 +71,8 @@ def refuse_strange(settings: Asked) -> None:
             raise UsageError("C02", f"{value:g} is not positive and finite", where=where, remedy="give a positive number")
     if not all(map(math.isfinite, (*(settings.home or ()), *(settings.tip_box or ()), *settings.keep_out))):
         raise UsageError("C02", "a number is not finite", where="--home, --tip-box, --keep-out", remedy="give finite numbers")
-    if any(low > high for low, high in zip(settings.keep_out[::2], settings.keep_out[1::2], strict=False)):
-        raise UsageError("C02", "a band ends below where it begins", where="--keep-out", remedy="write 5,8 [Hz]")
+    if any(not 0.0 <= low <= high for low, high in zip(settings.keep_out[::2], settings.keep_out[1::2], strict=False)):
+        raise UsageError("C02", "a band begins below 0 Hz, or ends before it begins", where="--keep-out", remedy="write 5,8 [Hz]")
     for where, share in (("torque_share", settings.torque_share), ("speed_share", settings.speed_share)):
         if share > 1.0:
             raise UsageError("C02", f"{share:g} of the limits is more than there is", where=where, remedy="give 1 at most")

@@ -28,7 +28,7 @@ from pipelines.model.excitation.problem import DesignProblem, grams_of
 from pipelines.model.excitation.task import Task
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Alike", "Apart", "Pair", "alike", "judged_again", "refuse_hidden", "told_apart"]
+__all__ = ["Alike", "Apart", "Pair", "alike", "judged_again", "refuse_hidden", "refuse_one", "told_apart"]
 
 _SHARPNESS = 200.0  # [s/rad] of Coulomb friction
 _SHAPES = 4  # of a cause
@@ -69,6 +69,19 @@ class Apart:
     evaluations: int
 
 
+def refuse_one(pair: Pair, written: Sequence[str]) -> None:
+    """Two causes that are one, or of which one is the other with a number given; as they were `written`.
+
+    Raises:
+        UsageError: C02, no motion tells a cause from itself.
+    """
+    first, second = (start.items() for start in pair.starts)
+    if (pair.first.name, pair.first.joint) == (pair.second.name, pair.second.joint) and (first <= second or second <= first):
+        why = "are one cause" if first == second else "are not two causes: one is the other with a number given"
+        raise UsageError("C02", f"{' and '.join(written)} {why}; no motion tells a cause from itself", where="--tell-apart",
+                         remedy="name another cause or joint, or give both another number")
+
+
 def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
     """Before anything is designed.
 
@@ -84,7 +97,7 @@ def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
     if hidden:
         which = f"{' and '.join(hidden)} {'show' if len(hidden) > 1 else 'shows'}"
         raise UsageError("C02", f"{which} in no motion: the base parameters take it up", where="--tell-apart",
-                         remedy="see what diagnose says of it under not_testable")
+                         remedy="the report of diagnose says what would tell it, under 'What these logs cannot tell'")
 
 
 def _names(pair: Pair) -> tuple[str, str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.fit.rational import Known, Mode
 from pipelines.log.experiment import Array
@@ -14,7 +15,7 @@ from pipelines.model.frf.modes import relative_acceleration
 from pipelines.signal.frequency_response import FrequencyResponse, bands_below
 
 __all__ = ["Band", "Classified", "Curve", "Method", "ModeFound", "Posture", "Undecided", "classified", "methods_of", "posture_of",
-           "undecided"]
+           "same_bins", "undecided"]
 
 COHERENCE = 0.7  # Kostić et al. 2004, Section IV.D: a response of less is not reliable
 Band = tuple[float, float]
@@ -150,9 +151,7 @@ def _mode(mode: Mode) -> ModeFound:
 
 def difference(default: FrequencyResponse, other: FrequencyResponse) -> tuple[float | None, float | None]:
     """Largest share by which `other` is off beyond what noise explains, where its coherence looks fine, and the frequency."""
-    k = np.searchsorted(default.frequency, other.frequency)
-    k = np.minimum(k, len(default.frequency) - 1)
-    same = np.abs(default.frequency[k] - other.frequency) < 0.25 * default.resolution
+    k, same = same_bins(default.frequency, other.frequency, default.resolution)
     good = same & (other.coherence >= COHERENCE)
     if not good.any():
         return None, None
@@ -161,6 +160,13 @@ def difference(default: FrequencyResponse, other: FrequencyResponse) -> tuple[fl
     off = np.where(good, np.maximum(np.abs(other.response - base) - noise, 0.0) / np.maximum(size, 1e-300), 0.0)
     worst = int(np.argmax(off))
     return float(off[worst]), float(other.frequency[worst])
+
+
+def same_bins(default: Array, other: Array, resolution: float) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """Of each frequency of `other` the place of the same one in `default` [Hz], and whether there is one: where v excites nothing
+    the default has none, and another method makes its response of noise alone."""
+    k = np.minimum(np.searchsorted(default, other), len(default) - 1)
+    return k, np.asarray(np.abs(default[k] - other) < 0.25 * resolution)
 
 
 def posture_of(seen: Seen) -> Posture:

@@ -74,6 +74,7 @@ class Course:
     left: Array  # measured - model
     tip: Array  # [m] (points, 3) as executed
     drawn: Array | None = None  # (points,) 1 where it writes, 0 on the way between strokes; null: the reference is no text
+    missed: Array | None = None  # left after the low-pass, as `Largest` judges it; NaN where it does not
 
 
 @dataclass(frozen=True)
@@ -134,15 +135,15 @@ def first_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm, parts:
     whole, _ = _low_passed(log, motion, log.tau)
     wanted = reference_tip(log)
     marks, tip = marks_of(log, wanted), _tip(motion, arm)
-    size = _rms(measured)
+    size, judged = _rms(measured), _seen_from_both_sides(log, known, cutoff)
     return FirstValidation(
         log.name, log.experiment, log.role, "unknown" if log.controller is None else log.controller.law,
         int(known.sum()), tuple(joint_unit("tau", joint.revolute) for joint in log.robot.joints),
         _rms(left), size, _ratio(_rms(left), size), cutoff, _ratio(_rms(smooth[known]), _rms(whole[known])),
         {name: _rms(getattr(parts, name)[known]) for name in _PARTS}, marks.kind, marks.text,
         _letters(log, smooth, known, marks, _rms(whole[known])),
-        _largest(log, smooth, _seen_from_both_sides(log, known, cutoff), marks, tip), online,
-        _course(log, parts, tip, known, wanted) if draw else None)
+        _largest(log, smooth, judged, marks, tip), online,
+        _course(log, parts, tip, known, wanted, np.where(judged[:, None], smooth, np.nan)) if draw else None)
 
 
 def online_validation(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> tuple[Online, float]:
@@ -225,7 +226,8 @@ def _largest(log: ExperimentLog, left: Array, known: npt.NDArray[np.bool_], mark
     return tuple(found)
 
 
-def _course(log: ExperimentLog, parts: ArmTorque, tip: Array, known: npt.NDArray[np.bool_], wanted: Array | None) -> Course:
+def _course(log: ExperimentLog, parts: ArmTorque, tip: Array, known: npt.NDArray[np.bool_], wanted: Array | None,
+            missed: Array) -> Course:
     """Every so-manieth sample: the torque of a task is smooth over milliseconds."""
     rows = slice(None, None, max(1, -(-log.n_samples // _POINTS)))
     shown = np.where(known[:, None], log.tau, np.nan)[rows]
@@ -233,4 +235,4 @@ def _course(log: ExperimentLog, parts: ArmTorque, tip: Array, known: npt.NDArray
     model = parts.total[rows]
     down = None if wanted is None else pen_down(wanted)
     return Course((log.t - log.t[0])[rows], shown, model, left=shown - model, tip=tip[rows],
-                  drawn=None if down is None else down[rows].astype(np.float64), **split)
+                  drawn=None if down is None else down[rows].astype(np.float64), missed=missed[rows], **split)

@@ -17,7 +17,7 @@ from pipelines.log.doctor.faults import quantum, spikes, time_base, torque_limit
 from pipelines.log.files import Opened
 from pipelines.log.limits import percent, sentinels
 from tests.faulty import healthy_without_reference, turning
-from tests.healthy import changed, good_log, healthy_logs, make_log, one_joint, rest, rows, stops, with_signal
+from tests.healthy import changed, fourier, good_log, healthy_logs, make_log, one_joint, rest, rows, stops, with_signal
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
@@ -255,3 +255,14 @@ def test_a_held_joint_that_trembles_by_some_encoder_steps_is_sampled_well_enough
     trembling = log.q.copy()
     trembling[:, 0] = log.q[0, 0] + 1e-5 * np.rint(4.0 * np.sin(0.5 * np.pi * np.arange(log.n_samples) + 0.4))
     assert [c for c in check_log(with_signal(log, q=trembling)) if c.code == "RRID-T09" and c.level != "ok"] == []
+
+
+@pytest.mark.parametrize(("slower", "experiment", "joint", "said"), [
+    (1000.0, "excitation", None, True), (1000.0, "friction", 2, True), (100.0, "excitation", None, False),
+    (10.0, "excitation", None, False), (1000.0, "hold", None, False), (1e5, "excitation", None, False)])
+def test_an_arm_that_creeps_is_asked_for_the_unit_of_time(slower: float, experiment: str, joint: int | None, said: bool) -> None:
+    """S08 where every joint is slower than 0.02 rad/s at less than 10 Hz, and thousandths of a second make it an arm's motion."""
+    path = fourier(np.random.default_rng(1))
+    log = make_log(path if joint is None else one_joint(path, joint - 1), experiment, joint=joint)
+    slow = replace(with_signal(log, t=slower * log.t), sample_time=slower * log.sample_time)
+    assert any("with steps in ms" in c.message for c in check_log(slow) if c.code == "RRID-S08") == said

@@ -70,6 +70,15 @@ def test_t01_a_clock_that_was_set_back_splits_the_log() -> None:
     assert all((np.diff(part.t) > 0).all() for part in parts)
     assert levels(checks) == {"T01": "repair"}
     assert "line 502" in checks[0].message
+    assert "split into 2 parts" in checks[0].message
+
+
+def test_t01_a_part_too_short_for_a_log_is_no_part_of_a_split() -> None:
+    t = recording().t.copy()
+    t[3:] -= 0.3
+    parts, checks = mend(clocked(t), Limits())
+    assert [part.t.size for part in parts] == [1197]
+    assert "one part is kept, 3 samples of short parts left out" in checks[0].message
 
 
 def test_t01_a_clock_that_runs_wild_is_refused() -> None:
