@@ -138,6 +138,21 @@ def test_what_cannot_be_mended_is_refused_with_place_and_remedy(name: str, folde
     assert not (folder.parent / "out").exists()
 
 
+def test_c06_where_nothing_matches_the_files_that_are_there_are_named(folder: Path) -> None:
+    """Recordings first, a few of them; where --source was given nobody is told to give it."""
+    (folder / "run.csv").unlink()
+    with pytest.raises(NothingMatched, match="no file lies there"):
+        run(folder)
+    (folder / "notes.txt").write_text("nothing")
+    for k in range(6):
+        write(folder, text(good()), f"day_{k}.npy")
+    with pytest.raises(NothingMatched) as caught:
+        run(folder)
+    assert "there lie day_0.npy, day_1.npy, day_2.npy, day_3.npy, day_4.npy and 2 more" in caught.value.message
+    assert "--source" not in caught.value.remedy
+    assert "match" in caught.value.remedy
+
+
 def test_f15_a_file_that_is_still_written(folder: Path) -> None:
     import fcntl
 

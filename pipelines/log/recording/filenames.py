@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
 from pipelines.errors import EnvironmentFault, UsageError
 
-__all__ = ["files_below", "fill", "match"]
+__all__ = ["files_below", "fill", "lying_there", "match"]
 
 _MOST_FILES = 100_000
+_NAMED = 5  # files that a message names
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^{}]+(?:\{\d+(?:,\d*)?\}[^{}]*)*))?\}")
 
 
@@ -46,6 +47,15 @@ def match(patterns: str | tuple[str, ...], relative: str) -> dict[str, str] | No
         if found := _compiled(pattern).fullmatch(relative):
             return {"stem": Path(relative).stem} | found.groupdict(default="")
     return None
+
+
+def lying_there(names: Sequence[str], endings: Collection[str]) -> str:
+    """What a message says of the files in a folder, those with the `endings` of recordings first."""
+    if not names:
+        return "no file lies there"
+    first = sorted(names, key=lambda name: Path(name).suffix.lower() not in endings)[:_NAMED]
+    more = f" and {len(names) - len(first)} more" if len(names) > len(first) else ""
+    return f"there {'lies' if len(names) == 1 else 'lie'} {', '.join(first)}{more}"
 
 
 def fill(template: str, groups: Mapping[str, str], where: object) -> str:

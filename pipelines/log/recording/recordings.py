@@ -87,8 +87,9 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
               if (groups := filenames.match(spec.match, name)) is not None]
     if not sources and not tables:
         patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
-        raise NothingMatched("C06", f"no file matches {patterns}", where=folder,
-                             remedy="give the folder of the recordings with --source")
+        there = filenames.lying_there(names, _RECORDINGS)
+        raise NothingMatched("C06", f"no file matches {patterns}; {there}", where=folder, remedy="correct match in the recipe" + (
+            "" if source else ", or give the folder of the recordings with --source"))
     return Material(recipe, path, folder, replace(arm, drive=drive), drive, tuple(sources), tuple(tables),
                     tuple(name for name in names if name not in read and Path(name).suffix.lower() in _RECORDINGS),
                     (path, *described, *(folder / name for name in read)),
