@@ -100,9 +100,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 def _refuse_no_posture(settings: Settings, most: int) -> None:
     """C02: a number that no posture can have, or none of the `most` that a joint was recorded in; 0: not known yet."""
     if wrong := [number for number in settings.postures if number < 1 or 0 < most < number]:
-        there = f"give 1 to {most}" if most else "they are counted from 1"
+        there = "they are counted from 1" if not most else "give 1" if most == 1 else f"give 1 to {most}"
         raise UsageError("C02", f"no joint has a posture {wrong[0]}", where="--posture",
-                         remedy=f"{there}, as they stand in the report under 'How it was measured'")
+                         remedy=f"{there}, as numbered in the report under 'How it was measured'")
 
 
 def _chosen(inputs: Inputs) -> list[ExperimentLog]:
