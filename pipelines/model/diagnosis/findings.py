@@ -62,8 +62,7 @@ def findings(found: Found, ruling: Ruling, simulated: Sequence[Simulation], prep
     order = _told([(best.effect.name, best.effect.joint) for step in steps if (best := step.best) is not None], taken)
     told = worth(found, ruling.named, order, simulated, prepared, beside, blocks) if order else []
     each = once_each(
-        _finding(found, steps[place], best, place, models[place] if len(places) == 1 else (one.before, one.after), covariance,
-                 taken[place], floor, one.gain, draw)
+        _finding(found, steps[place], best, place, (one.before, one.after), covariance, taken[place], floor, one.gain, draw)
         for places, one in zip(order, told, strict=True) for place in places if (best := steps[place].best) is not None)
     return Causes(each, (told[0].simulated[0], told[-1].simulated[1]) if told else ())
 
