@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected, UsageError
 from pipelines.log.places import slug
 from pipelines.log.stored_result import StoredResult, read_result
 
@@ -20,13 +20,21 @@ def read_any_result(path: Path) -> StoredResult:
 
     Raises:
         UsageError: C04, there is none, or the run has passed the stage over.
-        InputRejected: as `read_result`, of the run's.
+        InputRejected: as `read_result`.
     """
     if not path.is_file() and not (path / "result.json").is_file():
         for run in path.parents[:2]:
-            if (run / "result.json").is_file() and (found := _stage_of(read_result(run), path)) is not None:
+            if (run / "result.json").is_file() and (found := _within(run, path)) is not None:
                 return found
     return read_result(path)
+
+
+def _within(run: Path, path: Path) -> StoredResult | None:
+    """Of a result that can be read: what somebody else left beside a folder that is not there is none of its faults."""
+    try:
+        return _stage_of(read_result(run), path)
+    except InputRejected:
+        return None
 
 
 def _stage_of(run: StoredResult, path: Path) -> StoredResult | None:
@@ -43,5 +51,5 @@ def _stage_of(run: StoredResult, path: Path) -> StoredResult | None:
 def _steps(run: StoredResult) -> Iterator[tuple[tuple[str, ...], Mapping[str, Any]]]:
     """Every stage with the folder it has there: below that of its robot and day, where there are several."""
     if run.command == "run":
-        yield from (((one["name"],), one) for one in run.object["stages"])
-        yield from (((slug(part["name"]), one["name"]), one) for part in run.object["runs"] for one in part["stages"])
+        yield from (((one["name"],), one) for one in run.object.get("stages") or ())
+        yield from (((slug(part["name"]), one["name"]), one) for part in run.object.get("runs") or () for one in part["stages"])

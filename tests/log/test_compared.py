@@ -71,6 +71,17 @@ def test_a_stage_of_a_run_is_a_result(runs: Path) -> None:
     assert read_any_result(several / slug("arm, 2026-01-05") / "diagnose").object["verdict"] == "unknown"
 
 
+def test_what_lies_beside_a_folder_that_is_not_there_is_none_of_its_faults(tmp_path: Path) -> None:
+    """A run without stages of several days; and a result.json of some other program."""
+    (tmp_path / "run").mkdir()
+    provenance = json.dumps({"tool": "rrrid", "command": "run", "outputs": {}})
+    for text in (json.dumps({"command": "run"}), "[]", "{"):
+        (tmp_path / "run/result.json").write_text(text)
+        (tmp_path / "run/provenance.json").write_text(provenance)
+        with pytest.raises(UsageError, match=f"C04.*{tmp_path}/run/frf"):
+            read_any_result(tmp_path / "run/frf")
+
+
 def test_what_can_be_compared_instead_is_named(runs: Path) -> None:
     """The models of both; the stage within the run; or that there is no model."""
     estimate, extend, run = (read_result(runs / "monday" / name) for name in ("estimate-bps", "extend", "run"))

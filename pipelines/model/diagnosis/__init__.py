@@ -4,12 +4,12 @@
 causes that somebody names. Where to look, in that order:
 
     asked           settings, gates, inputs, memory
-    rows            data, bridged, sharper, stretch, signals; kept, what was laid already; ripple and whitening, noise of rows
+    rows            data, sharper, stretch, signals; kept, what was laid already; ripple and whitening, noise of rows
     nominal model   nominal, dissipation, curves, change_of_sign, terms_apart; linear, least squares around a solution
     what acts       exact, record, slopes, refit; beside, what is known from elsewhere; numbers, as they are reported
     responses       responding, compliance: what gives way is named by them, and subtracted first
 
-    floor           floored: by a twin (twin, drive_noise, imperfections, clean, waves), or stored (calibration, calibrated,
+    floor           floored: by a twin (replay, twin, drive_noise, imperfections, clean, waves), or stored (calibration, calibrated,
                     calibration_file); motion_floor and by_speed, of other motion; thresholds, wide, what has to be exceeded
     search          case, candidates, screen, through; gate, hypotheses, ledger, search; parsimony, elsewhere, unnameable, wanted
     second look     second_look, in white rows; steadied, unbiased, what noise and sampling did to the numbers

@@ -24,10 +24,11 @@ from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, rows_of
+from pipelines.model.diagnosis.replay import experiment_of
 from pipelines.model.diagnosis.twin import imperfect, replica
 from pipelines.model.diagnosis.waves import without_waves
 from pipelines.model.estimation.logs import Motions, Recipe
-from pipelines.model.simulation import Experiment, Noise, Plant, choose_step, simulate
+from pipelines.model.simulation import Noise, Plant, choose_step, simulate
 
 __all__ = ["drive_noise", "white"]
 
@@ -62,7 +63,7 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     step = float(np.median(np.diff(own.t)))
     rough = np.square(_roughness(mine, step))
     guess = np.sqrt(rough * step / log.sample_time)
-    experiment = Experiment.of_log(log)
+    experiment = experiment_of(log)
     chosen = choose_step(Plant.of(model.nominal), experiment)  # fine enough for the noisy one too
 
     def simulated(drawn: tuple[Array, int]) -> _Replica:

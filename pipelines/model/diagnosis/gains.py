@@ -177,7 +177,8 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
         longest = _SOFT if soft else _LONGEST
         found = _each(arms, logs, soft, longest)
         if _open(found[0], found[-1]) and any(log.n_samples * log.sample_time > longest for log, _ in logs):
-            found = _each(arms, logs, soft, _LONGER * longest)
+            longer = _each(arms, logs, soft, _LONGER * longest)
+            found = found if longer[0].how == "none" else longer
         if found[0].how != "none":
             return found
     found = _each(arms, logs, soft, np.inf, closed=False)

@@ -23,7 +23,7 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["apart_from", "best_form", "fitted", "laid_whole", "plainer"]
 
-_CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less
+_CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less, and a cause in a shape that is not the best
 _NEARLY = 0.95  # of what the best shape explains
 _MOST, _OTHERS = 0.5, 3  # of what a joint leaves, that a cause has to take to be asked in other shapes; how many these are
 _TELLS = 3.0  # standard deviations of a further number
@@ -100,26 +100,27 @@ def _takes_most(now: Refined, one: Screened) -> bool:
     return bool(one.gain[0] > _MOST * float(own @ own))
 
 
-def _near_best(case: Case, now: Refined, one: Screened) -> list[tuple[float, Effect, Array]]:
-    """(gain, shape, amplitudes) of the screened shapes that explain nearly the most, best first."""
+def _near_best(case: Case, now: Refined, one: Screened) -> list[Effect]:
+    """The screened shapes that explain nearly the most, best first."""
     found = []
     for laid in lay_family(case.data, one.family, case.arms(now.model).of(one.family)):
         gains, _, _ = gains_of(laid, now.fit, now.residual[None])
         for k in np.flatnonzero(gains[:, 0] >= _NEARLY * one.gain[0]).tolist():
-            shape = one.family.shapes[laid.first + k].full()
-            found.append((float(gains[k, 0]), shape, _amplitudes(now.fit, laid_whole(case.data, shape, now.model.arm))))
-    return sorted(found, key=lambda each: -each[0])
+            found.append((float(gains[k, 0]), one.family.shapes[laid.first + k].full()))
+    return [shape for _, shape in sorted(found, key=lambda each: -each[0])]
 
 
 def _borne_out_elsewise(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried | None:
-    """In another of the screened shapes that explain nearly the most, which held-out time bears out; None where there is none.
+    """In another of the screened shapes that explain nearly the most, which held-out time clearly bears out, for it is asked more
+    than once; None where there is none.
 
     Over less than a turn, friction that is greatest once in a turn and friction that is twice are alike; over other angles they
     are not.
     """
-    others = [shape for _, shape, _ in _near_best(case, now, one) if shape != one.shape[0].full()][:_OTHERS]
+    others = [shape for shape in _near_best(case, now, one) if shape != one.shape[0].full()][:_OTHERS]
     tried = [_refitted(case, now, one, shape, error) for shape in others]
-    return min((other for other in tried if other.possible and other.error < 1.0), key=lambda other: other.error, default=None)
+    confirmed = [other for other in tried if other.possible and other.error < _CONFIRMED]
+    return min(confirmed, key=lambda other: other.error, default=None)
 
 
 def _in_range(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried | None:
@@ -129,8 +130,8 @@ def _in_range(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried 
     Of a drift that is seen only at its beginning, size and time constant grow together beyond anything; what the logs tell is how
     fast it begins. Of all ends that it may come to, the nearest one goes least beyond what was seen.
     """
-    able = [(float(np.linalg.norm(amplitudes)), shape) for _, shape, amplitudes in _near_best(case, now, one)
-            if shape.possible(shape.values(amplitudes))]
+    near = [(shape, _amplitudes(now.fit, laid_whole(case.data, shape, now.model.arm))) for shape in _near_best(case, now, one)]
+    able = [(float(np.linalg.norm(amplitudes)), shape) for shape, amplitudes in near if shape.possible(shape.values(amplitudes))]
     if not able:
         return None
     _, best = min(able, key=lambda each: each[0])

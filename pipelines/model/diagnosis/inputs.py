@@ -17,7 +17,6 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.bridged import bridged
 from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.diagnosis.sharper import sharpened
@@ -84,7 +83,6 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     """
     if not logs.identify:
         raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
-    logs = replace(logs, **{part: tuple(map(bridged, getattr(logs, part))) for part in ("identify", "validate", "reference")})
     columns = _columns(logs, arm)
     how = Reconstruction()
     parts = (logs.identify, logs.validate, logs.reference)
@@ -94,7 +92,9 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
                          (*motions[:judged.start], *motions[judged.stop:]))
     sharp = iter(sharpened(motions, recipe))
     fitted, judging, referring = (tuple(islice(sharp, len(part))) for part in parts)
-    return _laid(logs, columns, recipe, fitted, judging, referring)
+    prepared = _laid(logs, columns, recipe, fitted, judging, referring)
+    refuse_too_few([one.equations for one in prepared.data.logs], fitted, 0)  # what so few do not tell, has no name
+    return prepared
 
 
 def narrowed(prepared: Prepared, cutoff_hz: float, min_speed: Sequence[float]) -> Prepared:
@@ -118,7 +118,6 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
         first += len(part)
     data, judge, reference = rows
     assert data is not None  # prepare refuses logs without any to fit
-    refuse_too_few([one.equations for one in data.logs], fitted, 0)  # what so few do not tell, has no name
     return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
 
 

@@ -30,10 +30,11 @@ from pipelines.model.diagnosis.drive_noise import drive_noise
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.imperfections import DriveNoise
 from pipelines.model.diagnosis.inputs import Prepared
+from pipelines.model.diagnosis.replay import experiment_of
 from pipelines.model.diagnosis.twin import imperfect, replayable, replica
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed
-from pipelines.model.simulation import Experiment, Noise, Simulated, Step, choose_steps, simulate_together
+from pipelines.model.simulation import Noise, Simulated, Step, choose_steps, simulate_together
 
 __all__ = ["motion_floor", "noise_in"]
 
@@ -114,11 +115,11 @@ class _InOrder:
     def steps(self, logs: Sequence[ExperimentLog]) -> dict[float, Step]:
         """Chosen in the first log of each sample time: what is a tenth of the noise there is little of it in the next."""
         first = {log.sample_time: log for log in reversed(logs)}
-        return choose_steps(self.plant, [Experiment.of_log(log) for log in first.values()], self._drives)
+        return choose_steps(self.plant, [experiment_of(log) for log in first.values()], self._drives)
 
     def powers(self, pieces: Sequence[_Piece], steps: Mapping[float, Step]) -> list[tuple[Array, Indices]]:
         """Of each log (joints,) [N m^2] sum of squares of what the model leaves of its own replicas, and of how many rows."""
-        experiments = [Experiment.of_log(one.log) for one in pieces]
+        experiments = [experiment_of(one.log) for one in pieces]
         done = simulate_together(self.plant, experiments, self._drives, range(self.seed, self.seed + _COPIES), steps)
         return [self._power(one, simulated) for one, simulated in zip(pieces, done, strict=True)]
 

@@ -178,7 +178,8 @@ def _nothing(found: Found, plain: Found, elsewhere: str, doubts: dict[int, str],
     alone = _elsewhere(near_other_motion(without_steps(plain, floor, known), plain, case, floor), plain, case, floor, known)
     reason = alone.reason
     if alone.verdict == "unknown":
-        reason = elsewhere or (TOO_SLIGHT if few == TOO_SLIGHT else f"{alone.reason}: {next(iter(doubts.values()), '')}")
+        said = "" if alone.reason.endswith(_NO_MODEL) else next(iter(doubts.values()), "")
+        reason = elsewhere or (TOO_SLIGHT if few == TOO_SLIGHT else f"{alone.reason}: {said}" if said else alone.reason)
     if not known and alone.verdict == "nothing-wrong" and (where := much_without_name(found, doubts, floor)):
         alone, reason = replace(alone, verdict="unknown"), f"{where} {_LAW_WITHOUT_NAME}"
     if few and alone.verdict == "nothing-wrong" and case.changed is None:  # of what has changed, other motion may leave a little

@@ -21,11 +21,12 @@ from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.imperfections import DriveNoise, small_loads
 from pipelines.model.diagnosis.nominal import Fit, fit_columns, law_slopes, rows_of
+from pipelines.model.diagnosis.replay import as_recorded, experiment_of
 from pipelines.model.diagnosis.whitening import Whitening
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Noise, Simulated, simulate_together
+from pipelines.model.simulation import Noise, Simulated, simulate_together
 
 __all__ = ["Twin", "imperfect", "make_twin", "not_replayable", "replayable", "replica"]
 
@@ -82,7 +83,7 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
     found = []
     for place, log in enumerate(logs):
         try:
-            Experiment.of_log(log)
+            experiment_of(log)
         except InputRejected:
             continue
         found.append(place)
@@ -90,15 +91,15 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
 
 
 def not_replayable(logs: Sequence[ExperimentLog]) -> str:
-    """Why the first of the logs that describe their controller cannot be replayed all the same, and what to do; empty where none
+    """Why the first of the logs that describe their controller cannot be replayed all the same; empty where none
     describes it."""
     for log in logs:
         if log.controller is None or log.controller.law == "unknown":
             continue
         try:
-            Experiment.of_log(log)
+            experiment_of(log)
         except InputRejected as refused:
-            return f"of {log.name}: {refused.message}" + (f"; {refused.remedy}" if refused.remedy else "")
+            return f"of {log.name}: {refused.message}"
     return ""
 
 
@@ -113,7 +114,7 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
     columns = model.columns
     drawn = Noise(noise.white, np.zeros_like(noise.white))
     seeds = range(seed, seed + replicas)
-    every = simulate_together(model.nominal, [Experiment.of_log(motions[place][0]) for place in places], drawn, seeds)
+    every = simulate_together(model.nominal, [experiment_of(motions[place][0]) for place in places], drawn, seeds)
     runs = dict(zip(places, every, strict=True))
     found = []
     for k in range(replicas):
@@ -141,6 +142,6 @@ def replica(real: tuple[ExperimentLog, Reconstructed], done: Simulated, k: int,
     """Replica `k`, reconstructed as the log was: another tuning, in which ends are less certain, would be no noise of the drive."""
     log, found = real
     signals = {name: Signal(values, log.signals[name].units, log.signals[name].long_name)
-               for name, values in (("t", log.t), ("q", done.q[k]), ("tau", done.tau[k]))}
+               for name, values in (("t", log.t), ("q", as_recorded(log, done.q[k])), ("tau", as_recorded(log, done.tau[k])))}
     copy = replace(log, name=f"{log.name} twin {k + 1}", torque=None, signals=signals, period=None, derived=None)
     return copy, reconstruct(copy, recipe.how, observers=None if found.mean is not None else found.observers)

@@ -31,9 +31,10 @@ from pipelines.model.diagnosis.data import Data, gather
 from pipelines.model.diagnosis.drive_noise import white
 from pipelines.model.diagnosis.inputs import Prepared
 from pipelines.model.diagnosis.refit import Refined, moved_by
+from pipelines.model.diagnosis.replay import as_recorded, experiment_of
 from pipelines.model.diagnosis.search import Found, Step
 from pipelines.model.diagnosis.twin import replayable, replica
-from pipelines.model.simulation import Experiment, Noise, Simulated, choose_steps, runs_alone, simulate_together
+from pipelines.model.simulation import Noise, Simulated, choose_steps, runs_alone, simulate_together
 
 __all__ = ["smoothed_away", "unbiased"]
 
@@ -94,13 +95,13 @@ def smoothed_away(arm: Arm, noise: Array, data: Data, prepared: Prepared, seed: 
         place, seeds = piece
         log = logs[place]
         done, = simulate_together(arm, [experiments[place]], drawn, seeds, steps)
-        holes = replace(done, q=_as_missing(done.q, log.q), tau=_as_missing(done.tau, log.tau))
+        holes = replace(done, q=_as_missing(as_recorded(log, done.q), log.q), tau=_as_missing(as_recorded(log, done.tau), log.tau))
         return np.asarray(np.sum([_left(arm, holes, k, data, prepared, place) for k in range(len(seeds))], axis=0))
 
     seeds = tuple(range(seed, seed + _RUNS))
     mean = [np.zeros(one.rows * one.n_joints) for one in data.logs]
     try:
-        experiments = {place: Experiment.of_log(logs[place]) for place in places}
+        experiments = {place: experiment_of(logs[place]) for place in places}
         steps = choose_steps(arm, list(experiments.values()), drawn)
         pieces = [(place, some) for place in sorted(places, key=lambda place: -logs[place].n_samples)
                   for some in ([(one,) for one in seeds] if runs_alone(arm, experiments[place]) else [seeds])]

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.log.limits import GAP_TICKS
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.filters import LowPass, choose_decimation, design_low_pass
 
 __all__ = ["HIGHEST", "Conditioning", "condition", "cutoff_at", "wanted_cutoff"]
 
 HIGHEST = 0.4  # of the rate: a low-pass from there on takes nothing away that would be worth it
-_GAP = 1.5  # sample times between two samples: one is missing
 _SHORT = 0.5  # of the longest stretch without a gap
 
 
@@ -53,15 +53,24 @@ def _highest_frequency(motion: Motion, rate: float) -> float:
     """Below it lies 99.9 % of the power of the speed, joints scaled alike [Hz].
 
     Of stretches without a gap, each by itself: laid end to end, a jump would count as the fastest motion. Short ones, whose own
-    ends are that as well, count only where there are no longer ones.
+    ends are that as well, count only where there are no longer ones; where a few samples are lost, a straight line does.
     """
     finite = np.isfinite(motion.dq).all(axis=1)
     known, t = motion.dq[finite], motion.t[finite]
     scale = known.std(axis=0)
     x = (known - known.mean(axis=0))[:, scale > 0.0] / scale[scale > 0.0]
-    stretches = np.split(x, 1 + np.flatnonzero(np.diff(t) > _GAP / rate))
+    cut = 1 + np.flatnonzero(np.diff(t) > GAP_TICKS / rate)
+    stretches = [_even(own, some, rate) for own, some in zip(np.split(t, cut), np.split(x, cut), strict=True)]
     longest = max(map(len, stretches))
     power = np.sum([np.sum(np.abs(np.fft.rfft(some * np.hanning(len(some))[:, None], longest, axis=0)) ** 2, axis=1)
                     for some in stretches if len(some) >= _SHORT * longest], axis=0)
     total = np.cumsum(power)
     return float(np.searchsorted(total, 0.999 * total[-1]) + 1) * rate / longest if total[-1] > 0.0 else rate
+
+
+def _even(t: Array, x: Array, rate: float) -> Array:
+    """`x` (samples, joints) at an even rate."""
+    if len(t) < 2 or np.diff(t).max() < 1.5 / rate:
+        return x
+    every = np.arange(t[0], t[-1] + 0.5 / rate, 1.0 / rate)
+    return np.stack([np.interp(every, t, column) for column in x.T], axis=1)

@@ -24,6 +24,15 @@ def motion(gap: float, missing: str) -> Motion:
     return Motion(t, np.zeros_like(dq), dq, np.zeros_like(dq))
 
 
+@pytest.mark.parametrize("every", [20, 50, 100])
+def test_neither_are_samples_that_were_lost_here_and_there(every: int) -> None:
+    """Cut at each of them, stretches would be too short to tell a frequency."""
+    whole = motion(0.0, "samples")
+    keep = np.arange(len(whole.t)) % every != every - 1
+    holed = Motion(*(x[keep] for x in (whole.t, whole.q, whole.dq, whole.ddq)))
+    assert wanted_cutoff(holed, RATE) == pytest.approx(wanted_cutoff(whole, RATE), rel=0.05)
+
+
 @pytest.mark.parametrize("missing", ["samples", "numbers"])
 @pytest.mark.parametrize("gap", [0.0, 0.1, 0.4, 0.8])
 def test_a_gap_is_no_fast_motion(gap: float, missing: str) -> None:
