@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.model.diagnosis.result import Curve, Diagnosis, Evidence, Spectrum
 from pipelines.report import style
 from pipelines.report.diagnosis_words import floor_words
-from pipelines.report.figures import draw_measured, draw_modelled, envelope, joint_axes, joint_size
+from pipelines.report.figures import broken_at_gaps, draw_measured, draw_modelled, envelope, joint_axes, joint_size
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure, Section, Table
 from pipelines.report.sections import joint_signal_figure
@@ -98,8 +98,8 @@ def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:
 
 def _compared(axes: Sequence[Axes], one: Evidence, unit: str) -> None:
     for j, axis in enumerate(axes):
-        draw_measured(axis, *envelope(one.t, one.measured[:, j]))
-        draw_modelled(axis, *envelope(one.t, one.predicted[:, j]), "predicted")
+        draw_measured(axis, *envelope(*broken_at_gaps(one.t, one.measured[:, j])))
+        draw_modelled(axis, *envelope(*broken_at_gaps(one.t, one.predicted[:, j])), "predicted")
     _over_time(axes, f"torque [{unit}]")
 
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["draw_intervals", "draw_joint_signals", "draw_measured", "draw_modelled", "draw_timeline", "envelope", "joint_axes",
-           "joint_size", "merge_spans", "true_spans"]
+__all__ = ["broken_at_gaps", "draw_intervals", "draw_joint_signals", "draw_measured", "draw_modelled", "draw_timeline", "envelope",
+           "joint_axes", "joint_size", "merge_spans", "true_spans"]
 
 Array = npt.NDArray[np.float64]
 Span = tuple[float, float]
@@ -101,7 +101,7 @@ def draw_joint_signals(axes: Sequence[Axes], t: Array, values: Array, unit: str,
         flagged.reshape(-1, 1) if flagged.ndim == 1 else flagged, values.shape)
     t, label = _drawable_time(t)
     for axis, name, column, mask in zip(axes, names, values.T, flags.T, strict=True):
-        _line(axis, *_broken_at_gaps(t, column), color=style.BLUE, width=1.1)
+        _line(axis, *broken_at_gaps(t, column), color=style.BLUE, width=1.1)
         _mark(axis, t, column, mask)
         axis.set_title(printable(name, 60), pad=3.0)
         axis.margins(x=0.01, y=0.12)
@@ -152,7 +152,7 @@ def _drawable_time(t: Array) -> tuple[Array, str]:
     return (t, "time [s]") if usable else (np.arange(t.size, dtype=np.float64), "sample")
 
 
-def _broken_at_gaps(t: Array, x: Array) -> tuple[Array, Array]:
+def broken_at_gaps(t: Array, x: Array) -> tuple[Array, Array]:
     """A NaN where five samples or more are missing in time: nothing was measured there, so no line is drawn."""
     step = np.diff(t)
     rising = step[step > 0.0]
