@@ -11,8 +11,9 @@ import numpy as np
 from pipelines.model.diagnosis.ledger import WEAKER
 from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Finding, Rejected, Trial
-from pipelines.model.diagnosis.words import how_much, taken_in, where, within
+from pipelines.model.diagnosis.words import how_much, taken_in, where
 from pipelines.model.effects import find_effect
+from pipelines.model.words import within
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_moved import of_moved, unmoved_words

@@ -13,6 +13,7 @@ from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, Resid
 from pipelines.model.diagnosis.words import other_joint
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.parameter_names import numbered, part_of
+from pipelines.model.words import within
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
@@ -22,7 +23,6 @@ __all__ = ["as_sentence", "at_places", "cause_at", "floor_name", "floor_words", 
            "told_value", "told_values", "torque_errors", "torque_of", "unit_or_dash", "what_stays",
            "without_keys"]
 
-_PERSONS = ("Coulomb", "Stribeck")  # their names stay capital
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
 
@@ -60,7 +60,7 @@ def title_of(cause: str) -> str:
 def named(cause: str, joint: int | None) -> str:
     """A cause and its joint within a sentence: "cogging at joint 2"; as it is typed it is `cause_at`."""
     title = title_of(cause)
-    words = title if title.startswith(_PERSONS) else f"{title[:1].lower()}{title[1:]}"
+    words = within(title)
     return words if joint is None else f"{words} at joint {joint}"
 
 

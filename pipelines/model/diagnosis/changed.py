@@ -44,9 +44,9 @@ from pipelines.model.diagnosis.steadied import steadied, steady_nominal
 from pipelines.model.diagnosis.told import Limits, diagnosis_of, limits_of, sentence, strongest
 from pipelines.model.diagnosis.unchanged import stood_before
 from pipelines.model.diagnosis.verdict import Ruling, rule
-from pipelines.model.diagnosis.words import within
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.words import within
 
 __all__ = ["changed"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pipelines.model.diagnosis.elsewhere import Shared, as_good_elsewhere, as_likely
 from pipelines.model.diagnosis.ledger import Tried
 from pipelines.model.diagnosis.search import Step
-from pipelines.model.diagnosis.words import within
+from pipelines.model.words import within
 
 __all__ = ["at_which"]
 

@@ -4,7 +4,6 @@
     how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
     beside(findings)               "; and a torque that is logged late (120 ms) at joint 1"
     taken_in(finding, left)        ", most of which the nominal model had taken in"
-    within(title)                  a title, or a sentence, within another
 """
 
 from __future__ import annotations
@@ -16,14 +15,13 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.result import Finding, Value
 from pipelines.model.effects import find_effect
-from pipelines.model.friction.words import plain_number
+from pipelines.model.words import plain_number, within
 
-__all__ = ["beside", "how_much", "other_joint", "taken_in", "where", "within"]
+__all__ = ["beside", "how_much", "other_joint", "taken_in", "where"]
 
 # Units as a technician says them, where others than SI are usual. How far something is tilted is told in degrees.
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 _DEGREE = np.pi / 180.0
-_PERSONS = ("Coulomb", "Stribeck")
 _TOLD = 2  # further findings that a sentence names
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
@@ -52,11 +50,6 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
     """"from joint 1"; empty where a cause has to do with no other joint."""
     found = ((word, parameters[name].value) for name, word in _OTHER.items() if name in parameters)
     return next((f"{word} joint {joint:g}" for word, joint in found if isinstance(joint, int | float)), "")
-
-
-def within(words: str) -> str:
-    """A title or a sentence as a part of another: without its capital, but that of a person, and its full stop."""
-    return (words if words.startswith(_PERSONS) else words[:1].lower() + words[1:]).rstrip(".")
 
 
 def beside(others: Sequence[Finding]) -> str:

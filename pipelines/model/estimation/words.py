@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from pipelines.model.effects import find_effect
+from pipelines.model.words import within
 
 __all__ = ["column_in_words", "columns_in_words"]
-
-_PERSONS = ("Coulomb", "Stribeck")
 
 
 def columns_in_words(names: Iterable[str]) -> dict[str, str]:
@@ -25,7 +24,7 @@ def column_in_words(name: str) -> str:
     if not rest:
         return name
     effect = find_effect(cause)
-    title = effect.title if effect.title.startswith(_PERSONS) else f"{effect.title[:1].lower()}{effect.title[1:]}"
+    title = within(effect.title)
     words = f"{title} at joint {rest[0]}" if len(rest) > 1 else title
     alone = sum(not q.shape for q in effect.parameters) == 1
     return words if alone else f"{words} ({rest[-1].replace('_', ' ')})"

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.errors import Check
 from pipelines.model.friction.result import JointResult, Rippled, Value
-from pipelines.model.friction.words import plain_number
+from pipelines.model.words import plain_number
 
 __all__ = ["NAMED", "POOR", "depends_in_words", "inertia_in_words", "misfits"]
 

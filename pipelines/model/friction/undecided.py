@@ -11,8 +11,8 @@ import numpy as np
 
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.ladder import Ladder, Tried
-from pipelines.model.friction.words import plain_number
 from pipelines.model.rigid.body import Array
+from pipelines.model.words import plain_number
 
 __all__ = ["undecided"]
 

@@ -13,7 +13,7 @@ from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.ladder import Judge, climb
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.friction.undecided import undecided
-from pipelines.model.friction.words import plain_number
+from pipelines.model.words import plain_number
 from tests.model.friction.one_joint import JOINT, recorded
 from tests.model.friction.test_ladder import plateaus
 
