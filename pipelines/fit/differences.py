@@ -20,7 +20,7 @@ __all__ = ["difference", "limit_of", "standardised"]
 
 def difference(a: float, b: float, period: float | None = None) -> float:
     """b - a; of numbers that are the same again after a `period`, the nearer one to zero."""
-    return b - a if period is None else math.remainder(b - a, period)
+    return b - a if period is None or not math.isfinite(b - a) else math.remainder(b - a, period)
 
 
 def standardised(a: float, b: float, std_a: float, std_b: float, period: float | None = None) -> float:

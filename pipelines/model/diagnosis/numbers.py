@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.fit.differences import difference
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.exact import number_moved
@@ -122,8 +123,7 @@ def _deviations(effect: Effect, here: Values, moved: Sequence[Values], steps: Se
     by its step."""
     found = {}
     for q in effect.parameters:
-        apart = np.array([there[q.name] - here[q.name] for there in moved])
-        slope = np.asarray(apart if q.period is None else apart - q.period * np.rint(apart / q.period)) / np.array(steps)
+        slope = np.array([difference(here[q.name], there[q.name], q.period) for there in moved]) / np.array(steps)
         if slope.any() and np.isfinite(slope).all():
             found[q.name] = np.inf if _untold(slope, unseen) else float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
     return found
