@@ -121,7 +121,8 @@ def with_cutoff(recipe: Recipe, motions: Motions) -> Recipe:
 
 
 def refuse_too_few(equations: Sequence[LogEquations], motions: Motions, fewest: int = _FEWEST) -> None:
-    """
+    """Before a fit: enough equations are left, in all and of every joint.
+
     Args:
         fewest: equations in all.
 
