@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
-from pipelines.model.arm import Arm
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.data import Data, LogData
-from pipelines.model.diagnosis.record import recorded
+from pipelines.model.diagnosis.record import changing, recorded, recorded_of
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -129,8 +129,8 @@ def lay_shape(data: Data, family: Family, place: int, arm: Arm) -> Array:
 def _lay_some(data: Data, family: Family, first: int, size: int, whole: Arm) -> Laid:
     some, arm = family.shapes[first:first + size], whole.unrecorded
     with np.errstate(all="ignore"):
-        kept = some[0].from_motion and family.joint and whole is arm
-        acting, parts = _own(data, some, arm) if kept else _anywhere(data, some, arm, whole, not family.event)
+        own = some[0].from_motion and family.joint
+        acting, parts = _own(data, some, arm, whole) if own else _anywhere(data, some, arm, whole, not family.event)
     rows = np.flatnonzero(acting[data.joint])
     return Laid(first, data.clear(np.concatenate(parts, axis=2), rows), rows)
 
@@ -147,17 +147,21 @@ def _at_once(data: Data, family: Family, arm: Arm) -> int:
     return max(1, _AT_ONCE // max(int(columns), 1))
 
 
-def _own(data: Data, some: Sequence[Effect], arm: Arm) -> tuple[Mask, list[Array]]:
-    """The joint that they act on, and of each log (shapes, k, rows of that joint): kept, for they follow from the motion alone."""
-    laid = [one.keep(tuple(some), partial(_laid_own, one, some, arm)) for one in data.logs]
-    return np.arange(data.n_joints) == (some[0].joint or 1) - 1, [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
+def _own(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm) -> tuple[Mask, list[Array]]:
+    """The joint that they act on, and of each log (shapes, k, rows of that joint): kept, for they follow from the motion alone,
+    and from what the record of that joint passes through, where there is such a thing."""
+    joint = some[0].joint or 1
+    through = changing(whole, joint)
+    laid = [one.keep((tuple(some), one.kept.number(whole)) if through else tuple(some), partial(_laid_own, one, some, arm, through))
+            for one in data.logs]
+    return np.arange(data.n_joints) == joint - 1, [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
 
 
-def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
+def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm, through: Sequence[Acting]) -> Array:
     table = some[0].own_columns(some, one.motion, arm)
     for shape in table:
         shape[...] = _finite(shape)
-    flat = table.reshape(-1, table.shape[2])
+    flat = recorded_of(through, table.reshape(-1, table.shape[2]), one.motion)
     return one.lay_signals(flat, np.full(len(flat), (some[0].joint or 1) - 1))
 
 

@@ -62,8 +62,11 @@ class Spring(Effect):
         q = self.own(motion.q)
         near = np.clip(q, self.seen_from, self.seen_to)
         beyond = q - near
-        powers = (near**power + power * near**(power - 1) * beyond for power in range(2, self.degree + 1))
-        return self.on_own_row(arm, q, np.ones_like(q), *powers)
+        columns, power = [q, np.ones_like(q)], near
+        for degree in range(2, self.degree + 1):  # one from the other: a power of its own costs ten times as much
+            columns.append(power * (near + degree * beyond))
+            power = power * near
+        return self.on_own_row(arm, *columns)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Straight alone where a joint without limits closes its circle: what comes back to where it began there is a wave."""
