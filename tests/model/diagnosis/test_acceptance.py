@@ -14,13 +14,13 @@ from pipelines.bench import experiments
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.log import shared_work
-from pipelines.model.diagnosis import gains
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.gains import Simulation, farther, gain_of, simulation_errors, worse_log
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.result import TorqueGain
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.worth import gains
+from pipelines.model.diagnosis.worth.gains import Simulation, farther, gain_of, simulation_errors, worse_log
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation.windows import Windows, simulate_windows
 from tests.diagnose.sessions import session

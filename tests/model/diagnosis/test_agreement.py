@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import agreement, unlike
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import refine
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.named.findings import agreement, unlike
 from pipelines.model.effects.cogging import Cogging
 from tests.model.diagnosis.test_through import turned
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.blocked import Blocked
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.hypotheses import laid_whole
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import refine
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.screened.blocked import Blocked
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.searched.hypotheses import laid_whole
 from tests.model.diagnosis.test_borne_out import SETTINGS, wandering
 
 

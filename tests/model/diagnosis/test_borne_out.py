@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.diagnosis import borne_out
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.search import Found, search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.searched import borne_out
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.search import Found, search
 from tests.model.diagnosis.test_through import turned
 
 SETTINGS = DiagnosisSettings(replicas=0, cutoff_hz=40.0)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import case as module
-from pipelines.model.diagnosis.case import HeldOut
+from pipelines.model.diagnosis.searched import case as module
+from pipelines.model.diagnosis.searched.case import HeldOut
 
 JOINT = np.repeat([0, 1], 50)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.model.diagnosis import chain
+from pipelines.model.diagnosis.named import chain
 
 
 def left(name: str) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.fit.flips import by_flips
-from pipelines.model.diagnosis import chance
+from pipelines.model.diagnosis.believed import chance
 from pipelines.model.diagnosis.result import TorqueGain
 
 ROWS, FITTED = 2000, 8000  # 12 s of held-out logs beside 40 s of fitted ones, say

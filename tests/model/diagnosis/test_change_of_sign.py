@@ -13,15 +13,15 @@ import pytest
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis import diagnose as diagnose_module
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.change_of_sign import loosened, plainer_of, shows, wrong_law
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.given.change_of_sign import loosened, plainer_of, shows, wrong_law
 from pipelines.model.diagnosis.result import Value
-from pipelines.model.diagnosis.search import search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.search import search
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
@@ -30,8 +30,8 @@ from tests.model.diagnosis.arms import hidden
 from tests.model.estimation.experiments import COULOMB
 
 if TYPE_CHECKING:
-    from pipelines.model.diagnosis.calibration import Calibration
-    from pipelines.model.diagnosis.inputs import Prepared
+    from pipelines.model.diagnosis.asked.inputs import Prepared
+    from pipelines.model.diagnosis.floor.calibration import Calibration
     from pipelines.model.diagnosis.result import Diagnosis
 
 LAWS = ("stribeck", "concave_friction", "quadratic_drag")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.compliance import Compliance, compliance, gaps_untold, untold
+from pipelines.model.diagnosis.given.compliance import Compliance, compliance, gaps_untold, untold
 from sample_logs.make_model import synthetic_arm
 
 SAMPLES = Path(__file__).resolve().parents[3] / "sample_logs" / "rrr-healthy"

@@ -10,13 +10,13 @@ import pytest
 
 from pipelines.log.experiment import Array
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.change_of_sign import loosened
-from pipelines.model.diagnosis.curves import with_curves_anew
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import Refined, refine
+from pipelines.model.diagnosis.given.change_of_sign import loosened
+from pipelines.model.diagnosis.searched.curves import with_curves_anew
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.doubted import above_in_both, unlike_held_out, unlike_noise, unnamed, without_twin
-from pipelines.model.diagnosis.pruned import Settled
-from pipelines.model.diagnosis.search import Found
-from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.diagnosis.believed.doubted import above_in_both, unlike_held_out, unlike_noise, unnamed, without_twin
+from pipelines.model.diagnosis.believed.pruned import Settled
+from pipelines.model.diagnosis.named.verdict import Ruling
+from pipelines.model.diagnosis.searched.search import Found
 from pipelines.model.effects import find_effect
 from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 

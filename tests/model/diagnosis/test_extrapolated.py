@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import extrapolated as module
+from pipelines.model.diagnosis.worth import extrapolated as module
 
 
 def test_it_is_what_numbers_drawn_by_their_covariance_leave(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.model.diagnosis import floored
+from pipelines.model.diagnosis.given import floored
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ import numpy as np
 from pipelines.log.derive import derive
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.motion import Reconstruction, reconstruct
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.imperfections import small_loads
+from pipelines.model.diagnosis.rows.imperfections import small_loads
 from pipelines.model.rigid.body import Motion
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from tests.diagnose.sessions import session
 from tests.healthy import with_signal
 

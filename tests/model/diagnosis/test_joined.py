@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.findings import _told
-from pipelines.model.diagnosis.joined import once_each
+from pipelines.model.diagnosis.named.findings import _told
+from pipelines.model.diagnosis.named.joined import once_each
 from pipelines.model.diagnosis.result import Finding, Gain, Rival, TorqueGain, Value
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 
-from pipelines.model.diagnosis.kept import Kept
+from pipelines.model.diagnosis.rows.kept import Kept
 
 
 class Thing:

@@ -16,14 +16,14 @@ from pipelines.bench.faults import make
 from pipelines.bench.machine import Machine, draw_machine
 from pipelines.bench.session import record
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.injection import _last_root, _raised
-from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.limits import _absorbed, _limit, detectable
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Rejected
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.without_limit import without_limit
+from pipelines.model.diagnosis.screened.candidates import Family
+from pipelines.model.diagnosis.unseen.injection import _last_root, _raised
+from pipelines.model.diagnosis.unseen.limits import _absorbed, _limit, detectable
+from pipelines.model.diagnosis.unseen.without_limit import without_limit
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.rotor_inertia import RotorInertia
 from pipelines.model.effects.torque_gain import TorqueGain

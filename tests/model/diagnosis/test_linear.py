@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 import scipy.signal
 
-from pipelines.model.diagnosis.linear import covariance, deviations, left_out, solved, superfluous
+from pipelines.model.diagnosis.fitted.linear import covariance, deviations, left_out, solved, superfluous
 
 
 def _table(rows: int = 400, seed: int = 3) -> np.ndarray:

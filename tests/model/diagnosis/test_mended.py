@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from pipelines.model.diagnosis import mended
-from pipelines.model.diagnosis.candidates import Family
+from pipelines.model.diagnosis.believed import mended
+from pipelines.model.diagnosis.screened.candidates import Family
 from tests.model.diagnosis.made_up import effect, left, searched
 from tests.model.diagnosis.test_pruned import among, twins
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.held_out import cross_validated
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import refine
-from pipelines.model.diagnosis.screen import Screened, screen
-from pipelines.model.diagnosis.search import search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.screened.screen import Screened, screen
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.search import search
+from pipelines.model.diagnosis.worth.held_out import cross_validated
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.viscous_drift import ViscousDrift
 from pipelines.model.rigid.body import Motion

@@ -13,14 +13,14 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.robot import format_robot
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis import changed as changed_module
-from pipelines.model.diagnosis.absorbed import Absorbed, Move, chosen
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.numbers import told
-from pipelines.model.diagnosis.refit import refine
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.given.since import since_reference
+from pipelines.model.diagnosis.reference.absorbed import Absorbed, Move, chosen
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import since_reference
+from pipelines.model.diagnosis.worth.numbers import told
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.link_length import LinkLength

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_columns, fit_nominal, rows_of
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.nominal import fit_columns, fit_nominal, rows_of
 from sample_logs.make_model import synthetic_arm
 from tests.model.diagnosis.arms import hidden
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.numbers import of_amplitudes, of_no_size, parameters, standard_deviations, told, too_slight
-from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import Refined, refine
+from pipelines.model.diagnosis.worth.numbers import of_amplitudes, of_no_size, parameters, standard_deviations, told, too_slight
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.gravity_tilt import GravityTilt

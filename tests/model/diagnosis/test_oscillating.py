@@ -9,11 +9,11 @@ import pytest
 from scipy.signal import lfilter, welch
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.oscillating import oscillation
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed.oscillating import oscillation
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
 

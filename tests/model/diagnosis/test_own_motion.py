@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
-from pipelines.model.diagnosis.own_motion import following, lasting, put_right, standing_out
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns, fit_nominal
+from pipelines.model.diagnosis.fitted.own_motion import following, lasting, put_right, standing_out
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
 

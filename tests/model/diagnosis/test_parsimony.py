@@ -11,15 +11,15 @@ import pytest
 from scipy.optimize import minimize
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis import hypotheses
-from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.ledger import Tried
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.parsimony import fewest
-from pipelines.model.diagnosis.refit import refine
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.searched import hypotheses
+from pipelines.model.diagnosis.searched.ledger import Tried
+from pipelines.model.diagnosis.searched.parsimony import fewest
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.spring import Spring

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import mended, pruned
-from pipelines.model.diagnosis.search import Found
-from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.diagnosis.believed import mended, pruned
+from pipelines.model.diagnosis.named.verdict import Ruling
+from pipelines.model.diagnosis.searched.search import Found
 from pipelines.model.effects.base import Effect
 from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 

@@ -7,10 +7,10 @@ import pytest
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.replay import as_recorded, experiment_of
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.floor.replay import as_recorded, experiment_of
 from tests.diagnose.sessions import session
 from tests.faulty import dropped, retimed
 

@@ -13,14 +13,14 @@ from pipelines.bench.faults import make
 from pipelines.bench.machine import draw_machine
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis import responding
-from pipelines.model.diagnosis.compliance import Compliance, compared
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.given import responding
+from pipelines.model.diagnosis.given.compliance import Compliance, compared
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.wanted import Wanted
+from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects.base_resonance import BaseResonance
 from pipelines.report.diagnosis_finding import finding_section
 from tests.diagnose.sessions import but, healthy_again, session

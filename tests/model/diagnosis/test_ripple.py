@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.beside import less
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.held_out import cross_validated
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.whitening import Whitening
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import Refined, refine
+from pipelines.model.diagnosis.rows.whitening import Whitening
+from pipelines.model.diagnosis.searched.beside import less
+from pipelines.model.diagnosis.worth.held_out import cross_validated
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import arm, hidden
 from tests.model.estimation.experiments import motion_of

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal, orthonormal, rows_of
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.stretch import quick_size
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal, orthonormal, rows_of
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.rows.stretch import quick_size
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import arm, hidden
 

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.diagnosis import hypotheses
-from pipelines.model.diagnosis import search as search_module
-from pipelines.model.diagnosis.candidates import Family, families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.gate import Gate
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.ledger import Tried, ledger
-from pipelines.model.diagnosis.mistaken import imitated
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import refine
-from pipelines.model.diagnosis.screen import screen, screen_family
-from pipelines.model.diagnosis.search import Step, provisional, search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.thresholds import Thresholds, without_twin
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed.mistaken import imitated
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.floor.thresholds import Thresholds, without_twin
+from pipelines.model.diagnosis.screened.candidates import Family, families, whole_motion
+from pipelines.model.diagnosis.screened.screen import screen, screen_family
+from pipelines.model.diagnosis.searched import hypotheses
+from pipelines.model.diagnosis.searched import search as search_module
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.gate import Gate
+from pipelines.model.diagnosis.searched.ledger import Tried, ledger
+from pipelines.model.diagnosis.searched.search import Step, provisional, search
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden, wave

@@ -13,7 +13,7 @@ from pipelines.bench.machine import Machine, draw_machine
 from pipelines.bench.plant import Recording, run
 from pipelines.bench.session import as_log
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.diagnosis.sharper import sharpened
+from pipelines.model.diagnosis.rows.sharper import sharpened
 from pipelines.model.estimation.conditioning import wanted_cutoff
 from pipelines.model.estimation.logs import Motions, Recipe, motions_of
 from pipelines.model.motion import Reconstruction

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import simulated
-from pipelines.model.diagnosis.gains import Strayed
+from pipelines.model.diagnosis.worth import simulated
+from pipelines.model.diagnosis.worth.gains import Strayed
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs, prepare
+from pipelines.model.diagnosis.given.since import since_reference
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import since_reference
 from pipelines.model.effects import effect_names
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import arm, hidden

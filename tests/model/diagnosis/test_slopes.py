@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal, law_rows, rigid_rows
-from pipelines.model.diagnosis.refit import moved_by, refine
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.slopes import slopes_of
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal, law_rows, rigid_rows
+from pipelines.model.diagnosis.fitted.refit import moved_by, refine
+from pipelines.model.diagnosis.fitted.slopes import slopes_of
 from pipelines.model.effects.gravity_tilt import GravityTilt
 from tests.model.diagnosis.arms import hidden
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import standing
-from pipelines.model.diagnosis.standing import standing_set
+from pipelines.model.diagnosis.reference import standing
+from pipelines.model.diagnosis.reference.standing import standing_set
 
 ROWS = 400
 HUMP = np.sin(np.arange(ROWS) / 7.0)  # of what is left at the joint

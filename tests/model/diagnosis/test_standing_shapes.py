@@ -11,13 +11,13 @@ import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.exact import Exact
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import Since, since_reference
-from pipelines.model.diagnosis.wanted import Wanted
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.given.since import Since, since_reference
+from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.torque_gain import TorqueGain

@@ -13,19 +13,19 @@ import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis import changed as changed_module
-from pipelines.model.diagnosis.by_speed import floor_by_speed
-from pipelines.model.diagnosis.candidates import lay_one
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed.unchanged import near_other_motion, no_change, stood_before
 from pipelines.model.diagnosis.changed import _times
-from pipelines.model.diagnosis.data import Data
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import rows_of
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import _farther, _with, since_reference
-from pipelines.model.diagnosis.standing import Chosen, apart, joined
-from pipelines.model.diagnosis.stood import ANYTHING, Share, share_before
-from pipelines.model.diagnosis.unchanged import near_other_motion, no_change, stood_before
-from pipelines.model.diagnosis.verdict import Ruling
+from pipelines.model.diagnosis.fitted.nominal import rows_of
+from pipelines.model.diagnosis.floor.by_speed import floor_by_speed
+from pipelines.model.diagnosis.given.since import _farther, _with, since_reference
+from pipelines.model.diagnosis.named.verdict import Ruling
+from pipelines.model.diagnosis.reference.standing import Chosen, apart, joined
+from pipelines.model.diagnosis.reference.stood import ANYTHING, Share, share_before
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.screened.candidates import lay_one
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion

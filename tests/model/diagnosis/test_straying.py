@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.model.diagnosis import straying
+from pipelines.model.diagnosis.believed import straying
 from tests.model.diagnosis.made_up import effect, left, searched
 
 REST: Any = SimpleNamespace(model=SimpleNamespace(arm="rest"))

@@ -14,15 +14,15 @@ import pytest
 
 from pipelines.log.experiment import Array
 from pipelines.log.files import open_log
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, narrowed, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.exact import Exact
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.inputs import Logs, Prepared, narrowed, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import Refined, refine
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.terms_apart import unclear, with_terms_told_apart
-from pipelines.model.diagnosis.wanted import Wanted
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import Refined, refine
+from pipelines.model.diagnosis.given.terms_apart import unclear, with_terms_told_apart
+from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.coulomb import Coulomb

@@ -11,15 +11,15 @@ from scipy.signal import lsim
 
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal, rigid_rows
-from pipelines.model.diagnosis.refit import refine
-from pipelines.model.diagnosis.search import Found, search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.slopes import slopes_of
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal, rigid_rows
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.fitted.slopes import slopes_of
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.search import Found, search
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.coulomb import Coulomb

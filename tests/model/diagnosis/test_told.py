@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.model.diagnosis.answered.told import sentence
+from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.result import Value
-from pipelines.model.diagnosis.told import sentence
-from pipelines.model.diagnosis.verdict import Ruling
 from pipelines.model.effects import find_effect
 
 

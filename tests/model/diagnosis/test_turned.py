@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis import mended
-from pipelines.model.diagnosis import search as search_module
-from pipelines.model.diagnosis.candidates import Family, families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.fewer import without
-from pipelines.model.diagnosis.findings import _in_steps
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.ledger import Tried
-from pipelines.model.diagnosis.mended import not_mending, turned
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.search import Found, search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.verdict import Ruling, explained
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed import mended
+from pipelines.model.diagnosis.believed.fewer import without
+from pipelines.model.diagnosis.believed.mended import not_mending, turned
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.named.findings import _in_steps
+from pipelines.model.diagnosis.named.verdict import Ruling, explained
+from pipelines.model.diagnosis.screened.candidates import Family, families, whole_motion
+from pipelines.model.diagnosis.searched import search as search_module
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.ledger import Tried
+from pipelines.model.diagnosis.searched.search import Found, search
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import refine
-from pipelines.model.diagnosis.screen import screen
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.unnameable import unnameable
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.screened.screen import screen
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.unnameable import unnameable
 from tests.model.diagnosis.arms import hidden, wave
 
 

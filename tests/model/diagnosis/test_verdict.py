@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.verdict import excess, explained, much_without_name, rule
+from pipelines.model.diagnosis.floor.thresholds import Thresholds
+from pipelines.model.diagnosis.named.verdict import excess, explained, much_without_name, rule
 from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.clean import clean
-from pipelines.model.diagnosis.drive_noise import white
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.search import provisional
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.waves import without_waves
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.floor.drive_noise import white
+from pipelines.model.diagnosis.floor.waves import without_waves
+from pipelines.model.diagnosis.given.clean import clean
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.search import provisional
 from pipelines.model.rigid.body import Motion
 from tests.diagnose.sessions import but
 from tests.model.diagnosis.arms import hidden

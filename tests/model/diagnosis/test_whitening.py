@@ -10,11 +10,11 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
-from pipelines.model.diagnosis.candidates import families, lay_family, whole_motion
-from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.whitening import Whitening
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.rows.whitening import Whitening
+from pipelines.model.diagnosis.screened.candidates import families, lay_family, whole_motion
 from tests.model.diagnosis.arms import arm, hidden
 
 ROWS = 4000

@@ -10,15 +10,15 @@ import pytest
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.robot import Joint, RobotDescription, format_robot
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.candidates import Family, families, whole_motion
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.nominal import Fit, fit_columns, fit_nominal
-from pipelines.model.diagnosis.screen import screen
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.wide import Wide
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns, fit_nominal
+from pipelines.model.diagnosis.floor.thresholds import Thresholds
+from pipelines.model.diagnosis.floor.twin import Twin
+from pipelines.model.diagnosis.floor.wide import Wide
+from pipelines.model.diagnosis.screened.candidates import Family, families, whole_motion
+from pipelines.model.diagnosis.screened.screen import screen
 from pipelines.model.effects import find_effect
 from tests.model.diagnosis.arms import hidden
 
