@@ -9,8 +9,8 @@ import pytest
 
 from pipelines.model.diagnosis.believed import mended
 from pipelines.model.diagnosis.screened.candidates import Family
+from tests.model.diagnosis.believed.test_pruned import among, twins
 from tests.model.diagnosis.made_up import effect, left, searched
-from tests.model.diagnosis.test_pruned import among, twins
 
 
 @pytest.fixture

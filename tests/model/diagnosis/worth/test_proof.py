@@ -17,8 +17,8 @@ from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import refine
 from pipelines.model.diagnosis.worth.evidence import proof
 from pipelines.report.diagnosis_proof import proof_figures
-from tests.model.diagnosis.test_through import turned
-from tests.model.diagnosis.test_whole_orders import searched
+from tests.model.diagnosis.screened.test_through import turned
+from tests.model.diagnosis.searched.test_whole_orders import searched
 from tests.report.test_diagnosis_words import found
 
 _RINGS = 20.0  # [Hz]

@@ -15,7 +15,7 @@ from pipelines.model.diagnosis.searched.beside import less
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.effects.viscous import Viscous
-from tests.model.diagnosis.test_through import turned
+from tests.model.diagnosis.screened.test_through import turned
 
 
 def fitted(waves: dict[float, float], lag: float) -> tuple[float, Refined]:

@@ -12,7 +12,7 @@ from pipelines.model.diagnosis.screened.candidates import families, whole_motion
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.search import Found, search
 from tests.diagnose.sessions import but
-from tests.model.diagnosis.test_through import turned
+from tests.model.diagnosis.screened.test_through import turned
 
 _LIBRARY = but("cogging", "spring", "torque_offset")
 

@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.fitted.refit import refine
 from pipelines.model.diagnosis.screened.blocked import Blocked
 from pipelines.model.diagnosis.screened.candidates import families, whole_motion
 from pipelines.model.diagnosis.searched.hypotheses import laid_whole
-from tests.model.diagnosis.test_borne_out import SETTINGS, wandering
+from tests.model.diagnosis.searched.test_borne_out import SETTINGS, wandering
 
 
 @pytest.mark.parametrize("cause", ["cogging", "concave_friction", "spring"])

@@ -17,7 +17,7 @@ from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import refine
 from pipelines.model.diagnosis.named.findings import agreement, unlike
 from pipelines.model.effects.cogging import Cogging
-from tests.model.diagnosis.test_through import turned
+from tests.model.diagnosis.screened.test_through import turned
 
 _SETTINGS = DiagnosisSettings(replicas=0, cutoff_hz=40.0)
 _WAVES = {7.0: 0.04}

@@ -18,7 +18,7 @@ from pipelines.model.diagnosis.screened.candidates import families, whole_motion
 from pipelines.model.diagnosis.searched import borne_out
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.search import Found, search
-from tests.model.diagnosis.test_through import turned
+from tests.model.diagnosis.screened.test_through import turned
 
 SETTINGS = DiagnosisSettings(replicas=0, cutoff_hz=40.0)
 
