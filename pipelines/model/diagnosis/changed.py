@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.believed.oscillating import oscillation
 from pipelines.model.diagnosis.believed.pruned import settled
 from pipelines.model.diagnosis.believed.steadied import steadied, steady_nominal
 from pipelines.model.diagnosis.believed.unchanged import stood_before
-from pipelines.model.diagnosis.floor.calibrated import conditions_of, origin_of, refuse_unfit
+from pipelines.model.diagnosis.floor.calibrated import conditions_of, origin_of, refuse_calibration
 from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.model.diagnosis.floor.motion_floor import motion_floor, noise_in
 from pipelines.model.diagnosis.given.floored import Floored
@@ -63,7 +63,7 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
     """What is different since the reference logs."""
     logs = [log for log, _ in first.held.prepared.referring]
     if given is not None:
-        refuse_unfit(given, first.held.prepared, first.held.case.families, "reference logs", logs)
+        refuse_calibration(given, first.held.prepared, first.held.case.families, "reference logs", logs)
     known = None if given is None else (given.weight, {(one.cause, one.joint): one.own for one in given.causes})
     taken = first.held.case.beside
     since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else

@@ -1,9 +1,9 @@
 """Store thresholds of one diagnosis, and take them for the logs of another.
 
     Calibration(origin_of(...), conditions_of(prepared), ..., bounds_of(families, gain, own), ...)
-    refuse_unfit(made, prepared, families, "twin")      C02 where it is not for these logs
-    thresholds_of(made, families, data, given)          for these families and so many rows
-    following_of(made, prepared, given)                 of what has no name
+    refuse_calibration(made, prepared, families, "twin")    C02 where it is not for these logs
+    thresholds_of(made, families, data, given)              for these families and so many rows
+    following_of(made, prepared, given)                     of what has no name
 
 What an arm in order shows of a cause depends on how it is driven, sampled and moved. A calibration therefore holds for the same
 robot and controller at the same rate, in experiments of the same kind that move about as fast; nothing else is asked of the logs.
@@ -35,7 +35,7 @@ from pipelines.model.diagnosis.floor.wide import WideCause
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.candidates import Family, place_of
 
-__all__ = ["bounds_of", "conditions_of", "following_of", "origin_of", "refuse_unfit", "thresholds_of"]
+__all__ = ["bounds_of", "conditions_of", "following_of", "origin_of", "refuse_calibration", "thresholds_of"]
 
 _ALIKE = 1.5  # times the speed, acceleration or range of a joint
 _OTHER = 1.5  # times the thresholds, for other motion: of four excitations nine of ten were less than 1.8 times the first's
@@ -135,8 +135,8 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def refuse_unfit(made: Calibration, prepared: Prepared, families: Sequence[Family], kind: Literal["twin", "reference logs"],
-                 reference: Sequence[ExperimentLog] = ()) -> None:
+def refuse_calibration(made: Calibration, prepared: Prepared, families: Sequence[Family], kind: Literal["twin", "reference logs"],
+                       reference: Sequence[ExperimentLog] = ()) -> None:
     """Raise where the calibration is not for these logs.
 
     Raises:

@@ -18,7 +18,7 @@ from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.own_motion import following
-from pipelines.model.diagnosis.floor.calibrated import bounds_of, conditions_of, origin_of, refuse_unfit, thresholds_of
+from pipelines.model.diagnosis.floor.calibrated import bounds_of, conditions_of, origin_of, refuse_calibration, thresholds_of
 from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.model.diagnosis.floor.drive_noise import drive_noise, white
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
@@ -55,7 +55,7 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
                given: Calibration | None) -> Floored:
     """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
     if given is not None:
-        refuse_unfit(given, prepared, case.families, "twin")
+        refuse_calibration(given, prepared, case.families, "twin")
     made, twin, why = given, None, ""
     if given is None:
         try:
