@@ -1,6 +1,6 @@
 """What the simulation of an arm gets wrong, and why: every effect tried on what the nominal model leaves.
 
-Three modules answer three questions; each folder is a part of the way there, and its own docstring is the map of it:
+`diagnose`, `changed` and `extend` answer one question each; a folder is a part of the way there, and its docstring the map of it:
 
     diagnose     what the nominal model gets wrong in these logs: the whole of it in the order in which it happens
     changed      what has changed since the reference logs: the same, with these beside
