@@ -24,18 +24,18 @@ import numpy as np
 from pipelines.import_log import STAGE, Settings
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.clean import clean
-from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.drive_noise import white
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import settled
-from pipelines.model.diagnosis.search import Found, provisional, search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.verdict import rule
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed.pruned import settled
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.floor.drive_noise import white
+from pipelines.model.diagnosis.given.clean import clean
+from pipelines.model.diagnosis.named.verdict import rule
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.search import Found, provisional, search
 from pipelines.stage import Request, run_stage
 
 __all__ = ["TX40", "Judged", "Step", "fold", "imported", "judged_odrive", "judged_tx40", "main", "searched"]

@@ -17,14 +17,14 @@ from pathlib import Path
 from pipelines.errors import Check, UsageError
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.calibration import Calibration
-from pipelines.model.diagnosis.calibration_file import calibration_files, read_calibration, write_calibration
+from pipelines.model.diagnosis.answered.outcome import Result
+from pipelines.model.diagnosis.asked.gates import logs_of_roles
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.gates import logs_of_roles
+from pipelines.model.diagnosis.floor.calibration import Calibration
+from pipelines.model.diagnosis.floor.calibration_file import calibration_files, read_calibration, write_calibration
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.outcome import Result
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.named_cause import refuse_unknown
 from pipelines.report.diagnosis_report import diagnosis_report

@@ -26,13 +26,13 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.answered.outcome import Extension
+from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
+from pipelines.model.diagnosis.asked.gates import logs_of_roles
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.extend import Extended, extend
-from pipelines.model.diagnosis.gates import logs_of_roles
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.outcome import Extension
-from pipelines.model.diagnosis.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.wanted import Wanted
+from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit

@@ -11,32 +11,26 @@ A log is *rejected* where a check says "reject"; the exit code is then 3. With -
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from pipelines.errors import Check, Level, RrridError
+from pipelines.errors import Check, RrridError
 from pipelines.log.codes import first_to_read, title_of
 from pipelines.log.doctor.checks import NotTested, Subject, check_together, findings
 from pipelines.log.doctor.checks_subject import many
 from pipelines.log.doctor.checks_unit import TRUSTED
 from pipelines.log.doctor.columns_first import columns_first
-from pipelines.log.doctor.faults import quantum
-from pipelines.log.experiment import ExperimentLog
+from pipelines.log.doctor.summary import LogSummary, summary_of
 from pipelines.log.files import Opened
 from pipelines.log.robot import RobotDescription, format_robot
-from pipelines.log.schema import joint_unit
 from pipelines.model.plausibility import plausibility_findings
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import checks_table, level_tone
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
-__all__ = ["STAGE", "LogSummary", "Range", "Result", "Settings", "compute", "report"]
+__all__ = ["STAGE", "Result", "Settings", "compute", "report"]
 
 _PREVIEWS = 8
-_WORST_FIRST: tuple[Level, ...] = ("reject", "repair", "warn")
 _FINDINGS_SHOWN = 200
 _TRUST = "--trust-units"
 
@@ -48,47 +42,6 @@ class Settings:
 
     trust_units: bool = False
     allow_same: bool = False
-
-
-@dataclass(frozen=True)
-class Range:
-    """Extreme finite values of one signal of one joint."""
-
-    signal: str
-    joint: int  # 1-based
-    unit: str
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class LogSummary:
-    """What a log says of itself, and what its samples say."""
-
-    name: str
-    file: str
-    sha256: str
-    integrity: str  # "digest" | "none": whether a flipped bit would be noticed
-    experiment: str
-    role: str
-    origin: str
-    robot: str
-    joints: int
-    moving_joint: int | None
-    controller: str  # its law; "" where the log does not say
-    signals: tuple[str, ...]
-    samples: int
-    usable_samples: int  # that a fit may use
-    duration: float  # [s]
-    sample_time: float  # [s]
-    period: float | None  # [s]
-    jitter: float  # rms, in sample times
-    dropped_samples: int
-    gaps: tuple[tuple[float, float], ...]  # [s] from, to
-    encoder_step: tuple[float | None, ...]  # [rad]
-    torque_step: tuple[float | None, ...]  # [N m]
-    ranges: tuple[Range, ...]
-    verdict: Level  # worst level of its checks
 
 
 @dataclass(frozen=True)
@@ -123,7 +76,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         mine = [item for item in judged if isinstance(item, Check)]
         blind += [item for item in judged if isinstance(item, NotTested)]
         found += mine
-        logs.append(_summary(opened, subject, (*opened.checks, *mine)))
+        logs.append(summary_of(opened, subject, (*opened.checks, *mine)))
         if len(previews) < _PREVIEWS and subject.sampled:
             previews.append(log_preview(subject))
     found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
@@ -162,32 +115,6 @@ def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings)
     except RrridError as problem:  # a description without usable geometry
         found.append(_as_check(problem, opened.path))
     return subject, found
-
-
-def _summary(opened: Opened, subject: Subject, checks: Iterable[Check]) -> LogSummary:
-    log, good = subject.log, subject.good if subject.sampled else None
-    t = good.log.t if good else log.t[np.abs(log.t) < 1e20]
-    time = good.time if good else None
-    gaps = tuple((float(log.t[k]) * time.scale, float(log.t[k + 1]) * time.scale) for k in time.gaps) if time else ()
-    levels = [check.level for check in checks]
-    return LogSummary(
-        log.name, str(opened.path), opened.sha256, "none" if any(c.code == "RRID-F05" for c in opened.checks) else "digest",
-        log.experiment, log.role, log.origin, log.robot_name, log.n_joints, log.joint,
-        log.controller.law if log.controller else "", tuple(log.signals), log.n_samples, int(good.fit.sum()) if good else 0,
-        float(t.max() - t.min()) if t.size else 0.0, log.sample_time, log.period, time.jitter if time else 0.0,
-        time.dropped_samples if time else 0, gaps, subject.steps if good else (),
-        tuple(quantum(column) for column in good.log.tau.T) if good else (), _ranges(log),
-        next((level for level in _WORST_FIRST if level in levels), "ok"))
-
-
-def _ranges(log: ExperimentLog) -> tuple[Range, ...]:
-    found = []
-    for name in ("q", "dq", "tau", "q_ref", "current", "temperature"):
-        for j, joint in enumerate(log.robot.joints if name in log else ()):
-            finite = log[name][np.isfinite(log[name][:, j]), j]
-            low, high = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
-            found.append(Range(name, j + 1, joint_unit(name, joint.revolute), low, high))
-    return tuple(found)
 
 
 def exit_code(result: Result, check: bool) -> int:

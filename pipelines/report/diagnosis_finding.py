@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipelines.model.diagnosis.responding import BELOW
+from pipelines.model.diagnosis.answered.words import taken_in, where
+from pipelines.model.diagnosis.given.responding import BELOW
 from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
-from pipelines.model.diagnosis.words import taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.model.parameter_names import numbered
 from pipelines.report.diagnosis_answers import answer_figures

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.model.diagnosis.ledger import WEAKER
-from pipelines.model.diagnosis.outcome import Result
+from pipelines.model.diagnosis.answered.outcome import Result
+from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
 from pipelines.model.diagnosis.result import Finding, Rejected, Trial
-from pipelines.model.diagnosis.words import how_much, taken_in, where
+from pipelines.model.diagnosis.searched.ledger import WEAKER
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
 from pipelines.report.diagnosis_finding import finding_section, numbers_section

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.answered.words import other_joint
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected, ResidualRms, Value
-from pipelines.model.diagnosis.words import other_joint
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.parameter_names import numbered, part_of
 from pipelines.model.words import within

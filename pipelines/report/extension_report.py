@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_words import held_out_words, title_of, together, torque_errors, without_keys
 from pipelines.report.joint_units import Units, units_in

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.result import Diagnosis
 
 __all__ = ["Units", "each", "joined", "unit_of", "units_in"]

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipelines.model.diagnosis.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.unasked import FewerTerms
+from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
+from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.effects import find_effect
 from pipelines.model.estimation.result import Result as Estimated
 

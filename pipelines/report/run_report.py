@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from pipelines.errors import NothingMatched
 from pipelines.log.places import slug
-from pipelines.model.diagnosis.outcome import Extension
-from pipelines.model.diagnosis.outcome import Result as Diagnosed
+from pipelines.model.diagnosis.answered.outcome import Extension
+from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.joint_units import units_in
 from pipelines.report.report import Report, Section, Table, Tone

@@ -107,7 +107,7 @@ def _schema(what: str) -> dict[str, Any]:
     if what in ("model", "log"):
         return model_schema() if what == "model" else log_schema()
     if what == "calibration":
-        from pipelines.model.diagnosis.calibration_file import calibration_schema
+        from pipelines.model.diagnosis.floor.calibration_file import calibration_schema
 
         return calibration_schema()
     if what == "batch":

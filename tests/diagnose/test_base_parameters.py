@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from tests.diagnose.sessions import but, healthy_again, session
 
 _FEW = DiagnosisSettings(replicas=0, most=2, without=but("torque_gain", "payload"), evidence=False, limits=False)

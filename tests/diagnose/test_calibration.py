@@ -17,11 +17,11 @@ from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.log.files import hash_file
 from pipelines.log.model_file import read_model, write_model
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.calibrated import refuse_unfit
-from pipelines.model.diagnosis.calibration import Calibration
-from pipelines.model.diagnosis.calibration_file import calibration_schema, read_calibration, write_calibration
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.floor.calibrated import refuse_calibration
+from pipelines.model.diagnosis.floor.calibration import Calibration
+from pipelines.model.diagnosis.floor.calibration_file import calibration_schema, read_calibration, write_calibration
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from rrrid_cli.settings import make_settings
@@ -158,7 +158,7 @@ def test_it_is_refused_for_other_logs(changed: dict[str, Any], words: str, place
     made = replace(made, conditions=replace(made.conditions, **changed))
     prepared = prepare(Logs.by_role(session("cogging", 2)), DiagnosisSettings())
     with pytest.raises(UsageError, match=words) as refused:
-        refuse_unfit(made, prepared, (), "twin")
+        refuse_calibration(made, prepared, (), "twin")
     assert refused.value.code == "RRID-C02"
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.other_plants.cases import Case
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from tests.diagnose.sessions import but
 
 

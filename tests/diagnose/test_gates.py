@@ -14,7 +14,7 @@ import pytest
 from pipelines import diagnose
 from pipelines.errors import InputRejected, NothingMatched
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.diagnosis.gates import examined
+from pipelines.model.diagnosis.asked.gates import examined
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import session, written
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.motion import Reconstruction, reconstruct
 from tests.diagnose.sessions import but, session
 

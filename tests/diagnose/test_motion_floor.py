@@ -11,11 +11,11 @@ from pipelines.bench import experiments
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.drive_noise import _roughness
-from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.floor.drive_noise import _roughness
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from tests.diagnose.sessions import but
 
 

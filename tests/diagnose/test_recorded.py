@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from benchmarks.recorded_diagnosis import Judged, imported, judged_odrive, judged_tx40, nested_error, payoff, searched
-from pipelines.model.diagnosis.inputs import Logs, prepare
-from pipelines.model.diagnosis.search import Found
-from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.searched.search import Found
 
 _FOLDS = 5
 _TORQUE_CONSTANT = 0.0551  # N m/A

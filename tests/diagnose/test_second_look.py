@@ -16,14 +16,15 @@ from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.diagnosis import diagnose as whole
-from pipelines.model.diagnosis import second_look, told
+from pipelines.model.diagnosis.answered import told
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed import second_look
+from pipelines.model.diagnosis.believed.pruned import NEAR_THE_FLOOR
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.pruned import NEAR_THE_FLOOR
+from pipelines.model.diagnosis.floor.twin import Twin
+from pipelines.model.diagnosis.named.verdict import REST_OF_A_LAW, Ruling
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.twin import Twin
-from pipelines.model.diagnosis.verdict import REST_OF_A_LAW, Ruling
 from tests.diagnose.sessions import but
 from tests.model.diagnosis.made_up import FLOOR, effect, left, searched
 

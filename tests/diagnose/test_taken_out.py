@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from tests.diagnose.sessions import but, session
 
 _LIBRARY = but("torque_offset", "stribeck")  # neither is like what is hidden here

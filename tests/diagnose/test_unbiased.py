@@ -16,14 +16,14 @@ from pipelines.bench import experiments
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.diagnosis import unbiased
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.refit import Refined, moved_by, refine
-from pipelines.model.diagnosis.search import Found, Step
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.unbiased import smoothed_away
+from pipelines.model.diagnosis.answered import unbiased
+from pipelines.model.diagnosis.answered.unbiased import smoothed_away
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import Refined, moved_by, refine
+from pipelines.model.diagnosis.searched.search import Found, Step
 
 MACHINES = (1501, 1502, 1503, 1505)
 

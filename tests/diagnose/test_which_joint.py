@@ -10,10 +10,10 @@ import pytest
 from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.sessions import record_case
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from tests.diagnose.sessions import but
 
 WRONG = 1.1

@@ -12,7 +12,7 @@ import pytest
 
 from pipelines.log.field_words import words_of
 from pipelines.log.result_words import WORDS
-from pipelines.model.diagnosis.calibration import Calibration
+from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.stage import result_type
 from rrrid_cli.commands.application import STAGES
 from rrrid_cli.commands.tools import _schema
@@ -64,7 +64,7 @@ def test_no_words_are_left_over() -> None:
 
 def test_words_stand_beside_their_field() -> None:
     """A comment on the field's line or right above it, of the class itself or of the one it extends; units stand in it."""
-    from pipelines.model.diagnosis.outcome import Result
+    from pipelines.model.diagnosis.answered.outcome import Result
     from pipelines.model.motion_result import LogResult
 
     assert words_of(LogResult)["predicted"].startswith("predicted: samples in which the position of some joint was not measured")

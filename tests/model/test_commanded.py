@@ -16,7 +16,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.commanded import against_command, commanded
-from pipelines.model.diagnosis.gates import examined
+from pipelines.model.diagnosis.asked.gates import examined
 from pipelines.model.plausibility import mismatches
 from tests.healthy import with_signal
 

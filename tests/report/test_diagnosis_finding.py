@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Drawing
 
+from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
 from pipelines.model.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
-from pipelines.model.diagnosis.words import how_much, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
 from pipelines.report.diagnosis_words import together, what_stays

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.outcome import Result
+from pipelines.model.diagnosis.answered.outcome import Result
 from pipelines.model.diagnosis.result import (
     BeforeAfter,
     Detectable,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.log.model_file import ModelFile
-from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.result import BeforeAfter, Curve, Diagnosis, Evidence, Gain, ResidualRms, TorqueGain
 from pipelines.model.excitation.limits import Limit
 from pipelines.report.diagnosis_finding import gain_table

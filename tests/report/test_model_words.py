@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipelines.model.diagnosis.unasked import FewerTerms
+from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.report.model_words import fewer_words, laws_words
 
 MERGED = "w1 = 124 ± 6e+04 s/rad and w2 = 124 ± 9e+04 s/rad may be one"

@@ -11,7 +11,7 @@ import pytest
 
 from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
-from pipelines.model.diagnosis.outcome import Extension
+from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.run_ledger import ledger_lines

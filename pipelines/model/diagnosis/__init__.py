@@ -1,24 +1,28 @@
 """What the simulation of an arm gets wrong, and why: every effect tried on what the nominal model leaves.
 
-`diagnose` is the whole of it in the order in which it happens, `changed` the same with reference logs, `extend` what follows for
-causes that somebody names. Where to look, in that order:
+`diagnose`, `changed` and `extend` answer one question each; a folder is a part of the way there, and its docstring the map of it:
 
-    asked           settings, gates, inputs, memory
-    rows            data, sharper, stretch, signals; kept, what was laid already; ripple and whitening, noise of rows
-    nominal model   nominal, dissipation, curves, change_of_sign, terms_apart; linear, least squares around a solution
-    what acts       exact, record, slopes, refit; beside, what is known from elsewhere; numbers, as they are reported
-    responses       responding, compliance: what gives way is named by them, and subtracted first
+    diagnose     what the nominal model gets wrong in these logs: the whole of it in the order in which it happens
+    changed      what has changed since the reference logs: the same, with these beside
+    extend       what follows for causes that somebody names
+    result       what they answer with: everything found, nothing drawn
+    memory       what was worked out of logs, for whoever asks the same of them again
 
-    floor           floored: by a twin (replay, twin, drive_noise, imperfections, clean, waves), or stored (calibration, calibrated,
-                    calibration_file); motion_floor and by_speed, of other motion; thresholds, wide, what has to be exceeded
-    search          case, candidates, screen, through; gate, hypotheses, ledger, search; parsimony, elsewhere, unnameable, wanted
-    second look     second_look, in white rows; steadied, unbiased, what noise and sampling did to the numbers
+Where to look, in the order in which it happens:
 
-    believed        verdict; pruned, what is dropped again: borne_out, chance, blocked, fewer, mended, mistaken, momentary,
-                    straying, which_joint; held_out, gains, chain, what it is worth; doubted, with own_motion, oscillating,
-                    extrapolated
-    what changed    since, standing, standing_shapes, stood, unchanged; absorbed and carried, what base parameters took in
+    asked        settings and logs, and what has to be in order before any physics is blamed
+    rows         logs as equations: how signals become rows, and what noise these have
+    fitted       the nominal model on the rows, and an arm with its effects exactly, every number at once
+    given        what is settled before anything is looked for: frequency responses, laws of dry friction, reference logs, the floor
+    reference    what the reference logs have as well, and what base parameters took in since
+    screened     every cause that could be, and how much of the residual it would take away, to first order
+    floor        what an arm in order leaves, and so what a cause has to exceed
+    searched     causes found one after the other, each fitted exactly beside those before it
+    named        which of the causes found are named, and what is told of each
+    believed     what is dropped again, and what is doubted: other time, other causes, other noise
+    worth        numbers and proof of a cause, and what it is worth on what was held out
+    unseen       what these logs cannot tell: what would have been found
+    answered     findings, doubts and limits put together, down to the sentence for a technician
 
-    told            told, findings, joined, evidence, simulated, words, result, outcome
-    not told        limits, with injection and injection_of_shapes: what would have been found; without_limit, unasked
+What imports what is another order: `DIAGNOSIS` in tests/test_layers.py holds it, from the bottom up.
 """

@@ -16,34 +16,34 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.log.shared_work import meanwhile
-from pipelines.model.diagnosis.absorbed import Absorbed, Unexplained
-from pipelines.model.diagnosis.beside import acted
-from pipelines.model.diagnosis.calibrated import conditions_of, origin_of, refuse_unfit
-from pipelines.model.diagnosis.calibration import Calibration
-from pipelines.model.diagnosis.candidates import Family
-from pipelines.model.diagnosis.carried import carried, unmoved
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.data import Data
-from pipelines.model.diagnosis.doubted import unlike_noise, unnamed
-from pipelines.model.diagnosis.floored import Floored
-from pipelines.model.diagnosis.imperfections import DriveNoise
-from pipelines.model.diagnosis.inputs import Prepared
-from pipelines.model.diagnosis.ledger import line_of_moved
+from pipelines.model.diagnosis.answered.told import Limits, diagnosis_of, limits_of, sentence, strongest
+from pipelines.model.diagnosis.asked.inputs import Prepared
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed.doubted import unlike_noise, unnamed
+from pipelines.model.diagnosis.believed.oscillating import oscillation
+from pipelines.model.diagnosis.believed.pruned import settled
+from pipelines.model.diagnosis.believed.steadied import steadied, steady_nominal
+from pipelines.model.diagnosis.believed.unchanged import stood_before
+from pipelines.model.diagnosis.floor.calibrated import conditions_of, origin_of, refuse_calibration
+from pipelines.model.diagnosis.floor.calibration import Calibration
+from pipelines.model.diagnosis.floor.motion_floor import motion_floor, noise_in
+from pipelines.model.diagnosis.given.floored import Floored
+from pipelines.model.diagnosis.given.responding import Responding
+from pipelines.model.diagnosis.given.since import Since, since_reference
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.motion_floor import motion_floor, noise_in
-from pipelines.model.diagnosis.oscillating import oscillation
-from pipelines.model.diagnosis.pruned import settled
-from pipelines.model.diagnosis.responding import Responding
+from pipelines.model.diagnosis.named.carried import carried, unmoved
+from pipelines.model.diagnosis.named.verdict import Ruling, rule
+from pipelines.model.diagnosis.reference.absorbed import Absorbed, Unexplained
+from pipelines.model.diagnosis.reference.standing import Chance
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Rejected
-from pipelines.model.diagnosis.search import Found, search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.simulated import arms_of, as_simulated, followed_by, with_simulation
-from pipelines.model.diagnosis.since import Since, since_reference
-from pipelines.model.diagnosis.standing import Chance
-from pipelines.model.diagnosis.steadied import steadied, steady_nominal
-from pipelines.model.diagnosis.told import Limits, diagnosis_of, limits_of, sentence, strongest
-from pipelines.model.diagnosis.unchanged import stood_before
-from pipelines.model.diagnosis.verdict import Ruling, rule
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.rows.imperfections import DriveNoise
+from pipelines.model.diagnosis.screened.candidates import Family
+from pipelines.model.diagnosis.searched.beside import acted
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.ledger import line_of_moved
+from pipelines.model.diagnosis.searched.search import Found, search
+from pipelines.model.diagnosis.worth.simulated import arms_of, as_simulated, followed_by, with_simulation
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.words import within
@@ -63,7 +63,7 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
     """What is different since the reference logs."""
     logs = [log for log, _ in first.held.prepared.referring]
     if given is not None:
-        refuse_unfit(given, first.held.prepared, first.held.case.families, "reference logs", logs)
+        refuse_calibration(given, first.held.prepared, first.held.case.families, "reference logs", logs)
     known = None if given is None else (given.weight, {(one.cause, one.joint): one.own for one in given.causes})
     taken = first.held.case.beside
     since = (since_reference(first.held.prepared, reference, chosen, taken, known) if taken or known is not None else

@@ -15,30 +15,30 @@ from functools import partial
 
 from pipelines.errors import InputRejected
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.beside import Held
-from pipelines.model.diagnosis.calibrated import following_of
-from pipelines.model.diagnosis.calibration import Calibration
-from pipelines.model.diagnosis.candidates import families, whole_motion
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.change_of_sign import SEVERAL, loosened, of_one_law, plainer_of, shows, wrong_law
+from pipelines.model.diagnosis.answered.told import diagnosis_of
+from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.believed.doubted import of_replicas, unlike_motion, unlike_noise, without_replay, without_twin
+from pipelines.model.diagnosis.believed.pruned import settled
+from pipelines.model.diagnosis.believed.second_look import looked_again
 from pipelines.model.diagnosis.changed import changed
-from pipelines.model.diagnosis.doubted import of_replicas, unlike_motion, unlike_noise, without_replay, without_twin
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.floored import floored_by
-from pipelines.model.diagnosis.held_out import held_out_left
-from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.own_motion import put_right
+from pipelines.model.diagnosis.floor.calibrated import following_of
+from pipelines.model.diagnosis.floor.calibration import Calibration
+from pipelines.model.diagnosis.given.change_of_sign import SEVERAL, loosened, of_one_law, plainer_of, shows, wrong_law
+from pipelines.model.diagnosis.given.floored import floored_by
+from pipelines.model.diagnosis.given.responding import Responding, responding
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.own_motion import put_right
-from pipelines.model.diagnosis.pruned import settled
-from pipelines.model.diagnosis.responding import Responding, responding
+from pipelines.model.diagnosis.named.verdict import rule
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.search import Explored, gap_first, gives_way, glance, greatest, provisional, search
-from pipelines.model.diagnosis.second_look import looked_again
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.told import diagnosis_of
-from pipelines.model.diagnosis.verdict import rule
-from pipelines.model.diagnosis.without_limit import without_limit
+from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.searched.beside import Held
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.search import Explored, gap_first, gives_way, glance, greatest, provisional, search
+from pipelines.model.diagnosis.unseen.without_limit import without_limit
+from pipelines.model.diagnosis.worth.held_out import held_out_left
 
 __all__ = ["diagnose"]
 

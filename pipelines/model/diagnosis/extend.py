@@ -18,35 +18,35 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.absorbed import Absorbed
-from pipelines.model.diagnosis.beside import Held, acted, judged
-from pipelines.model.diagnosis.candidates import place_of
-from pipelines.model.diagnosis.carried import carried
-from pipelines.model.diagnosis.case import Case
-from pipelines.model.diagnosis.chance import BY_CHANCE
-from pipelines.model.diagnosis.change_of_sign import clearly_less, loosened, shows
-from pipelines.model.diagnosis.drive_noise import white
-from pipelines.model.diagnosis.exact import Exact
-from pipelines.model.diagnosis.findings import extended_arm, findings, held_finding
-from pipelines.model.diagnosis.gains import farther, gain_of, simulation_errors, torque_gain_of
-from pipelines.model.diagnosis.held_out import held_out_left
-from pipelines.model.diagnosis.inputs import GAP_HZ, Logs, Prepared, narrowed
-from pipelines.model.diagnosis.ledger import UNBELIEVABLE
+from pipelines.model.diagnosis.answered.unbiased import unbiased
+from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.unasked import FewerTerms
+from pipelines.model.diagnosis.believed.chance import BY_CHANCE
+from pipelines.model.diagnosis.believed.pruned import at_odds, vague
+from pipelines.model.diagnosis.believed.steadied import steadied, steady
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import Refined
+from pipelines.model.diagnosis.floor.drive_noise import white
+from pipelines.model.diagnosis.floor.thresholds import Thresholds
+from pipelines.model.diagnosis.given.change_of_sign import clearly_less, loosened, shows
+from pipelines.model.diagnosis.given.responding import Responding, responding
+from pipelines.model.diagnosis.given.since import Moved, since_reference
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.nominal import fit_nominal
-from pipelines.model.diagnosis.pruned import at_odds, vague
-from pipelines.model.diagnosis.refit import Refined
-from pipelines.model.diagnosis.responding import Responding, responding
+from pipelines.model.diagnosis.named.carried import carried
+from pipelines.model.diagnosis.named.findings import extended_arm, findings, held_finding
+from pipelines.model.diagnosis.named.verdict import Ruling
+from pipelines.model.diagnosis.reference.absorbed import Absorbed
 from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
-from pipelines.model.diagnosis.search import Found, search
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import Moved, since_reference
-from pipelines.model.diagnosis.steadied import steadied, steady
-from pipelines.model.diagnosis.thresholds import Thresholds
-from pipelines.model.diagnosis.unasked import FewerTerms
-from pipelines.model.diagnosis.unbiased import unbiased
-from pipelines.model.diagnosis.verdict import Ruling
-from pipelines.model.diagnosis.wanted import Wanted, wanted_families
+from pipelines.model.diagnosis.screened.candidates import place_of
+from pipelines.model.diagnosis.searched.beside import Held, acted, judged
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.ledger import UNBELIEVABLE
+from pipelines.model.diagnosis.searched.search import Found, search
+from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
+from pipelines.model.diagnosis.worth.gains import farther, gain_of, simulation_errors, torque_gain_of
+from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
 

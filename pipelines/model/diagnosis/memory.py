@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 
 from pipelines.errors import Check
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.gates import examined
-from pipelines.model.diagnosis.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.since import Since, since_reference
-from pipelines.model.diagnosis.terms_apart import with_terms_told_apart
+from pipelines.model.diagnosis.asked.gates import examined
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.given.since import Since, since_reference
+from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
 
 __all__ = ["Memory"]
 

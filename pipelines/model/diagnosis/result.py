@@ -12,8 +12,8 @@ from typing import Literal
 from pipelines.log.experiment import Array
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.calibration import Calibration
-from pipelines.model.diagnosis.unasked import FewerTerms, WithoutLimit
+from pipelines.model.diagnosis.asked.unasked import FewerTerms, WithoutLimit
+from pipelines.model.diagnosis.floor.calibration import Calibration
 
 __all__ = ["RIVALS", "Answer", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable",
            "Proof", "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from pipelines.log import shared_work
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects import effect_names
 from tests.model.diagnosis.arms import hidden, wave
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.wanted import Wanted
+from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden, wave

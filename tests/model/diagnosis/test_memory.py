@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from pipelines.model.diagnosis import memory as module
-from pipelines.model.diagnosis.change_of_sign import loosened
-from pipelines.model.diagnosis.inputs import Logs
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.given.change_of_sign import loosened
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.settings import DiagnosisSettings
 from pipelines.model.effects.coulomb import Coulomb
 from tests.model.diagnosis.arms import hidden
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import pytest
 
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.inputs import Logs
-from pipelines.model.diagnosis.settings import DiagnosisSettings
-from pipelines.model.diagnosis.wanted import Wanted
+from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects.cogging import Cogging
-from tests.model.diagnosis.test_through import turned
+from tests.model.diagnosis.screened.test_through import turned
 
 SETTINGS = DiagnosisSettings(replicas=0, cutoff_hz=40.0)
 

@@ -1,0 +1,7 @@
+"""What is answered: findings, doubts and limits put together.
+
+    told        findings and what they gain, what the logs cannot show, and the sentence for a technician
+    words       words that this sentence and the report share
+    unbiased    numbers less what sampling and smoothing did to them
+    outcome     what the stages `diagnose` and `extend` leave
+"""

@@ -1,0 +1,53 @@
+"""What the stages `diagnose` and `extend` leave: what was found, and what their reports say besides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pipelines.errors import Check
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.model_file import ModelFile
+from pipelines.log.results import NOT_STORED
+from pipelines.model.diagnosis.asked.unasked import FewerTerms
+from pipelines.model.diagnosis.memory import Memory
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
+
+__all__ = ["Extension", "Result"]
+
+
+@dataclass(frozen=True)
+class Result(Diagnosis):
+    """A diagnosis with the names of its robot and what the doctor remarked."""
+
+    robot: str = ""
+    joints: tuple[str, ...] = ()  # names
+    rated: tuple[float, ...] = ()  # [N m] rated torque of each; infinite where nobody knows it
+    without: tuple[str, ...] = ()  # causes that were left out
+    doctor: tuple[Check, ...] = ()
+    calibrated_with: tuple[str, ...] = ()  # logs of an earlier diagnosis, whose thresholds were taken; none: its own
+    laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
+    memory: Memory | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class Extension:
+    """A model extended, or why it was not."""
+
+    accepted: bool  # every cause that was named
+    causes: tuple[str, ...]  # as they were named
+    findings: tuple[Finding, ...]  # accepted
+    rejected: tuple[Rejected, ...]
+    gain: Gain | None  # of all accepted together
+    residual_rms: ResidualRms  # before
+    after_rms: ResidualRms
+    held_out: Literal["logs", "blocks"]
+    standing: tuple[str, ...]  # effects that the reference logs show as well; the model has them
+    robot: str
+    joints: tuple[str, ...]
+    rated: tuple[float, ...]  # [N m]
+    doctor: tuple[Check, ...]
+    model: ModelFile | None  # None where nothing was accepted
+    laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
+    fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart
+    derived: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED, repr=False)

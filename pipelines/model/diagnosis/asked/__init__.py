@@ -1,0 +1,7 @@
+"""What is asked, of which logs, and whether they can be asked that: before any row is fitted.
+
+    settings     what can be chosen
+    inputs       the logs, prepared: to fit, to judge, to refer to
+    gates        columns, signs, scales and clocks mixed up, and the doctor's checks
+    unasked      what is said though nobody asked: causes without a size to tell, laws that gave way to plainer ones
+"""

@@ -1,0 +1,81 @@
+"""What has to be in order before any physics is blamed: the doctor's checks, and columns, signs, scales and clocks mixed up.
+
+    said = examined(logs)           what the doctor remarks of each log; InputRejected where no diagnosis makes sense
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.log.derive import recording
+from pipelines.log.doctor.checks import Subject, check_log
+from pipelines.log.experiment import ExperimentLog
+from pipelines.log.shared_work import shared_out
+from pipelines.model.commanded import against_command
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.plausibility import mismatches
+
+__all__ = ["examined", "logs_of_roles"]
+
+
+def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tuple[Check, ...]:
+    """What the doctor says of the logs, checks that found nothing apart.
+
+    Raises:
+        InputRejected: its first reason to reject a log; S13, S14, S15, T06: torque and motion of a log do not belong together,
+            with the repair, unless `allow_mismatch`.
+    """
+    every = list(logs)
+    said = shared_out(partial(_said, allow_mismatch=allow_mismatch), every)
+    for told in said:
+        if isinstance(told, Check):
+            raise told.as_error()
+    return tuple(check for told in said if not isinstance(told, Check) for check in told)
+
+
+def _said(log: ExperimentLog, allow_mismatch: bool) -> tuple[Check, ...] | Check:
+    """Of one log; the check that rejects it, where one does."""
+    subject = Subject(recording(log))
+    checks = [check for check in check_log(subject) if check.level != "ok"]
+    if reject := next((check for check in checks if check.level == "reject"), None):
+        # A controller says by how much a torque is too large, its limits only that it is.
+        exact = against_command(subject) if reject.code == "RRID-S05" else ()
+        return next((check for check in exact if check.code == "RRID-S10"), reject)
+    against = mismatches(subject)
+    if not allow_mismatch and (gate := next((check for check in against if check.gate), None)):
+        return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch")
+    return tuple(replace(check, gate=False) for check in (*checks, *against))
+
+
+def logs_of_roles(logs: Sequence[ExperimentLog], label: str) -> Logs:
+    """The logs by what they are for; plans are none.
+
+    Raises:
+        NothingMatched: C06, no log to fit.
+        UsageError: C02, logs of several robots.
+        InputRejected: D14, one recording in two roles.
+    """
+    known = [log for log in logs if log.origin != "planned"]
+    if len({log.robot_text for log in known}) > 1:
+        raise UsageError("C02", "logs of several robots", where=label,
+                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+    chosen = Logs.by_role(known)
+    if not chosen.identify:
+        kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in known})) or "none"
+        raise NothingMatched("C06", f"no excitation, free or writing log of role identify; there are: {kinds}", where=label,
+                             remedy="record an excitation, or name the logs to fit: --identify PATH")
+    _refuse_leak(chosen.identify, chosen.validate)
+    _refuse_leak(chosen.reference, (*chosen.identify, *chosen.validate))
+    return chosen
+
+
+def _refuse_leak(fitted: Sequence[ExperimentLog], judging: Sequence[ExperimentLog]) -> None:
+    """D14: what a model was fitted to must not judge it."""
+    seen = {log.q.tobytes() + log.tau.tobytes(): log for log in fitted}
+    for log in judging:
+        if (same := seen.get(log.q.tobytes() + log.tau.tobytes())) is not None:
+            raise InputRejected("D14", f"leak: {same.name} and {log.name} hold the same samples with roles {same.role} and "
+                                f"{log.role}", where=log.source or log.name, remedy="judge on another recording")

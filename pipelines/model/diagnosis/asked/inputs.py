@@ -1,0 +1,150 @@
+"""The logs of a diagnosis, and what is made of them before anything is suspected.
+
+    prepared = prepare(logs, settings, arm)
+    prepared = narrowed(prepared, 20.0, speeds)  the same through a lower low-pass, without slow samples
+    prepared.data, prepared.judge, prepared.columns
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.unasked import FewerTerms
+from pipelines.model.diagnosis.rows.data import Data, gather
+from pipelines.model.diagnosis.rows.sharper import sharpened
+from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, refuse_too_few, with_cutoff
+from pipelines.model.estimation.nominal import nominal_columns
+from pipelines.model.estimation.regression import Columns
+from pipelines.model.motion import Reconstruction
+
+__all__ = ["GAP_HZ", "Logs", "Prepared", "narrowed", "prepare"]
+
+GAP_HZ = 10.0  # below it a gap's torque is that of the gap; above, that of the tooth on which the link rings
+Joints = npt.NDArray[np.bool_]
+
+_HELD = 0.02  # of its largest speed in all logs, below which a joint is held throughout a log
+_MOVING = ("excitation", "free", "writing")  # experiments in which all joints move: a joint that is held sticks, and no law tells
+
+
+@dataclass(frozen=True)
+class Logs:
+    """Logs of one robot, by what they are for."""
+
+    identify: tuple[ExperimentLog, ...]
+    validate: tuple[ExperimentLog, ...] = ()
+    reference: tuple[ExperimentLog, ...] = ()
+    frf: tuple[ExperimentLog, ...] = ()
+    frf_before: tuple[ExperimentLog, ...] = ()  # of role "reference"
+
+    @classmethod
+    def by_role(cls, logs: Sequence[ExperimentLog]) -> Logs:
+        """Chosen by what they say of themselves."""
+        moving = [log for log in logs if log.experiment in _MOVING and log.origin != "planned"]
+        parts = {role: tuple(log for log in moving if log.role == role) for role in ("identify", "validate", "reference")}
+        return cls(parts["identify"], parts["validate"], parts["reference"],
+                   *(tuple(log for log in logs if log.experiment == "frf" and (log.role == "reference") is before)
+                     for before in (False, True)))
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Rows of every kind of logs."""
+
+    logs: Logs
+    columns: Columns  # of the nominal model, its friction laws in their first shape
+    recipe: Recipe
+    motions: Motions  # of the logs that are fitted
+    judging: Motions
+    referring: Motions
+    data: Data
+    judge: Data | None  # None: blocks of the fitted ones judge
+    reference: Data | None
+    fewer: tuple[FewerTerms, ...] = ()  # laws that gave way to plainer ones
+
+
+def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> Prepared:
+    """Reconstruct every log, and lay its rows; the cut-off is that of the fitted logs.
+
+    Args:
+        arm: whose friction laws the nominal model takes; Coulomb and viscous friction where left out.
+
+    Raises:
+        InputRejected: S01, no log to fit; T04, a log without a stretch that can be used; T08, of which, or of a joint, too few
+            equations are left.
+    """
+    if not logs.identify:
+        raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
+    columns = _columns(logs, arm)
+    how = Reconstruction()
+    parts = (logs.identify, logs.validate, logs.reference)
+    motions = motions_of([log for part in parts for log in part], how)
+    judged = slice(len(logs.identify), len(logs.identify) + len(logs.validate))
+    recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed),
+                         (*motions[:judged.start], *motions[judged.stop:]))
+    sharp = iter(sharpened(motions, recipe))
+    fitted, judging, referring = (tuple(islice(sharp, len(part))) for part in parts)
+    prepared = _laid(logs, columns, recipe, fitted, judging, referring)
+    refuse_too_few([one.equations for one in prepared.data.logs], fitted, 0)  # what so few do not tell, has no name
+    return prepared
+
+
+def narrowed(prepared: Prepared, cutoff_hz: float, min_speed: Sequence[float]) -> Prepared:
+    """The same logs through a low-pass at `cutoff_hz` at most, without samples of a joint slower than its `min_speed` [rad/s]."""
+    recipe = prepared.recipe
+    lower = cutoff_hz if recipe.cutoff_hz is None else min(cutoff_hz, recipe.cutoff_hz)
+    speeds = tuple(np.maximum(np.broadcast_to(np.array(recipe.min_speed), len(min_speed)), min_speed).tolist())
+    laid = _laid(prepared.logs, prepared.columns, replace(recipe, cutoff_hz=lower, min_speed=speeds), prepared.motions,
+                 prepared.judging, prepared.referring)
+    return replace(laid, fewer=prepared.fewer)
+
+
+def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging: Motions, referring: Motions) -> Prepared:
+    fastest = [np.abs(found.motion.dq[found.good.kept]).max(axis=0, initial=0.0) for _, found in (*fitted, *judging, *referring)]
+    held = list(np.array(fastest) < _HELD * np.max(fastest, axis=0))
+    rows: list[Data | None] = []
+    first = 0
+    for part in (fitted, judging, referring):
+        _refuse_held(part, held[first:first + len(part)], part is fitted)
+        rows.append(_moving(part, columns, recipe, held[first:first + len(part)], first) if part else None)
+        first += len(part)
+    data, judge, reference = rows
+    assert data is not None  # prepare refuses logs without any to fit
+    return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
+
+
+def _refuse_held(motions: Motions, held: Sequence[Joints], fitted: bool) -> None:
+    """T08: of a joint that moves in none of the fitted logs nothing can be said; logs in which no joint does say nothing."""
+    still = np.all(held, axis=0) if motions else np.zeros(1, dtype=bool)
+    if not (still.any() if fitted else still.all()):
+        return
+    log = motions[0][0]
+    which = "every joint" if still.all() else f"joint {int(np.argmax(still)) + 1}"
+    raise InputRejected("T08", f"{which} is held in the logs of role '{log.role}', and moves in others",
+                        where=log.source or log.name,
+                        remedy=f"record an excitation of role '{log.role}' in which it moves, or leave out {log.name}")
+
+
+def _moving(motions: Motions, columns: Columns, recipe: Recipe, held: Sequence[Joints], first: int) -> Data:
+    """The rows of logs; those of a joint that is held throughout a log do not count: it sticks, and no law tells its torque."""
+    if not any(still.any() for still in held):
+        return gather(motions, columns, recipe, first=first)
+    equations = equations_of(motions, recipe, columns)
+    rows = [replace(one.rows, slow=one.rows.slow | still) for one, still in zip(equations, held, strict=True)]
+    return gather(motions, columns, recipe, rows, first)
+
+
+def _columns(logs: Logs, arm: Arm | None) -> Columns:
+    columns = nominal_columns(logs.identify[0].robot, offset=False)
+    if arm is None or not arm.friction:
+        return columns
+    others = tuple(law for law in columns.laws if not law.friction)
+    return replace(columns, laws=(*(law.effect for law in arm.friction), *others))

@@ -1,0 +1,203 @@
+"""An arm with its effects exactly: the torque computed as the effects act, not to first order.
+
+    model = Exact.start(columns, fit)                     the nominal model
+    tried = model.with_effect(effect, amplitudes)         a cause more
+    tried.torque(data), tried.arm                         what it does
+
+The numbers are the base parameters, amplitudes and shapes of the friction laws, amplitudes and free shapes of the effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.fitted.nominal import Fit, effect_rows, law_rows, nominal_arm, rigid_rows, several_rows
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.effects.base import Effect, Quantity
+from pipelines.model.estimation.regression import Columns
+from pipelines.model.rigid.body import Motion
+
+__all__ = ["Exact", "Named", "law_of", "number_moved"]
+
+_FARTHEST = 0.5  # of ln shape, a step
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect with its amplitudes."""
+
+    effect: Effect
+    amplitudes: tuple[float, ...]
+    log: int | None = None  # number of the log it belongs to, where it happened once; None: it acts in all
+    tied: tuple[str, ...] = ()  # shapes that are those of the friction at its joint
+    held: tuple[str, ...] = ()  # shapes that are not fitted
+
+    @property
+    def values(self) -> dict[str, float]:
+        return self.effect.values(np.array(self.amplitudes))
+
+    @property
+    def free_shapes(self) -> list[Quantity]:
+        return [q for q in self.effect.parameters if q.name in self.effect.free and q.name not in (*self.tied, *self.held)]
+
+    @property
+    def free_amplitudes(self) -> bool:
+        return self.effect.fixed_amplitudes is None
+
+    @property
+    def count(self) -> int:
+        """Numbers that are fitted."""
+        return len(self.free_shapes) + (len(self.amplitudes) if self.free_amplitudes else 0)
+
+    @property
+    def possible(self) -> bool:
+        """Whether every number lies in its range, amplitudes of derived sign apart."""
+        return self.effect.possible(self.values)
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """A model with all its numbers."""
+
+    columns: Columns  # laws in their shapes
+    beta: Array  # of the rigid body and the laws
+    effects: tuple[Named, ...]
+    standing: tuple[Acting, ...] = ()  # that just add; their torque was subtracted from the rows, over the motion as it was read
+
+    @classmethod
+    def start(cls, columns: Columns, fit: Fit) -> Exact:
+        count = len(columns.kept) + sum(not q.shape for law in columns.laws for q in law.parameters)
+        return cls(columns, fit.beta[:count].copy(), ())
+
+    def with_effect(self, effect: Effect, amplitudes: Array, log: int | None = None, held: tuple[str, ...] = ()) -> Exact:
+        given = amplitudes if effect.fixed_amplitudes is None else effect.fixed_amplitudes
+        tied = tuple(name for name in effect.shared if law_of(self.columns.laws, effect, name) is not None)
+        return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log, tied, held)))
+
+    def without(self, place: int) -> Exact:
+        return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
+
+    def beside(self, nominal: Exact) -> Exact:
+        """Its effects beside another nominal model."""
+        own = tuple(_following(one, nominal.columns.laws) for one in self.effects)
+        return replace(nominal, effects=own, standing=self.standing)
+
+    @cached_property
+    def nominal(self) -> Arm:
+        return nominal_arm(self.columns, self.beta)
+
+    @cached_property
+    def arm(self) -> Arm:
+        """With every effect that does not belong to one log."""
+        return self.arm_in(-1)
+
+    def arm_in(self, log: int) -> Arm:
+        """As it was in log number `log`."""
+        turning = self.columns.body.robot.revolute
+        acting = [Acting.of(one.effect, one.values, revolute=one.effect.joint is None or turning[one.effect.joint - 1])
+                  for one in self.effects if one.log in (None, log)]
+        return self.nominal.extended(*acting)
+
+    def torque_in(self, log: int, motion: Motion) -> Array:
+        """(samples, joints) [N m] in log number `log`, less what stands beside the model where nothing acts on it."""
+        arm = self.arm_in(log)
+        if not self.standing:
+            return arm.torque(motion)
+        known = sum(one.effect.torque(motion, self.nominal, one.values) for one in self.standing)
+        return np.asarray(replace(arm, effects=(*self.standing, *arm.effects)).torque(motion) - known)
+
+    @property
+    def core(self) -> int:
+        """How many of the effects the torque has to be worked out with as a whole: all up to the last that does not just add."""
+        if any(one.effect.last or one.effect.in_drive or one.effect.misread for one in self.effects):
+            return len(self.effects)
+        return max((k + 1 for k, one in enumerate(self.effects) if not one.effect.adds), default=0)
+
+    def torque(self, data: Data, laid: Sequence[Array] | None = None) -> Array:
+        """(rows,); `laid` as in `laid`, where it is known."""
+        core, parts = self.core, self.laid(data) if laid is None else laid
+        added = [one.effect.amplitudes(one.values) @ part for one, part in zip(self.effects[core:], parts, strict=True)]
+        return np.asarray(sum(added, self.core_torque(data, core)))
+
+    def laid(self, data: Data) -> list[Array]:
+        """Columns (k, rows) of each of the effects that just add."""
+        return [self.columns_of(data, one) for one in self.effects[self.core:]]
+
+    def core_torque(self, data: Data, core: int) -> Array:
+        """(rows,) of the nominal model and the first `core` effects, which act on what stands beside it as well."""
+        if core:
+            inner = replace(self, effects=self.effects[:core])
+            return data.lay_each(lambda log, motion: inner.torque_in(log, motion))
+        if not all(law.from_motion for law in self.columns.laws):
+            return data.lay(self.nominal.torque)
+        kept = len(self.columns.kept)
+        torque, first = self.beta[:kept] @ rigid_rows(data, self.columns), kept
+        for law in self.columns.laws:
+            count = sum(not q.shape for q in law.parameters)
+            torque = torque + self.beta[first:first + count] @ law_rows(data, law, self.columns)
+            first += count
+        return np.asarray(torque)
+
+    def added(self, data: Data, *several: Named) -> list[Array]:
+        """(rows,) what an effect adds beside the nominal model, in the logs it belongs to, each with other numbers."""
+        rows = several_rows(data, [one.effect.at(one.values) for one in several], self.nominal)
+        return [np.asarray(one.effect.amplitudes(one.values) @ self._of_log(data, one, own))
+                for one, own in zip(several, rows, strict=True)]
+
+    def columns_of(self, data: Data, one: Named) -> Array:
+        """(k, rows) the same of each of its amplitudes."""
+        return self._of_log(data, one, effect_rows(data, one.effect.at(one.values), self.nominal))
+
+    def _of_log(self, data: Data, one: Named, columns: Array) -> Array:
+        return columns if one.log is None else np.where(data.log_of == one.log - data.first, columns, 0.0)
+
+    def moved(self, shift: Array, names: Sequence[tuple[int, int, str]]) -> Exact:
+        """Every number moved: base first, then what `names` says: shapes of laws, numbers of effects."""
+        first = len(self.beta)
+        laws, effects = list(self.columns.laws), list(self.effects)
+        for (kind, place, name), by in zip(names, shift[first:].tolist(), strict=True):
+            if kind == 0:
+                laws[place] = _shape_moved(laws[place], name, by)
+            else:
+                effects[place] = number_moved(effects[place], name, by)
+        effects = [_following(one, laws) for one in effects]
+        columns = replace(self.columns, laws=tuple(laws))
+        return replace(self, columns=columns, beta=self.beta + shift[:first], effects=tuple(effects))
+
+
+def law_of(laws: Sequence[Effect], effect: Effect, name: str) -> int | None:
+    """Which of the laws at the joint of `effect` has a shape `name`."""
+    return next((k for k, law in enumerate(laws) if law.joint == effect.joint
+                 and any(q.shape and q.name == name for q in law.parameters)), None)
+
+
+def _following(one: Named, laws: Sequence[Effect]) -> Named:
+    """The effect with what it shares with the friction at its joint."""
+    at = {name: law_of(laws, one.effect, name) for name in one.tied}
+    shape: dict[str, Any] = {name: getattr(laws[k], name) for name, k in at.items() if k is not None}
+    return replace(one, effect=replace(one.effect, **shape)) if shape else one
+
+
+def _shape_moved(effect: Effect, name: str, by: float) -> Effect:
+    """A shape of positive range moves by its logarithm, any other by itself."""
+    quantity = next(q for q in effect.parameters if q.name == name)
+    here = float(getattr(effect, name))
+    there = here * float(np.exp(np.clip(by, -_FARTHEST, _FARTHEST))) if quantity.low > 0.0 else here + by
+    shape: dict[str, Any] = {name: float(np.clip(there, quantity.low, quantity.high))}
+    return replace(effect, **shape)
+
+
+def number_moved(one: Named, name: str, by: float) -> Named:
+    """Amplitude number `name`, or the shape of that name, moved: a shape of positive range by its logarithm."""
+    if name.isdigit():
+        amplitudes = list(one.amplitudes)
+        amplitudes[int(name)] += by
+        return replace(one, amplitudes=tuple(amplitudes))
+    return replace(one, effect=_shape_moved(one.effect, name, by))

@@ -1,0 +1,212 @@
+"""Fit an exact model: every number at once.
+
+    done = refine(model, data, weight)                    Gauss-Newton over everything
+    done.residual, done.fit.basis                         what is left, and what the model can imitate
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.fitted.dissipation import dissipating, driving
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.linear import covariance, left_out, solved, superfluous
+from pipelines.model.diagnosis.fitted.nominal import Fit, law_shapes, rigid_rows
+from pipelines.model.diagnosis.fitted.slopes import Which, slopes_of
+from pipelines.model.diagnosis.rows.data import Data
+
+__all__ = ["Refined", "moved_by", "refine"]
+
+_STEPS = 8
+_SHARES = (1.0, 0.4, 0.1)  # of a step, until one leaves less
+_RIDGES = (0.0, 1e-4, 1e-2)  # of unit columns: two numbers that do nearly the same would be moved far apart
+_GAIN = 1e-5  # of the squared residual: less is no progress
+_PARTS = 30  # blocks of time, of about a second: longer than noise remembers
+_INVISIBLE = 1e-3  # η below which a number is one that the others are as well
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A model fitted exactly."""
+
+    model: Exact
+    data: Data
+    weight: Array  # (joints,)
+    left: Array  # (rows,) [N m]
+    slopes: Array  # (numbers, rows) unweighted
+    names: tuple[Which, ...]  # of the slopes behind those of the base
+    known: Array | None = None  # (numbers, numbers) their covariance, where they were fitted to other rows
+
+    @cached_property
+    def weights(self) -> Array:
+        return np.asarray(self.weight[self.data.joint])
+
+    @property
+    def residual(self) -> Array:
+        """(rows,) weighted."""
+        return np.asarray(self.left * self.weights)
+
+    @cached_property
+    def fit(self) -> Fit:
+        """As a linear fit around the solution: what is orthogonal to it, the model cannot imitate by moving a little."""
+        return Fit(self.data, self.slopes, self.left, self.weight, np.zeros(len(self.slopes)), self.data.y - self.left)
+
+    @cached_property
+    def rss(self) -> float:
+        """Squared weighted residual, of rows as they are, steady or not: as thresholds are."""
+        return float(self.residual @ self.residual)
+
+    def steadied(self, table: Array) -> Array:
+        """Weighted rows (..., rows) as the numbers are fitted to them."""
+        return _steadied(self.data, table, self.weight)
+
+    @property
+    def rms(self) -> Array:
+        return self.data.rms(self.left)
+
+    @property
+    def of_effects(self) -> Array:
+        """(rows,) [N m] what all effects together do to the torque."""
+        return np.asarray(self.model.torque(self.data) - replace(self.model, effects=()).torque(self.data))
+
+    def of_effect(self, place: int) -> list[int]:
+        """Which slopes belong to effect number `place`."""
+        first = len(self.model.beta)
+        return [first + k for k, (kind, which, _) in enumerate(self.names) if kind == 1 and which == place]
+
+    @cached_property
+    def unseen(self) -> list[int]:
+        """Which slopes, of effects, the others are as well: those numbers stay where they were, for these logs do not tell them."""
+        if self.known is not None:  # where they were fitted they were held
+            return [k for k in range(len(self.model.beta), len(self.slopes)) if self.names[k - len(self.model.beta)][0] == 1
+                    and self.known[k, k] == 0.0]
+        return _superfluous(self.steadied(self.slopes * self.weights), len(self.model.beta), self.names)
+
+    def covariance(self) -> Array:
+        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held.
+
+        Of a number that blocks of time left out in turn move by more than that, what they say is its deviation: noise is not all
+        that is left. Not to be written to.
+        """
+        return self._own_covariance if self.known is None else self.known
+
+    @cached_property
+    def _own_covariance(self) -> Array:
+        seen = np.ones(len(self.slopes), dtype=bool)
+        seen[self.unseen] = False
+        table, whole = self.steadied((self.slopes * self.weights)[seen]), np.zeros((len(seen), len(seen)))
+        residual = self.steadied(self.residual)
+        noise = covariance(table, residual)
+        std = np.sqrt(np.maximum(np.diag(noise), 1e-300))
+        wider = np.maximum(left_out(table, residual, self.data.blocks(_PARTS)) / std, 1.0)
+        whole[np.ix_(seen, seen)] = noise * wider * wider[:, None]
+        whole.flags.writeable = False
+        return whole
+
+
+def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target: Array | None = None) -> Refined:
+    """Gauss-Newton with halved steps until the squared weighted residual no longer falls."""
+    with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
+        return _refined(model, data, weight, steps, data.y if target is None else target)
+
+
+def moved_by(done: Refined, left: Array) -> Refined:
+    """The model with every number moved as far as `left` (rows,) [N m], if it was left beside what is, would move it."""
+    table, y = (_steadied(done.data, x * done.weights, done.weight) for x in (done.slopes, left))
+    shift = _within(done.model, list(done.names), table, y, 0.0, done.data.rubbing)
+    model = done.model.moved(shift, done.names)
+    shapes = [(place, name) for kind, place, name in done.names if kind == 0]
+    if law_shapes(model.columns, model.beta) != shapes:  # a law that takes no torque now, or did not before
+        return _refined(model, done.data, done.weight, 0, done.data.y)
+    return replace(done, model=model, left=done.data.y - model.torque(done.data))
+
+
+def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
+    weights = weight[data.joint]
+
+    def steadied(table: Array) -> Array:
+        return _steadied(data, table * weights, weight)
+
+    rigid = rigid_rows(data, model.columns)
+    model = replace(model, beta=dissipating(model.beta, model.columns.laws, data.rubbing))
+    laid = model.laid(data)
+    left = y - model.torque(data, laid)
+    now = _power(data, left, weight)
+    slopes, names = slopes_of(model, data, rigid, laid)
+    for _ in range(steps):
+        better, table, y_left = False, steadied(slopes), steadied(left)
+        for ridge in _RIDGES:
+            shift = _within(model, names, table, y_left, ridge, data.rubbing)
+            for share in _SHARES:
+                there = model.moved(share * shift, names)
+                laid = there.laid(data)
+                other = y - there.torque(data, laid)
+                power = _power(data, other, weight)
+                if power < now:
+                    better = True
+                    break
+            if better:
+                break
+        if not better:
+            break
+        gained, model, left, now = 1.0 - power / now, there, other, power
+        slopes, names = slopes_of(model, data, rigid, laid)
+        if gained < _GAIN:
+            break
+    return Refined(model, data, weight, left, slopes, tuple(names))
+
+
+def _power(data: Data, left: Array, weight: Array) -> float:
+    residual = _steadied(data, left * weight[data.joint], weight)
+    return float(residual @ residual)
+
+
+def _steadied(data: Data, table: Array, weight: Array) -> Array:
+    return table if data.ripple is None else data.ripple.out_of(table, weight)
+
+
+def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float, known: Collection[int]) -> Array:
+    """The step for every number. The others do without one that would leave its range, and stays at its end; without friction that
+    would drive its joint; and without one of an effect that the rest of the model does as well: rounding would move it anywhere."""
+    first = len(model.beta)
+    stuck = _superfluous(table, first, names)
+    shift = _without(table, y, ridge, stuck)
+    beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
+    held = driving(model.beta, shift, model.columns.laws, known)
+    while beyond or held:
+        shift = _without(table, y + model.beta[held] @ table[held], ridge, [*stuck, *beyond, *held])
+        shift[held] = -model.beta[held]
+        more = driving(model.beta, shift, model.columns.laws, known)  # of those that were free until then
+        if not more:
+            break
+        held = sorted({*held, *more})
+    return shift
+
+
+def _superfluous(table: Array, first: int, names: Sequence[Which]) -> list[int]:
+    """Of the numbers of effects, whose slopes stand behind the `first` of `table` (numbers, rows)."""
+    return superfluous(table, [first + k for k, (kind, _, _) in enumerate(names) if kind == 1], _INVISIBLE)
+
+
+def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
+    free = np.ones(len(table), dtype=bool)
+    free[stuck] = False
+    shift = np.zeros(len(table))
+    shift[free] = solved(table[free], y, ridge)
+    return shift
+
+
+def _beyond(model: Exact, which: Which, by: float) -> bool:
+    """Whether a shape stands at the end of its range, and `by` points out of it."""
+    kind, place, name = which
+    if name.isdigit():
+        return False
+    effect = model.columns.laws[place] if kind == 0 else model.effects[place].effect
+    quantity = next(q for q in effect.parameters if q.name == name)
+    here = float(getattr(effect, name))
+    return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)

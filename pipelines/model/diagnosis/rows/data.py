@@ -1,0 +1,287 @@
+"""The equations of all logs as plain arrays: whatever is a torque over a motion is averaged, filtered and thinned out alike.
+
+    data = gather(motions, columns, recipe)
+    data.y                              (rows,) measured torque of every log and joint, one behind the other
+    data.lay(lambda motion: torque)     (rows,) any torque, or (rows, k) of k columns, in the same rows
+
+One log's rows are those of its first joint in order of time, then those of its second …; the logs follow each other. What is
+done to a signal is linear, and done to torque and columns alike, in the frequency domain: for a held command the average over two
+samples (`signal.filters.centre_samples`), the zero-phase low-pass |H|², and nothing beyond half the rate of the thinned rows. Rows
+next to the end of a stretch, where the low-pass has to guess what was before, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.diagnosis.rows.kept import Kept
+from pipelines.model.diagnosis.rows.ripple import Ripple
+from pipelines.model.diagnosis.rows.stretch import PAD, Run, run_of
+from pipelines.model.diagnosis.rows.whitening import Whitening
+from pipelines.model.estimation.logs import Motions, Recipe, equations_of
+from pipelines.model.estimation.regression import Columns, LogEquations, Rows
+from pipelines.model.rigid.body import Motion
+
+__all__ = ["Data", "LogData", "gather"]
+
+Indices = npt.NDArray[np.intp]
+
+_AMPLE = 24.0  # samples a period of the cut-off, at which columns are worked out at least
+
+
+@dataclass(frozen=True, eq=False)
+class LogData:
+    """One log: its motion at full rate, and how a signal over it becomes rows."""
+
+    log: ExperimentLog
+    equations: LogEquations
+    motion: Motion  # at the kept samples of all runs, of a high rate at every so-manieth
+    y: Array  # [N m] (joints, rows) measured torque
+    weighed: npt.NDArray[np.bool_]  # (joints, rows) which rows count: those of a joint that is not too slow
+    pieces: tuple[slice, ...]  # of each run among those samples
+    runs: tuple[Run, ...]
+    kept: Kept  # what was laid before, of all logs gathered with it
+    place: int  # among them
+    whitening: Whitening | None = None  # that rows pass at last; `y` has
+    unwhitened: Array | None = None  # `y` before that
+
+    @property
+    def n_joints(self) -> int:
+        return int(self.motion.q.shape[1])
+
+    @property
+    def plain(self) -> Array:
+        """[N m] (joints, rows) measured torque that has passed no whitening."""
+        return self.y if self.unwhitened is None else self.unwhitened
+
+    @cached_property
+    def rows(self) -> int:
+        """Of each joint."""
+        return sum(len(run.chosen) for run in self.runs)
+
+    @cached_property
+    def t(self) -> Array:
+        """(rows,) [s] of each joint's rows."""
+        return np.asarray(self.at_rows(self.motion.t), dtype=np.float64)
+
+    @cached_property
+    def stretches(self) -> tuple[tuple[slice, ...], ...]:
+        """Of each joint's rows, those that follow each other without a gap, and that all count or all do not."""
+        gaps = [np.flatnonzero(np.diff(run.chosen) != 1) + 1 for run in self.runs]
+        first = np.cumsum([0, *(len(run.chosen) for run in self.runs)])
+        ends = np.concatenate([first, *(start + own for start, own in zip(first, gaps, strict=False))])
+        turns = [np.flatnonzero(np.diff(own.astype(np.int8))) + 1 for own in self.weighed]
+        return tuple(tuple(slice(a, b) for a, b in pairwise(np.union1d(ends, own).astype(int).tolist())) for own in turns)
+
+    def whitened(self, whitening: Whitening, kept: Kept) -> LogData:
+        """The same with rows through `whitening`."""
+        return replace(self, y=whitening.through(self.y, range(self.n_joints), self.stretches), whitening=whitening, kept=kept,
+                       unwhitened=self.y)
+
+    def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """What `x` (samples, …) is at the moments of the rows, unfiltered."""
+        return np.concatenate([x[piece][run.chosen * run.every] for piece, run in self._parts])
+
+    def lay(self, table: Array) -> Array:
+        """Columns over the motion, (samples, joints) or (samples, joints, k), as (joints, rows) or (k, joints, rows)."""
+        flat = table.reshape(len(table), -1).T
+        active = np.flatnonzero(flat.any(axis=1))
+        out = np.zeros((len(flat), self.rows))
+        if len(active):
+            out[active] = self.lay_signals(flat[active], active // (1 if table.ndim == 2 else table.shape[2]))
+        if table.ndim == 2:
+            return out
+        return out.reshape(table.shape[1], table.shape[2], self.rows).transpose(1, 0, 2)
+
+    def keep(self, key: Hashable, lay: Callable[[], npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        """What `lay()` makes, or made before under the same key; not to be written to."""
+        return self.kept.of((self.place, key), lay)
+
+    def lay_signals(self, x: Array, joints: Sequence[int] | Indices) -> Array:
+        """(channels, samples) of torques of the `joints` (channels,), from 0 -> (channels, rows)."""
+        rows = np.concatenate([run.lay(np.ascontiguousarray(x[:, piece])) for piece, run in self._parts], axis=1)
+        return rows if self.whitening is None else self.whitening.through(rows, joints, self.stretches)
+
+    @property
+    def _parts(self) -> list[tuple[slice, Run]]:
+        return list(zip(self.pieces, self.runs, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Rows of several logs. A row that does not count is zero in everything."""
+
+    logs: tuple[LogData, ...]
+    first: int = 0  # number of the first log among all that are diagnosed: of what happens in one log only
+    known: Array | None = None  # (rows,) [N m] torque that is subtracted: of standing effects
+    rubbing: frozenset[int] = frozenset()  # joints, from 1, whose friction is partly in `known`
+    steady: bool = False  # models are fitted with the ripple of drives in order among the noise
+    taken: Array | None = None  # (rows,) [N m] as `known`, of rows that are cleared
+    cleared: tuple[Ripple, Array] | None = None  # the ripple that torque and columns are without, and the weights (joints,) of rows
+
+    @property
+    def n_joints(self) -> int:
+        return self.logs[0].n_joints
+
+    @cached_property
+    def joint(self) -> Indices:
+        """(rows,) joint of each row, from 0."""
+        return np.concatenate([np.repeat(np.arange(one.n_joints), one.rows) for one in self.logs])
+
+    @cached_property
+    def log_of(self) -> Indices:
+        """(rows,) log of each row."""
+        return np.concatenate([np.full(one.n_joints * one.rows, k) for k, one in enumerate(self.logs)])
+
+    @cached_property
+    def t(self) -> Array:
+        """(rows,) [s] within each log."""
+        return np.concatenate([np.tile(one.t, one.n_joints) for one in self.logs])
+
+    @cached_property
+    def counts(self) -> npt.NDArray[np.bool_]:
+        return np.concatenate([one.weighed.ravel() for one in self.logs])
+
+    @cached_property
+    def y(self) -> Array:
+        measured = np.concatenate([one.y.ravel() for one in self.logs])
+        clear = self.clear(measured if self.known is None else measured - self.known)
+        return clear if self.taken is None else clear - self.taken
+
+    @cached_property
+    def ripple(self) -> Ripple | None:
+        """That of drives in order, where models are to be fitted beside it."""
+        return Ripple.of(self) if self.steady else None
+
+    @property
+    def rows(self) -> int:
+        return len(self.joint)
+
+    def whitened(self, whitening: Whitening, weight: Array | None = None) -> Data:
+        """The same rows through `whitening`, and, where `weight` (joints,) [1/(N m)] says how large their noise is then, without
+        what the ripple of drives in order has in common."""
+        kept = Kept()
+        known = None if self.known is None else self.through(whitening, self.known)
+        there = replace(self, logs=tuple(one.whitened(whitening, kept) for one in self.logs), known=known, steady=False)
+        return there if weight is None else replace(there, cleared=(Ripple.of(there), weight))
+
+    def through(self, whitening: Whitening, x: Array) -> Array:
+        """What `x` (…, rows) is in whitened rows."""
+        flat, first, out = x.reshape(-1, x.shape[-1]), 0, []
+        for one in self.logs:
+            for joint in range(one.n_joints):
+                own = flat[:, first:first + one.rows]
+                out.append(whitening.through(own, np.full(len(own), joint, dtype=np.intp), one.stretches))
+                first += one.rows
+        return np.concatenate(out, axis=1).reshape(x.shape)
+
+    def lay(self, torque: Callable[[Motion], Array]) -> Array:
+        """`torque` of the motion of each log, (samples, joints) or (samples, joints, k), as (rows,) or (k, rows)."""
+        return self.lay_each(lambda _, motion: torque(motion))
+
+    def lay_each(self, torque: Callable[[int, Motion], Array]) -> Array:
+        """The same of a torque that may differ from log to log: of each log's number and motion."""
+        laid = [one.lay(torque(self.first + k, one.motion)) for k, one in enumerate(self.logs)]
+        return self.clear(np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1))
+
+    def lay_kept(self, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
+        """As `lay` of columns (samples, joints, k) that follow from the motion alone; `key` says which they are."""
+        laid = [_kept(one, key, torque) for one in self.logs]
+        return self.clear(np.concatenate([x.reshape(len(x), -1) for x in laid], axis=-1))
+
+    def blocks(self, count: int) -> Indices:
+        """(rows,) to which of about `count` stretches of time a row belongs, each within one log, all joints alike."""
+        total = sum(one.rows for one in self.logs)
+        out, first = [], 0
+        for one in self.logs:
+            own = max(1, round(count * one.rows / total))
+            out.append(np.tile(first + np.arange(one.rows) * own // max(one.rows, 1), one.n_joints))
+            first += own
+        return np.concatenate(out)
+
+    def split(self, x: Array) -> Iterator[Array]:
+        """(rows,) -> (joints, rows) of each log."""
+        first = 0
+        for one in self.logs:
+            size = one.n_joints * one.rows
+            yield x[first:first + size].reshape(one.n_joints, one.rows)
+            first += size
+
+    def rms(self, x: Array) -> Array:
+        """(joints,) root mean square of `x` (rows,) over the rows that count."""
+        power, count = self.power(x)
+        return np.asarray(np.sqrt(power / np.maximum(count, 1)))
+
+    def power(self, x: Array) -> tuple[Array, Indices]:
+        """(joints,) sum of squares of `x` (rows,) over the rows that count, and how many these are."""
+        square = np.bincount(self.joint, np.where(self.counts, x, 0.0) ** 2, minlength=self.n_joints)
+        return np.asarray(square, dtype=np.float64), np.bincount(self.joint[self.counts], minlength=self.n_joints)
+
+    def clear(self, x: Array, rows: Indices | None = None) -> Array:
+        """Rows (…, rows) that count, less the ripple; `rows`: which these are, of some of the joints all."""
+        counts = self.counts if rows is None else self.counts[rows]
+        counted = x if counts.all() else np.where(counts, x, 0.0)
+        return counted if self.cleared is None else self.cleared[0].out_of(counted, self.cleared[1], rows)
+
+
+def _kept(one: LogData, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
+    return one.keep(key, lambda: one.lay(torque(one.motion)))
+
+
+def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Rows] | None = None, first: int = 0) -> Data:
+    """The rows of the logs; `recipe` with its cut-off.
+
+    Args:
+        rows: of each log which samples may be rows; its own choice where left out.
+        first: number of the first log.
+
+    Raises:
+        InputRejected: T04, every stretch of a log is too short for the low-pass, or spoilt.
+    """
+    logs, kept = zip(motions, equations_of(motions, recipe, columns, rows), strict=True), Kept()
+    return Data(tuple(_of_log(log, equations, kept, k) for k, ((log, _), equations) in enumerate(logs)), first)
+
+
+def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int) -> LogData:
+    stretches = [equations.stretch(run) for run in equations.runs]
+    fine = [run_of(equations, run) for run in equations.runs]
+    y = np.concatenate([run.lay_command(tau.T) for run, (_, tau) in zip(fine, stretches, strict=True)], axis=1)
+    skip = _skipped(equations)
+    some = [(Motion(m.t[::skip], m.q[::skip], m.dq[::skip], m.ddq[::skip]), tau[::skip]) for m, tau in stretches]
+    tau = np.concatenate([tau for _, tau in some])
+    t, q, dq, ddq = (np.concatenate([getattr(m, name) for m, _ in some]) for name in ("t", "q", "dq", "ddq"))
+    ends = np.cumsum([0, *(len(tau) for _, tau in some)]).tolist()
+    pieces = tuple(slice(a, b) for a, b in pairwise(ends))
+    runs = tuple(run_of(equations, run, skip) for run in equations.runs)
+    slow = np.concatenate([equations.rows.slow[run][one.chosen * one.every] for run, one in zip(equations.runs, fine, strict=True)])
+    asked = tau if equations.held else None  # a measured torque was there: nothing of it can have been kept back
+    since = _first_known(runs[0], pieces[0])
+    logged = None if equations.held else tau[since]
+    return LogData(log, equations, Motion(t, q, dq, ddq, asked, logged, since=since), y, ~slow.T, pieces, runs, kept, place)
+
+
+def _first_known(run: Run, piece: slice) -> int:
+    """The sample from which on the motion is good, by a period of the low-pass before the first row."""
+    if not len(run.chosen):
+        return 0
+    first = int(run.chosen[0]) * run.every
+    return int(max(0, min(first - run.pad // int(PAD), piece.stop - 1)))
+
+
+def _skipped(equations: LogEquations) -> int:
+    """Every how many samples columns are worked out: far more often than the low-pass leaves anything to be seen."""
+    how = equations.conditioning
+    if how.cutoff_hz is None:
+        return 1
+    step = equations.found.good.log.sample_time
+    highest = min(how.cutoff_hz, 0.5 / (step * how.decimation))  # rows further apart than the low-pass asks for show less
+    most = int(1.0 / (_AMPLE * highest * step))
+    return max((k for k in range(1, max(most, 1) + 1) if how.decimation % k == 0), default=1)

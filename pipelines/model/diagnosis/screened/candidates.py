@@ -1,0 +1,217 @@
+"""Every cause that could be: each effect at every place, in every shape worth trying.
+
+    for family in families(columns, motion, arm): ...
+    for laid in lay_family(data, family, arm): ...           its columns, a few shapes at a time
+
+An effect whose non-linear number is one of the friction fitted at its joint, how sharply it changes sign say, takes it from
+there: what a second law beside the first would gain by another one is an artefact of reversals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.fitted.record import changing, recorded, recorded_of
+from pipelines.model.diagnosis.rows.data import Data, LogData
+from pipelines.model.effects import all_effects
+from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.body import Motion
+
+__all__ = ["Arms", "Family", "Laid", "families", "lay_family", "lay_one", "lay_shape", "place_of", "runs_away", "whole_motion"]
+
+Indices = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
+
+_AT_ONCE = 48  # columns
+_AWAY = 1e50  # beyond any unit: what is larger runs away, and its square, weighted and summed, is no number any more
+
+
+@dataclass(frozen=True)
+class Family:
+    """One cause at one place."""
+
+    cause: str
+    joint: int | None
+    shapes: tuple[Effect, ...]
+
+    @property
+    def event(self) -> bool:
+        """Whether it happens once, in one log: its non-linear numbers belong to that."""
+        one = self.shapes[0]
+        return any(q.shape and q.name in one.per_log for q in one.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Arms:
+    """By whose columns causes are screened."""
+
+    now: Arm  # with all that was found
+    start: Arm  # for what just adds its torque, whatever else acts
+
+    def of(self, family: Family) -> Arm:
+        return self.start if family.shapes[0].adds else self.now
+
+
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """Columns of some shapes of a family, on the rows where they are not zero."""
+
+    first: int  # shape
+    table: Array  # (shapes, k, rows here)
+    rows: Indices  # which of all rows
+
+
+def place_of(cause: str, joint: int | None) -> str:
+    """As causes are written on the command line: "cogging:2", "gravity_tilt"."""
+    return cause if joint is None else f"{cause}:{joint}"
+
+
+def families(laws: Sequence[Effect], motion: Motion, arm: Arm, without: Sequence[str] = ()) -> tuple[Family, ...]:
+    """Every effect at every place, but those that the nominal model holds, and those left out.
+
+    Args:
+        laws: of the nominal model.
+        motion: of all logs, for the range of shapes.
+    """
+    nominal = {law.name for law in laws}
+    found = []
+    for kind in all_effects():
+        if kind.name in nominal or kind.name in without or kind.evidence in ("none", "base parameters"):
+            continue
+        for effect in kind.everywhere(arm.robot.revolute):
+            found.append(Family(kind.name, effect.joint, _shapes(effect, laws, motion, arm)))
+    return tuple(found)
+
+
+def _shapes(effect: Effect, laws: Sequence[Effect], motion: Motion, arm: Arm) -> tuple[Effect, ...]:
+    shared: dict[str, Any] = {}
+    for law in laws:
+        if law.joint == effect.joint:
+            shared |= {q.name: getattr(law, q.name) for q in law.parameters if q.shape
+                       and q.name in {own.name for own in effect.parameters if own.shape}}
+    shaped = replace(effect, **shared)
+    return tuple(dict.fromkeys(replace(one, **shared) for one in shaped.shapes(motion, arm)))
+
+
+def whole_motion(data: Data) -> Motion:
+    """The motions of all logs one behind the other, time from the start of each: for ranges, never for slopes."""
+    motions = [one.motion for one in data.logs]
+    t = np.concatenate([motion.t - motion.t[0] for motion in motions])  # logs of one session may share its clock
+    whole = Motion(t, *(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq")))
+    asked = [motion.tau for motion in motions if motion.tau is not None]
+    return replace(whole, tau=np.concatenate(asked)) if len(asked) == len(motions) else whole
+
+
+def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
+    """The columns of every shape, a few shapes at a time."""
+    size = _at_once(data, family, arm.unrecorded)
+    for first in range(0, len(family.shapes), size):
+        yield _lay_some(data, family, first, size, arm)
+
+
+def lay_shape(data: Data, family: Family, place: int, arm: Arm) -> Array:
+    """(k, rows) of shape number `place`, kept with those that `lay_family` lays beside it."""
+    size = _at_once(data, family, arm.unrecorded)
+    laid = _lay_some(data, family, place // size * size, size, arm)
+    whole = np.zeros((laid.table.shape[1], data.rows))
+    whole[:, laid.rows] = laid.table[place - laid.first]
+    return whole
+
+
+def _lay_some(data: Data, family: Family, first: int, size: int, whole: Arm) -> Laid:
+    some, arm = family.shapes[first:first + size], whole.unrecorded
+    with np.errstate(all="ignore"):
+        own = some[0].from_motion and family.joint
+        acting, parts = _own(data, some, arm, whole) if own else _anywhere(data, some, arm, whole, not family.event)
+    rows = np.flatnonzero(acting[data.joint])
+    return Laid(first, data.clear(np.concatenate(parts, axis=2), rows), rows)
+
+
+def _at_once(data: Data, family: Family, arm: Arm) -> int:
+    """Shapes that are laid together."""
+    first = family.shapes[0]
+
+    def width() -> Array:
+        with np.errstate(all="ignore"):
+            return np.array(first.columns(_first_samples(data), arm).shape[2])
+
+    columns = width() if family.event else data.logs[0].keep(("columns", first), width)
+    return max(1, _AT_ONCE // max(int(columns), 1))
+
+
+def _own(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm) -> tuple[Mask, list[Array]]:
+    """The joint that they act on, and of each log (shapes, k, rows of that joint): kept, for they follow from the motion alone,
+    and from what the record of that joint passes through, where there is such a thing."""
+    joint = some[0].joint or 1
+    through = changing(whole, joint)
+    laid = [one.keep((tuple(some), one.kept.number(whole)) if through else tuple(some), partial(_laid_own, one, some, arm, through))
+            for one in data.logs]
+    return np.arange(data.n_joints) == joint - 1, [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
+
+
+def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm, through: Sequence[Acting]) -> Array:
+    table = some[0].own_columns(some, one.motion, arm)
+    for shape in table:
+        shape[...] = _finite(shape)
+    flat = recorded_of(through, table.reshape(-1, table.shape[2]), one.motion)
+    return one.lay_signals(flat, np.full(len(flat), (some[0].joint or 1) - 1))
+
+
+def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bool) -> tuple[Mask, list[Array]]:
+    """Joints that they act on, and of each log (shapes, k, rows of those joints); kept for the next time the same arm is asked."""
+    laid, acts = [], np.zeros(data.n_joints, dtype=bool)
+    for one in data.logs:
+        lay, key = partial(_laid_anywhere, one, some, arm, whole), (tuple(some), one.kept.number(whole)) if keep else None
+        laid.append(lay() if key is None else one.keep(key, lay))
+        there = partial(_acting, laid[-1])
+        acts |= there() if key is None else one.keep((*key, "acting"), there)
+    joints = slice(None) if acts.all() else np.flatnonzero(acts)
+    return acts, [x[:, :, joints].reshape(*x.shape[:2], -1) for x in laid]
+
+
+def _acting(laid: Array) -> Mask:
+    """(joints,) of (shapes, k, joints, rows): which have something."""
+    return np.array([laid[:, :, joint].any() for joint in range(laid.shape[2])])
+
+
+def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -> Array:
+    """(shapes, k, joints, rows)"""
+    tables = [recorded(whole, _finite(table), one.motion).transpose(2, 1, 0)
+              for table in some[0].several(some, one.motion, arm)]
+    k, joints, samples = tables[0].shape
+    acting = np.flatnonzero([any(table[:, j].any() for table in tables) for j in range(joints)])
+    flat = np.empty((len(some), k, len(acting), samples))
+    for into, table in zip(flat, tables, strict=True):
+        into[...] = table[:, acting]
+    found = np.zeros((len(some), k, joints, one.rows))
+    laid = one.lay_signals(flat.reshape(-1, samples), np.tile(acting, len(some) * k))
+    found[:, :, acting] = laid.reshape(len(some), k, len(acting), one.rows)
+    return found
+
+
+def _finite(table: Array) -> Array:
+    """Columns that run away, of an arm that is badly known, are none."""
+    return np.zeros_like(table) if runs_away(table) else table
+
+
+def runs_away(table: Array) -> bool:
+    """Whether some of it is no number, or larger than any torque."""
+    return not bool((np.abs(table) < _AWAY).all())
+
+
+def _first_samples(data: Data) -> Motion:
+    motion = data.logs[0].motion
+    return Motion(motion.t[:8], motion.q[:8], motion.dq[:8], motion.ddq[:8], None if motion.tau is None else motion.tau[:8])
+
+
+def lay_one(data: Data, effect: Effect, arm: Arm) -> Array:
+    """(k, rows) of one effect in one shape."""
+    return data.lay(lambda motion: effect.columns(motion, arm))

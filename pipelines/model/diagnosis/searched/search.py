@@ -1,0 +1,289 @@
+"""Find the causes one after the other: screen, refit the best and its rivals exactly, keep the best, look at what is left.
+
+    rough = provisional(case)       the greatest causes, without thresholds: the twin is then made of the model beside them
+    found = search(case, most, rough)
+    found.final                     the nominal model with every cause that paid
+    found.steps                     what each step tried
+
+A step ends the search where no cause exceeds its threshold, or where the best, fitted exactly, brings nothing on what was held
+out. Rivals are ranked by the error they leave on held-out rows; of those that leave nearly the same, the one with fewest numbers,
+or with one more that is worth it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.model.diagnosis.fitted.nominal import fit_columns
+from pipelines.model.diagnosis.fitted.refit import Refined, refine
+from pipelines.model.diagnosis.floor.thresholds import Thresholds
+from pipelines.model.diagnosis.result import Trial
+from pipelines.model.diagnosis.screened.screen import Screened, screen
+from pipelines.model.diagnosis.searched.borne_out import borne_out
+from pipelines.model.diagnosis.searched.case import Case, HeldOut, held_out
+from pipelines.model.diagnosis.searched.curves import with_curves_anew
+from pipelines.model.diagnosis.searched.elsewhere import at_its_joint
+from pipelines.model.diagnosis.searched.gate import CLOSE, Gate, gate_of, once_more
+from pipelines.model.diagnosis.searched.hypotheses import best_form, fitted, laid_whole, plainer
+from pipelines.model.diagnosis.searched.ledger import Tried, ledger
+from pipelines.model.diagnosis.searched.parsimony import PARSIMONY, different, fewest
+from pipelines.model.diagnosis.searched.unnameable import unnameable
+
+__all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "glance", "greatest", "last_step", "provisional",
+           "search"]
+
+_RIVALS = 6  # fitted exactly
+_LEAST, _LEAST_WHITE = 2e-3, 2e-4  # of the squared residual: no cause is fitted for less; of whitened rows
+_GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
+_WORTH = 0.05  # of the squared residual of its joint
+_MISSED, _NEAR = 0.1, 0.5  # of what the second of two takes away: one in their place may miss so much; to first order
+_SETTLED = 0.02  # of a weight
+_ROUNDS = 3  # of weights
+
+
+@dataclass(frozen=True, eq=False)
+class Explored:
+    """Every cause on what one model leaves, and the greatest of them fitted exactly."""
+
+    before: Refined
+    screened: tuple[Screened, ...]
+    tried: tuple[Tried, ...]  # best first
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One search for one cause."""
+
+    before: Refined
+    best: Tried | None  # accepted
+    rivals: tuple[Tried, ...]  # above their thresholds, best first
+    screened: tuple[Screened, ...]
+    thresholds: Thresholds
+    trials: tuple[Trial, ...]
+    other: Screened | None = None  # what explains more than anything that can be named by the residual, and cannot be
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The outcome of a search."""
+
+    nominal: Refined
+    steps: tuple[Step, ...]
+    final: Refined
+
+
+def glance(case: Case) -> Explored:
+    """Every cause on what the nominal model leaves, to first order; none is fitted."""
+    now = refine(case.model, case.data, case.weight)
+    return Explored(now, _screened(case, now), ())
+
+
+def provisional(case: Case, seen: Explored | None = None) -> tuple[Explored, ...]:
+    """The causes that explain the most of what a joint leaves, right or wrong, until none explains a third of it.
+
+    Args:
+        seen: at a `glance`.
+    """
+    first = seen or glance(case)
+    now, screened, found = first.before, first.screened, list[Explored]()
+    while True:
+        one = _explored(case, now, screened, screened)
+        found.append(one)
+        best = fewest(one.tried)
+        if len(found) == _GREAT or best is None or _share(best.screened, now) < _LARGE:
+            return tuple(found)
+        now = _reweighted(best.done, case)
+        screened = _screened(case, now)
+
+
+def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:
+    """Of what `provisional` found, the causes that explain much of what their joint leaves, and their joints."""
+    found = [(one, best) for one in rough if (best := fewest(one.tried)) is not None]
+    return [(best.effect.name, best.effect.joint) for one, best in found if _share(best.screened, one.before) >= _LARGE]
+
+
+def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
+    """Up to `most` causes, the same at several joints being one; what `rough` explored already is not done again, as long as it
+    leads the same way."""
+    now = rough[0].before if rough else refine(case.model, case.data, case.weight)
+    nominal = now
+    steps: list[Step] = []
+    asked: list[tuple[Explored, Gate]] = []
+    joined: set[str] = set()
+    while True:
+        number = len(steps) + 1
+        same = number <= len(rough) and rough[number - 1].before is now
+        screened = rough[number - 1].screened if same else _screened(case, now)
+        gate = gate_of(case, now, screened)
+        explored = rough[number - 1] if same else _explored(case, now, screened, gate.passed)
+        if same and (not case.floored or _others(case, explored, gate)):
+            explored = _explored(case, now, screened, gate.passed, explored.tried)
+        found = different((one.effect.name, one.effect.joint) for one in now.model.effects)
+        step = _step(case, explored, gate, number, found < most)
+        steps.append(step)
+        asked.append((explored, gate))
+        if step.best is None:
+            break
+        # Once a cause: what came in place of two might give way to another of them again, and so on without end.
+        alone = None if step.best.effect.name in joined else _one_for_two(case, steps, asked)
+        if alone is not None:
+            place, instead, best = alone
+            del steps[place:], asked[place + 1:]
+            steps.append(instead)
+            joined.add(best.effect.name)
+            now, rough = _reweighted(best.done, case), ()
+            continue
+        follows = number < len(rough) and same and step.best is fewest(rough[number - 1].tried)
+        now = rough[number].before if follows else _reweighted(step.best.done, case)
+    return Found(nominal, tuple(steps), now)
+
+
+def last_step(case: Case, done: Refined, number: int) -> Step:
+    """What every cause shows beside all that was found; none is fitted."""
+    screened = _screened(case, done)
+    return _step(case, Explored(done, screened, ()), gate_of(case, done, screened), number, False)
+
+
+def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explored, Gate]]) -> tuple[int, Step, Tried] | None:
+    """The place of an earlier step, that step as it should have been, and what it should have found: where the same cause was found
+    at two joints, the joint at which it leaves as little alone.
+
+    Of the scales of all torques only their ratios show: one joint's is that of all the others the other way round.
+    """
+    last = steps[-1]
+    if last.best is None or last.best.effect.joint is None:
+        return None
+    name = last.best.effect.name
+    error = held_out(last.best.done, case)
+    for place, earlier in enumerate(steps[:-1]):
+        if earlier.best is None or earlier.best.effect.name != name:
+            continue
+        for rival in earlier.rivals:
+            if rival.effect.name != name or rival.effect.joint == earlier.best.effect.joint or rival.log is not None:
+                continue
+            if rival.error >= 1.0 or not rival.possible:
+                continue
+            gain = max(last.before.rss - last.best.done.rss, 1e-300)
+            if _first_order_missed(rival, place, last.best, case) > _NEAR * gain:
+                continue
+            effects = (*rival.done.model.effects, *last.before.model.effects[place + 1:])
+            alone = refine(replace(last.before.model, effects=effects), case.data, last.before.weight)
+            missed = (alone.rss - last.best.done.rss) / gain
+            if held_out(alone, case) > (1.0 + PARSIMONY) * error or missed > _MISSED:
+                continue
+            instead = _step(case, *asked[place], place + 1, True, rival)
+            if instead.best is rival:
+                return place, instead, rival
+    return None
+
+
+def _first_order_missed(rival: Tried, place: int, last: Tried, case: Case) -> float:
+    """Squared weighted torque of effect number `place` and the last one together that `rival` cannot do to first order, beside all
+    else: a fit, which tells it exactly, costs ten times as much."""
+    done, two = last.done, (place, len(last.done.model.effects) - 1)
+    others = replace(done.model, effects=tuple(e for k, e in enumerate(done.model.effects) if k not in two))
+    own = laid_whole(case.data, rival.done.model.effects[-1].effect, done.model.arm)
+    rest = np.delete(done.slopes, [k for which in two for k in done.of_effect(which)], axis=0)
+    missed = fit_columns(case.data, np.concatenate([rest, own]), done.model.torque(case.data) - others.torque(case.data),
+                         done.weight).residual
+    return float(missed @ missed)
+
+
+def gives_way(explored: Explored) -> bool:
+    """Whether what explains most, to first order, is something that gives way, and worth a second look."""
+    most = max(explored.screened, key=lambda one: one.gain[0])
+    return most.family.shapes[0].evidence != "residual" and _share(most, explored.before) > _WORTH
+
+
+def gap_first(explored: Explored) -> bool:
+    """Whether the best of those fitted exactly is a gap."""
+    best = fewest(explored.tried)
+    return best is not None and best.effect.evidence == "reversals"
+
+
+def _share(one: Screened, now: Refined) -> float:
+    """Gain as a share of the squared residual of the cause's own joint, or of all."""
+    own = now.residual if one.joint is None else now.residual[now.data.joint == one.joint - 1]
+    return float(one.gain[0] / max(float(own @ own), 1e-300))
+
+
+def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
+    return tuple(screen(case.data, now.fit, case.families, case.arms(now.model)))
+
+
+def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened],
+              there: Sequence[Tried] = ()) -> Explored:
+    """The greatest causes fitted exactly, as far as they are wanted: what stays below its threshold need not be.
+
+    Args:
+        there: those that are fitted already.
+    """
+    great = _great(case, now, screened, wanted)
+    error = HeldOut.of(now, case) if great else HeldOut(np.nan, now.weight)
+    done = {id(one.screened): one for one in there}
+    tried = [done.get(id(one)) or fitted(case, now, one, error) for one in great]
+    best = fewest(sorted(tried, key=lambda one: one.rank))
+    plain = None if best is None else plainer(case, now, tried, best, error)
+    if plain is not None:
+        best, tried = plain, [plain if one.screened is plain.screened else one for one in tried]
+    lasting = best
+    if best is not None and best.log is not None:  # an event may be refused yet
+        lasting = fewest(sorted((one for one in tried if one.log is None), key=lambda one: one.rank))
+    tried = [best_form(case, now, one, error) if one in (best, lasting) else one for one in tried]
+    return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
+
+
+def _great(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened]) -> list[Screened]:
+    """Of those wanted the greatest: what is below its threshold or not borne out, however great, is no rival of what is not."""
+    taken = {(e.effect.name, e.effect.joint) for e in now.model.effects}
+    asked = {id(one) for one in wanted}
+    able = [one for one in screened if one.family.event or (one.cause, one.joint) not in taken
+            or (case.again and any(one.shape[0].again(log.motion) for log in case.data.logs))]
+    least = _LEAST_WHITE if case.white else _LEAST
+    able = [one for one in able if one.gain[0] >= least * now.rss and one.stands_out and id(one) in asked
+            and one.family.shapes[0].evidence in case.nameable]
+    able = sorted(able, key=lambda one: -one.gain[0])
+    return [one for one in able[:_RIVALS] if one.gain[0] >= CLOSE * able[0].gain[0]]
+
+
+def _others(case: Case, explored: Explored, gate: Gate) -> bool:
+    """Whether others than were explored are the greatest of those that pass."""
+    tried = {id(one.screened) for one in explored.tried}
+    return any(id(one) not in tried for one in _great(case, explored.before, explored.screened, gate.passed))
+
+
+def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, chosen: Tried | None = None) -> Step:
+    now, screened, thresholds = explored.before, explored.screened, gate.thresholds
+    passes = {id(one) for one in gate.passed}
+    tried = [one for one in explored.tried if id(one.screened) in passes]
+    bound = {id(one): gain for one, gain in zip(screened, thresholds.gain, strict=True)}
+    # What happened once no other time asks for: fitted exactly it has to take as much as its columns had to.
+    happened = {id(one.screened) for one in tried if one.log is not None and now.rss - one.done.rss <= bound[id(one.screened)]}
+    refused = gate.refused | happened
+    tried = [one for one in tried if id(one.screened) not in happened]
+    again = once_more(case, now, screened)
+    asked = [one for one in tried if not case.floored or id(one.screened) in again]
+    refused |= {id(one.screened) for one in asked if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
+    tried = [one for one in tried if id(one.screened) not in refused]
+    best = (chosen or fewest(tried)) if more else None
+    if best is not None and case.shared is not None:
+        best = at_its_joint(best, tried, now, case.shared)
+    other = unnameable(gate.passed, best, explored.tried, now, case)
+    best = None if other is not None else best
+    trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number, refused)
+    return Step(now, best, tuple(tried), screened, thresholds, trials, other)
+
+
+def _reweighted(done: Refined, case: Case) -> Refined:
+    """Joints weighted by what this model leaves of them."""
+    done = with_curves_anew(done, case.model.columns.laws)
+    for _ in range(_ROUNDS):
+        weight = 1.0 / np.maximum(done.rms, 1e-12)
+        settled = np.abs(weight / done.weight - 1.0).max() < _SETTLED
+        done = refine(done.model, done.data, weight)
+        if settled:
+            break
+    return done

@@ -1,0 +1,70 @@
+"""Causes that somebody names, and the families of shapes that they are fitted in.
+
+    wanted_families(case, (Wanted(effect, {"order": 18.0}), …))     one of each place, with all starts that were given there
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from pipelines.errors import UsageError
+from pipelines.model.diagnosis.screened.candidates import Family, families, place_of, whole_motion
+from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.effects.base import Effect
+
+__all__ = ["Wanted", "wanted_families"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A cause to extend the model by, and where its non-linear numbers start."""
+
+    effect: Effect
+    start: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def place(self) -> str:
+        return place_of(self.effect.name, self.effect.joint)
+
+
+def wanted_families(case: Case, wanted: Sequence[Wanted]) -> tuple[Family, ...]:
+    """One of each place, with all starts that were given there.
+
+    Raises:
+        UsageError: C02, a cause that no model of these logs can take up.
+    """
+    there: dict[str, list[Family]] = {}
+    for one in wanted:
+        there.setdefault(one.place, []).append(_family(case, one))
+    return tuple(replace(some[0], shapes=tuple(dict.fromkeys(shape for family in some for shape in family.shapes)))
+                 for some in there.values())
+
+
+def _family(case: Case, one: Wanted) -> Family:
+    every = families(case.model.columns.laws, whole_motion(case.data), case.model.arm)
+    mine = next((f for f in every if (f.cause, f.joint) == (one.effect.name, one.effect.joint)), None)
+    if mine is None:
+        why, remedy = _missing(case, one)
+        raise UsageError("C02", f"{one.place}: {why}", where="--with", remedy=remedy)
+    if mine.event:
+        raise UsageError("C02", f"{one.place} happens once: no model of the arm holds it", where="--with",
+                         remedy="leave the moment out of the logs instead")
+    shape: dict[str, Any] = dict(one.start)
+    return replace(mine, shapes=tuple(dict.fromkeys(replace(s, **shape) for s in mine.shapes)))
+
+
+def _missing(case: Case, one: Wanted) -> tuple[str, str]:
+    """Why nothing can be fitted there, and what to do."""
+    effect = one.effect
+    if effect.name in {law.name for law in case.model.columns.laws}:
+        return "the nominal model has it already", "name a cause that the nominal model lacks"
+    if effect.evidence == "none":
+        return "it is a law of friction for a nominal model, and no cause", "extend a model that has it: --model FILE"
+    if effect.evidence == "base parameters":
+        return ("the base parameters take it up, and no reference logs show that they moved as it moves them",
+                "name reference logs from before it: --reference PATH")
+    places = [place_of(other.name, other.joint) for other in effect.everywhere(case.model.arm.robot.revolute)]
+    return ("this arm does not have it there",
+            f"write {' or '.join(places)}" if places else "name another cause: no place of this arm has it")

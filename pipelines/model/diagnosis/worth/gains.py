@@ -1,0 +1,288 @@
+"""What a finding is worth on what was held out: torque residual, simulated position, tip.
+
+    torque_gain(before, after, case)        with its bootstrap interval
+    surely_less(before, after, own, ...)    of all joints together
+    simulation_errors(arms, logs)           position error of each arm, in closed loop or over short windows
+    farther(before, after)                  whether the second is worse than chance does
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected
+from pipelines.fit.bootstrap import apart
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.shared_work import shared_out
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.fitted.refit import Refined
+from pipelines.model.diagnosis.result import BeforeAfter, Gain, SimulatedSpan, TipError, TorqueGain
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.worth.held_out import held_out_left
+from pipelines.model.estimation.logs import Motions
+from pipelines.model.motion import Reconstructed
+from pipelines.model.rigid.body import Motion
+from pipelines.model.simulation import Experiment, Plant, Windows, choose_step, simulate_together, simulate_windows
+
+__all__ = ["Simulation", "Strayed", "farther", "gain_of", "in_loop", "nearer", "simulation_errors", "surely_less", "torque_gain",
+           "torque_gain_of", "worse_log"]
+
+Mask = npt.NDArray[np.bool_]
+
+_BLOCKS = 20  # of the held-out time
+_SEED = 20040509
+_LONGEST = 5.0  # [s] of a log that is simulated
+_SOFT = 1.0  # [s] the same, where something moves beside the joints of an arm, which takes many steps
+_LONGER = 6.0  # times as long, where the last arm comes no nearer than the first: what noise does to an error averages out
+_WINDOW = 0.1  # [s]
+_FINE = 1e-3  # [s] between torques that drive a window: a faster log's are averaged, which moves an arm as far
+_EXACT = 1e-3  # of the position error, to which it is worked out
+_ROUGH = 1e-2  # the same, where something moves beside the joints: a hundredth is far less than what chance does to the error
+_LOGS = 2  # that are simulated
+_THERE = 0.5  # of the share that all joints together fall by, by which those have to where a cause acts or is seen
+_WORSE = 1.1  # times the error of a held-out log, that an extension must not exceed
+
+
+@dataclass(frozen=True, eq=False)
+class Strayed:
+    """How a simulated arm strays from the measured one in a log whose controller moves both."""
+
+    log: str  # its name
+    t: Array  # [s] (samples,) since it began
+    error: Array  # [rad] (samples, joints) simulated minus measured
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """How far the simulated arm is from the measured one, over the held-out logs."""
+
+    how: Literal["closed-loop", "windowed", "none"]
+    position_rms: Array  # [rad] (joints,)
+    tip_rms: float  # [m]
+    power: Array  # [rad^2] (blocks,) summed over the joints and the samples of each block of time
+    samples: Array  # (blocks,)
+    first: Strayed | None = None  # in the first of the logs; None where no controller is known
+    span: tuple[SimulatedSpan, ...] = ()  # of each log that was simulated
+    longest: float = np.nan  # [s] of a log, at most
+
+    @classmethod
+    def none(cls, joints: int) -> Simulation:
+        return cls("none", np.full(joints, np.nan), np.nan, np.zeros(0), np.zeros(0))
+
+
+def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
+    """All of it, as a finding has it; position and tip are None where one of the two could not be simulated."""
+    known = "none" not in (before.how, after.how)
+    return Gain(torque, BeforeAfter(before.position_rms, after.position_rms) if known else None, after.how if known else "none",
+                TipError(before.tip_rms, after.tip_rms) if known else None, after.span if known else ())
+
+
+def torque_gain(before: Refined, after: Refined, judge: Data | None, blocks: int) -> TorqueGain:
+    """Root mean square of the held-out torque residual, joint by joint, and how sure its change is."""
+    data = after.data if judge is None else judge
+    one, other = (held_out_left(x, judge, blocks) for x in (before, after))
+    return torque_gain_of(data, one, other)
+
+
+def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
+    """The same of residuals (rows,) [N m] of held-out rows."""
+    place = data.blocks(_BLOCKS)
+    count = int(place.max()) + 1
+    ci = []
+    for joint in range(data.n_joints):
+        own = (data.joint == joint) & data.counts
+        sums = [np.asarray(np.bincount(place[own], values, minlength=count), dtype=np.float64)
+                for values in (before[own] ** 2, after[own] ** 2, np.ones(int(own.sum())))]
+        ci.append(apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED)))
+    return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
+
+
+def surely_less(before: Refined, after: Refined, own: Mask, judge: Data | None, blocks: int) -> bool:
+    """Whether the held-out torque error of all joints together falls beyond chance, each in units of what `before` leaves of it,
+    and at the joints `own` (joints,) together by half of that share at least."""
+    data = after.data if judge is None else judge
+    left = [held_out_left(x, judge, blocks) for x in (before, after)]
+    scale = np.maximum(data.rms(left[0]), 1e-12)[data.joint]
+    place = data.blocks(_BLOCKS)
+    ours, theirs, rows = (np.asarray(np.bincount(place, np.where(data.counts, x, 0.0), minlength=int(place.max()) + 1), dtype=float)
+                          for x in (np.square(left[0] / scale), np.square(left[1] / scale), np.ones(len(scale))))
+    _, high = apart(ours, theirs, rows, np.random.default_rng(_SEED))
+    here = data.counts & own[data.joint]
+    there = float(np.sum(np.square(left[1] / scale)[here]) / max(np.sum(np.square(left[0] / scale)[here]), 1e-300))
+    return high < 0.0 and 1.0 - there >= _THERE * (1.0 - float(theirs.sum() / max(ours.sum(), 1e-300)))
+
+
+def worse_log(data: Data, before: Array, after: Array) -> str:
+    """In which held-out log the torque error grows by more than a tenth, of all joints together; empty where in none."""
+    for place, one in enumerate(data.logs):
+        own = (data.log_of == place) & data.counts
+        joints = data.joint[own]
+        overall = np.maximum(data.rms(before)[joints], 1e-12)
+        for scale in (1.0, overall):  # as they are, and each joint in units of its own error
+            was, now = (float(np.linalg.norm(x[own] / scale)) for x in (before, after))
+            if now > _WORSE * was:
+                return f"the torque error of {one.log.name}, held out, would be {100.0 * (now / was - 1.0):.0f} % larger"
+    return ""
+
+
+def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str:
+    """Why the second simulated arm is no nearer to the measured one than the first; empty where it is, or chance hides it.
+
+    Args:
+        late: the log's torque is not what the arm felt: windows, which it drives, tell nothing then.
+    """
+    if before.how == "none" or (late and before.how == "windowed"):
+        return ""
+    if after.how == "none":
+        return "the simulated arm runs away with it"
+    low, _ = apart(before.power, after.power, before.samples, np.random.default_rng(_SEED))
+    return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
+
+
+def nearer(before: Simulation, after: Simulation, *, late: bool = False) -> bool:
+    """Whether the second simulated arm is nearer to the measured one than the first, chance or not; `late` as in `farther`."""
+    if late and before.how == "windowed":
+        return False
+    return "none" not in (before.how, after.how) and float(after.power.sum()) < float(before.power.sum())
+
+
+def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int, Simulation] | None = None) -> list[Simulation]:
+    """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else.
+
+    Without logs nothing is simulated. In a loop the stretches are short, and longer ones where they leave it open whether the last
+    arm comes nearer than the first: what the amplifiers' noise moves, no simulated arm follows.
+
+    Args:
+        known: of arms, by their places, that were simulated already beside others with the same effects as these.
+    """
+    none = [Simulation.none(arm.n_joints) for arm in arms]
+    if not motions:
+        return none
+    logs = motions[:_LOGS]
+    soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
+    if known:
+        one, left = next(iter(known.values())), [k for k in range(len(arms)) if k not in known]
+        if one.how == "none":
+            return none
+        found = _each([arms[k] for k in left], logs, soft, one.longest, closed=one.how == "closed-loop")
+        every = {**known, **dict(zip(left, found, strict=True))}
+        return [every[k] for k in range(len(arms))]
+    if all(in_loop(arms[0], log) for log, _ in logs):
+        longest = _SOFT if soft else _LONGEST
+        found = _each(arms, logs, soft, longest)
+        if _open(found[0], found[-1]) and any(log.n_samples * log.sample_time > longest for log, _ in logs):
+            longer = _each(arms, logs, soft, _LONGER * longest)
+            found = found if longer[0].how == "none" else longer
+        if found[0].how != "none":
+            return found
+    found = _each(arms, logs, soft, np.inf, closed=False)
+    return none if found[0].how == "none" else found
+
+
+def _open(first: Simulation, last: Simulation) -> bool:
+    """Whether both could be simulated, and the last is not nearer."""
+    return "none" not in (first.how, last.how) and first is not last and not nearer(first, last)
+
+
+def _each(arms: Sequence[Arm], motions: Motions, soft: bool, longest: float, *, closed: bool = True) -> list[Simulation]:
+    """`soft`: something moves beside the joints of one of them; `longest` [s] of a log in a loop."""
+    return shared_out(partial(_if_possible, motions=motions, closed=closed, soft=soft, longest=longest), arms)
+
+
+def in_loop(arm: Arm, log: ExperimentLog) -> bool:
+    """Whether the log's controller is known, and the arm, where the log begins, has an inertia that can be moved."""
+    try:
+        Plant.of(arm).refuse_unphysical(Experiment.of_log(log).q_ref[:1])
+    except InputRejected:
+        return False
+    return True
+
+
+def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -> Simulation:
+    try:
+        return _all(arm, motions, closed, soft, longest)
+    except InputRejected:
+        return Simulation.none(arm.n_joints)
+
+
+def _all(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -> Simulation:
+    square, away, span = [], [], []
+    pairs = _closed(arm, motions, longest) if closed else _in_windows(arm, motions, _ROUGH if soft else _EXACT)
+    for (q, seen, between), (log, _) in zip(pairs, motions, strict=True):
+        known = np.isfinite(q + seen).all(axis=1)
+        square.append(np.square(q[known] - seen[known]))
+        away.append(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known])), axis=1))
+        span.append(SimulatedSpan(log.name, between * int(known.sum())))
+    each = np.concatenate(square)
+    block = np.arange(len(each)) * _BLOCKS // max(len(each), 1)
+    power = np.asarray(np.bincount(block, each.sum(axis=1), minlength=_BLOCKS), dtype=np.float64)
+    samples = np.asarray(np.bincount(block, minlength=_BLOCKS), dtype=np.float64)
+    (log, _), (q, seen, _) = motions[0], pairs[0]
+    first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
+    return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first, tuple(span),
+                      longest)
+
+
+def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array, float]]:
+    """Simulated and measured positions of each log (samples, joints) [rad], and the time between samples [s]."""
+    first = [_first(log, seconds) for log, _ in motions]
+    step = choose_step(Plant.of(arm), first[0])  # one controller and arm: what suffices for a log suffices for the next
+    done = simulate_together(arm, first, steps={one.sample_time: step for one in first})
+    return [(one.q[0], log.q[:one.q.shape[1]], log.sample_time) for one, (log, _) in zip(done, motions, strict=True)]
+
+
+def _first(log: ExperimentLog, seconds: float) -> Experiment:
+    experiment = Experiment.of_log(log)
+    return experiment.part(0, min(experiment.n_samples, round(seconds / log.sample_time)))
+
+
+def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[tuple[Array, Array, float]]:
+    """The same, driven by the logged torque; the steps that suffice for a log suffice for the next."""
+    pairs, steps = [], dict[float, int]()
+    for log, found in motions:
+        q, seen, between, steps[log.sample_time] = _windowed(arm, log, found, exact, steps.get(log.sample_time))
+        pairs.append((q, seen, between))
+    return pairs
+
+
+def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float, steps: int | None,
+              ) -> tuple[Array, Array, float, int]:
+    usable = np.zeros(log.n_samples, dtype=bool)
+    usable[found.good.kept] = found.good.fit
+    tau = log.tau if log.torque != "measured" else np.concatenate([0.5 * (log.tau[1:] + log.tau[:-1]), log.tau[-1:]])
+    motion, tau, usable, every = _coarser(found.motion, tau, usable, log.sample_time)
+    between = every * log.sample_time
+    length = max(3, round(_WINDOW / between))
+    driven = partial(simulate_windows, Plant.of(arm), motion, tau, between, length, usable, exact)
+    windows = driven(steps)
+    if steps is not None and not _whole(windows, length):  # livelier than the log they were chosen for
+        windows = driven(None)
+    if not _whole(windows, length):  # left out, it would count as no error at all
+        raise InputRejected("D17", "the arm runs away in a window", where=log.name, remedy="look at its inertia")
+    return windows.q, motion.q, between, windows.steps
+
+
+def _whole(windows: Windows, length: int) -> bool:
+    return bool(np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all())
+
+
+def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_], sample_time: float,
+             ) -> tuple[Motion, Array, npt.NDArray[np.bool_], int]:
+    """Every so-manieth sample of a motion, the mean torque (samples, joints) until the next, and where all of that is usable."""
+    every = max(1, int(_FINE / sample_time * (1.0 + 1e-9)))
+    if every == 1:
+        return motion, tau, usable, 1
+    count = len(tau) // every
+    uneven = np.abs(np.diff(motion.t, append=motion.t[-1] + sample_time) - sample_time) > 0.5 * sample_time
+    good: npt.NDArray[np.bool_] = np.asarray(usable & ~uneven)
+    some = slice(0, count * every, every)
+    thin = Motion(motion.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
+    mean = np.asarray(tau[:count * every].reshape(count, every, -1).mean(axis=1))
+    return thin, mean, np.asarray(good[:count * every].reshape(count, every).all(axis=1)), every

@@ -1,0 +1,45 @@
+"""Slopes of a model's torque by its numbers, against what geometry gives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal, law_rows, rigid_rows
+from pipelines.model.diagnosis.fitted.refit import moved_by, refine
+from pipelines.model.diagnosis.fitted.slopes import slopes_of
+from pipelines.model.effects.gravity_tilt import GravityTilt
+from tests.model.diagnosis.arms import hidden
+
+ANGLE = 0.08  # [rad]
+
+
+def test_across_a_tilt_the_slope_is_that_of_its_sine_and_has_nothing_of_the_curvature() -> None:
+    """Gravity g (cos α down + sin α (x, y)/α) with α = |(x, y)|: at y = 0 its slope by y is sin α/α of a level arm's. Half the
+    step's part of the curvature, 4e-6 of the weight, would be all there is for an arm in one plane, and no number of it."""
+    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit).with_effect(GravityTilt(), np.array([ANGLE, 0.0, 0.0, 0.0]))
+    slopes, names = slopes_of(model, prepared.data, rigid_rows(prepared.data, columns))
+    found = slopes[len(model.beta) + names.index((1, 0, "1"))]
+    level = prepared.data.lay(lambda motion: GravityTilt().columns(motion, model.nominal)[..., 1:2])[0]
+    np.testing.assert_allclose(found, np.sin(ANGLE) / ANGLE * level, atol=1e-7 * np.abs(level).max())
+
+
+def test_a_law_that_takes_no_torque_any_more_has_no_shape_either() -> None:
+    """What is left beside the model asks joint 1 for friction that would drive it: it has none then, and slopes, names and
+    covariance are those of the model as it is."""
+    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    done = refine(Exact.start(columns, fit), prepared.data, fit.weight)
+    place = next(k for k, law in enumerate(columns.laws) if law.joint == 1 and law.name == "coulomb")
+    first = len(columns.kept) + sum(sum(not q.shape for q in law.parameters) for law in columns.laws[:place])
+    friction = done.model.beta[first] * law_rows(prepared.data, columns.laws[place], columns)[0]
+    assert any(one[:2] == (0, place) for one in done.names)
+    moved = moved_by(done, -1.5 * friction)
+    assert moved.model.beta[first] == 0.0
+    again = refine(moved.model, prepared.data, done.weight, steps=0)
+    assert moved.names == again.names
+    assert moved.slopes.shape == again.slopes.shape

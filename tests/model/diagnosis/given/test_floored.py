@@ -1,0 +1,63 @@
+"""The twin that a floor is taken from is one of an arm that could be this one; on made-up numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.errors import InputRejected
+from pipelines.model.diagnosis.given import floored
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What is looked at of a fitted one."""
+
+    model: str
+    rms: np.ndarray
+    weight: np.ndarray
+
+
+def explored(name: str, rms: float = 0.1) -> Any:
+    """A model beside some causes, and what it leaves of the log at one joint [N m]."""
+    return SimpleNamespace(before=Model(name, np.array([rms]), np.ones(1)))
+
+
+@pytest.mark.parametrize(("twins", "taken", "tried"), [
+    ({"nominal": 0.09, "beside": 0.05}, "beside", ["beside"]),
+    ({"nominal": 0.09, "beside": 0.8}, "nominal", ["beside", "nominal"]),  # a friction that hunts in simulation, and not on the arm
+    ({"nominal": 0.9, "beside": 0.8}, "beside", ["beside", "nominal"]),  # the lesser of two
+    ({"nominal": 0.09, "beside": None}, "nominal", ["beside", "nominal"])])  # it runs away
+def test_no_floor_stands_above_what_the_log_shows(twins: dict[str, float | None], taken: str, tried: list[str],
+                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    """The arm beside the greatest causes comes first, for it has the least of the fault in its numbers."""
+    asked: list[str] = []
+
+    def made(model: str, *_: Any) -> Any:
+        asked.append(model)
+        if (left := twins[model]) is None:
+            raise InputRejected("D17", "the simulated arm runs away", where="log", remedy="record more")
+        return SimpleNamespace(rms=np.array([left]))
+
+    monkeypatch.setattr(floored, "make_twin", made)
+    monkeypatch.setattr(floored, "drive_noise", lambda *_: None)
+    monkeypatch.setattr(floored, "clean", lambda _: None)
+    data: Any = SimpleNamespace(data=None, motions=None, recipe=None)
+    chosen: Any = SimpleNamespace(replicas=1, seed=1)
+    model, twin = floored._likely(data, (explored("nominal"), explored("beside", 0.01)), chosen, 0)
+    assert (model, float(twin.rms[0]), asked) == (taken, twins[taken], tried)
+
+
+def test_an_arm_that_nobody_can_simulate_has_no_twin(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: Any) -> Any:
+        raise InputRejected("D17", "the simulated arm runs away", where="log", remedy="record more")
+
+    monkeypatch.setattr(floored, "drive_noise", refused)
+    monkeypatch.setattr(floored, "clean", lambda _: None)
+    data: Any = SimpleNamespace(data=None, motions=None, recipe=None)
+    with pytest.raises(InputRejected, match="runs away"):
+        floored._likely(data, (explored("nominal"), explored("beside")), SimpleNamespace(replicas=1, seed=1), 0)  # type: ignore[arg-type]

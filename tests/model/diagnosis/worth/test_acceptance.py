@@ -1,0 +1,204 @@
+"""Rules of acceptance, on numbers that are made up: what is farther than chance explains, what is worse on one held-out log; and
+rows of a joint that is held do not count."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.bench import experiments
+from pipelines.bench.machine import draw_machine
+from pipelines.bench.session import record
+from pipelines.log import shared_work
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.result import TorqueGain
+from pipelines.model.diagnosis.worth import gains
+from pipelines.model.diagnosis.worth.gains import Simulation, farther, gain_of, simulation_errors, worse_log
+from pipelines.model.rigid.body import Motion
+from pipelines.model.simulation.windows import Windows, simulate_windows
+from tests.diagnose.sessions import session
+
+RNG = np.random.default_rng(5)
+NOISE = RNG.uniform(0.5, 1.5, 20)
+
+
+def simulated(power: Any, how: Any = "closed-loop") -> Simulation:
+    return Simulation(how, np.full(3, 1e-4), 1e-4, np.asarray(power), np.full(20, 100.0))
+
+
+@pytest.mark.parametrize(("after", "words"), [
+    (0.5 * NOISE, ""),  # nearer
+    (NOISE * RNG.uniform(0.8, 1.25, 20), ""),  # as near, give or take
+    (2.0 * NOISE, "farther")])
+def test_a_simulated_arm_that_is_farther_than_chance_explains_is_refused(after: Any, words: str) -> None:
+    said = farther(simulated(NOISE), simulated(after))
+    assert (words in said) if words else not said
+
+
+def test_a_model_that_runs_away_is_refused_and_has_no_simulated_gain() -> None:
+    gone = Simulation.none(3)
+    assert "runs away" in farther(simulated(NOISE), gone)
+    assert not farther(gone, gone)  # nobody can be simulated: no argument against anyone
+    gain = gain_of(TorqueGain(np.ones(3), np.ones(3), np.zeros((3, 2))), simulated(NOISE), gone)
+    assert (gain.simulated_position_rms, gain.tip_error_rms, gain.simulation) == (None, None, "none")
+
+
+def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One window of one arm without an end: that arm has no simulated error, the other keeps its own."""
+    log = replace(session()[0], controller=None)
+    prepared = prepare(Logs((log,)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    arm = Exact.start(columns, fit).arm
+    calls = []
+
+    def windows(*given: Any) -> Windows:
+        calls.append(simulate_windows(*given))
+        if len(calls) == 2:
+            calls[1].q[calls[1].first[3]:calls[1].first[4]] = np.nan
+        return calls[-1]
+
+    monkeypatch.setattr(gains, "simulate_windows", windows)
+    monkeypatch.setattr(shared_work, "processors", lambda: 1)  # `calls` counts in one process
+    first, second = simulation_errors([arm, arm], prepared.motions)
+    assert (first.how, second.how) == ("windowed", "none")
+    assert "runs away" in farther(first, second)
+
+
+def test_an_arm_beside_those_that_are_simulated_already_is_simulated_as_they_were() -> None:
+    """In windows beside windows, over the same time; and not at all beside what could not be simulated."""
+    log = session()[0]
+    prepared = prepare(Logs((replace(log, controller=None),)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    arm = Exact.start(columns, fit).arm
+    first = simulation_errors([arm], prepared.motions)[0]
+    same, other = simulation_errors([arm, arm], prepared.motions, {0: first})
+    assert same is first
+    assert (other.how, other.samples.sum()) == ("windowed", first.samples.sum())
+    np.testing.assert_array_equal(other.position_rms, first.position_rms)
+    none = Simulation.none(arm.n_joints)
+    assert [one.how for one in simulation_errors([arm, arm], prepared.motions, {0: none})] == ["none", "none"]
+    closed = prepare(Logs((log,)), DiagnosisSettings()).motions  # they could be closed, and what is known was not
+    assert [one.how for one in simulation_errors([arm, arm], closed, {0: first})] == ["windowed", "windowed"]
+
+
+@pytest.fixture(scope="module")
+def long() -> tuple[Any, Any]:
+    """Six seconds of one log, and an arm fitted to them."""
+    prepared = prepare(Logs((session(seconds=6.0, logs=1)[0],)), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    return prepared.motions[0], Exact.start(columns, fit).arm
+
+
+def test_the_simulated_span_is_where_the_measured_arm_counts(long: tuple[Any, Any]) -> None:
+    """In closed loop: behind the seconds that are told a measured position changes nothing, before their end it does."""
+    (log, found), arm = long
+    first = simulation_errors([arm], ((log, found),))[0]
+    span = first.span[0]
+    assert (first.how, span.log) == ("closed-loop", log.name)
+    assert 1.0 < span.seconds < 5.9
+    end = round(span.seconds / log.sample_time)
+    for sample, same in ((end, True), (end - 1, False)):
+        q = log.q.copy()
+        q[sample] += 0.1
+        moved = replace(log, signals={**log.signals, "q": replace(log.signals["q"], values=q)})
+        assert (simulation_errors([arm], ((moved, found),))[0].tip_rms == first.tip_rms) == same
+
+
+def test_longer_stretches_are_simulated_where_the_last_arm_comes_no_nearer(long: tuple[Any, Any]) -> None:
+    """An arm that is worse first, and then the fitted one: what is short tells. The same two the other way round, and one arm
+    twice, are told apart by all of the log; what is simulated beside them then is as long."""
+    (log, found), arm = long
+    heavy = replace(arm, base=tuple(replace(one, value=1.2 * one.value) for one in arm.base))
+    assert [one.span[0].seconds for one in simulation_errors([heavy, arm], ((log, found),))] == [5.0, 5.0]
+    for arms in ([arm, heavy], [arm, replace(arm)]):
+        both = simulation_errors(arms, ((log, found),))
+        assert [one.span[0].seconds for one in both] == pytest.approx([6.0, 6.0], abs=0.01)
+        beside = simulation_errors([*arms, heavy], ((log, found),), dict(enumerate(both)))[-1]
+        assert beside.samples.sum() == both[0].samples.sum()
+
+
+def test_the_simulated_span_of_windows_is_all_that_they_cover(long: tuple[Any, Any]) -> None:
+    """Without a controller nearly all of the log is simulated, 0.1 s at a time, and half of it where half can be used."""
+    (log, found), arm = long
+    bare = replace(log, controller=None)
+    good = found.good.fit & (np.arange(len(found.good.fit)) < len(found.good.fit) / 2)
+    half: Any = replace(found, good=SimpleNamespace(kept=found.good.kept, fit=good))
+    whole, part = (simulation_errors([arm], ((bare, motion),))[0] for motion in (found, half))
+    assert (whole.how, part.how) == ("windowed", "windowed")
+    assert 5.0 < whole.span[0].seconds <= 6.01
+    assert part.span[0].seconds == pytest.approx(0.5 * whole.span[0].seconds, abs=0.3)
+
+
+def test_a_fast_log_drives_its_windows_by_the_mean_torque_of_a_millisecond() -> None:
+    """Five samples of 0.2 ms make one; none is left of a millisecond of which a sample is missing, or of no use."""
+    t = np.delete(2e-4 * np.arange(61), 23)
+    tau = RNG.normal(size=(60, 3))
+    usable = np.arange(60) != 11
+    motion = Motion(t, *(RNG.normal(size=(60, 3)) for _ in range(3)))
+    thin, mean, left, every = gains._coarser(motion, tau, usable, 2e-4)
+    assert every == 5
+    np.testing.assert_array_equal(thin.q, motion.q[::5])
+    np.testing.assert_allclose(mean[1], tau[5:10].mean(axis=0), rtol=1e-12)
+    assert left.tolist() == [k not in (2, 4) for k in range(12)]
+    assert gains._coarser(motion, tau, usable, 1e-3) == (motion, tau, usable, 1)
+
+
+def two_logs() -> Any:
+    """Two logs of 100 rows of each of two joints."""
+    joint = np.tile(np.repeat([0, 1], 100), 2)
+    return SimpleNamespace(
+        logs=[SimpleNamespace(log=SimpleNamespace(name=name)) for name in ("first", "second")], log_of=np.repeat([0, 1], 200),
+        counts=np.ones(400, dtype=bool), joint=joint,
+        rms=lambda x: np.sqrt(np.bincount(joint, x**2) / np.bincount(joint)))
+
+
+def test_no_held_out_log_may_get_worse_by_more_than_a_tenth() -> None:
+    """Better on the whole, and yet worse on the second; a joint of small torque counts as well as one of large."""
+    data, large = two_logs(), np.tile(np.repeat([1.0, 0.01], 100), 2)
+    first = data.log_of == 0
+    assert not worse_log(data, large, 0.9 * large)
+    assert not worse_log(data, large, np.where(first, 0.2, 1.09) * large)
+    assert "second" in worse_log(data, large, np.where(first, 0.2, 1.12) * large)
+    assert "second" in worse_log(data, large, np.where(first | (data.joint == 0), 1.0, 2.0) * large)
+
+
+def test_all_joints_together_tell_what_no_single_one_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cause of an eighth of the noise at each of three joints, one of them ten times as loud: surely told in most of 100 draws,
+    by its joint alone in half as many; two models that are equally wrong are told apart in no more than one in twenty."""
+    rng, rows, blocks = np.random.default_rng(3), 600, 20
+    joint = np.repeat([0, 1, 2], rows)
+    data: Any = SimpleNamespace(
+        joint=joint, counts=np.ones(3 * rows, dtype=bool), n_joints=3,
+        rms=lambda x: np.sqrt(np.bincount(joint, x**2) / rows), blocks=lambda count: np.tile(np.arange(rows) * count // rows, 3))
+    monkeypatch.setattr(gains, "held_out_left", lambda done, judge, count: done)
+    loud = np.array([10.0, 1.0, 1.0])[joint]
+    told, alone, false, elsewhere = 0, 0, 0, 0
+    own = np.array([True, False, False])
+    for _ in range(100):
+        cause, moved = (0.12 * loud * rng.standard_normal(3 * rows) for _ in range(2))
+        noise = loud * rng.standard_normal(3 * rows)
+        told += gains.surely_less(noise + cause, noise, own | True, data, blocks)
+        elsewhere += gains.surely_less(noise + 3.0 * cause, np.where(joint == 0, noise + 3.0 * cause, noise), own, data, blocks)
+        alone += bool(gains.torque_gain_of(data, noise + cause, noise).ci95[0, 1] < 0.0)
+        false += gains.surely_less(noise + cause, noise + moved, own, data, blocks)
+    assert told > 50
+    assert alone < told / 2
+    assert false <= 5
+    assert not elsewhere  # a cause at joint 1 has no part in what falls at the others
+
+
+def test_rows_of_a_joint_that_is_held_do_not_count() -> None:
+    """Joint 1 to and fro, the others at rest: they stick, and no law tells their torque. In the other log all three count."""
+    machine = draw_machine(7, "fault")
+    (fro,) = record(machine, (), [experiments.reversal(machine, 1, 2.0)], 3)
+    data = prepare(Logs((session()[0], replace(fro, role="identify"))), DiagnosisSettings()).data
+    counted = {(log, joint): bool(data.counts[(data.log_of == log) & (data.joint == joint)].all())
+               for log in (0, 1) for joint in (0, 1, 2)}
+    assert counted == {(0, 0): True, (0, 1): True, (0, 2): True, (1, 0): True, (1, 1): False, (1, 2): False}

@@ -1,0 +1,55 @@
+"""The figure that proves a finding is drawn over what the cause depends on."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import refine
+from pipelines.model.diagnosis.worth.evidence import proof
+from pipelines.report.diagnosis_proof import proof_figures
+from tests.model.diagnosis.screened.test_through import turned
+from tests.model.diagnosis.searched.test_whole_orders import searched
+from tests.report.test_diagnosis_words import found
+
+_RINGS = 20.0  # [Hz]
+
+
+def test_a_wave_of_the_angle_is_shown_over_the_angle() -> None:
+    """A rotor that turns once, one way, tells the same over time; what it does then is what it does there."""
+    (step, *_) = searched({7.0: 0.04, 28.0: 0.03}, 1, runs=1).steps
+    assert step.best is not None
+    assert proof(step.before, step.best.done, 1).against == "position"
+
+
+def test_what_rings_is_shown_over_frequency() -> None:
+    """At 20 Hz, now stronger and now weaker, wherever the joint is: no signal tells it, and its line stands at its frequency."""
+    log = turned(1, {}, 0.0)
+    rng = np.random.default_rng(20261126)
+    strength = np.interp(log.t, np.linspace(log.t[0], log.t[-1], 200), rng.standard_normal(200))
+    ringing = 0.05 * strength * np.sin(2.0 * np.pi * _RINGS * log.t)
+    rung = replace(log, signals=log.signals | {"tau": replace(log.signals["tau"], values=log.tau + ringing[:, None])})
+    prepared = prepare(Logs((rung,)), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    before = refine(Exact.start(columns, fit), prepared.data, fit.weight)
+    (rows,) = prepared.data.logs
+    after: Any = SimpleNamespace(left=before.left - np.interp(rows.t, log.t, ringing))
+    shown = proof(before, after, 1)
+    assert (shown.against, shown.unit) == ("frequency", "Hz")
+    for line in (shown.before, shown.predicted):
+        assert abs(shown.x[np.argmax(line)] - _RINGS) < 2.0
+    beside = np.abs(shown.x - _RINGS) < 2.0
+    assert shown.after[beside].max() < 0.2 * shown.before[beside].max()
+    caption = next(proof_figures(1, replace(found("base_resonance"), proof=shown))).caption
+    size = re.search(r"amplitudes in the log .*: ([0-9.]+) N m rms without", caption)
+    assert size is not None
+    assert float(size[1]) == pytest.approx(float(before.rms[0]), rel=0.1)
