@@ -26,3 +26,15 @@ def test_few_waves_beside_a_spring_are_its_curve_and_many_are_not(waves: float, 
     named = Spring(joint=2)
     taken = 1.0 - left(named.looser()) / left(named)
     assert taken > 0.5 if rest else taken < 0.5
+
+
+def test_columns_of_a_spring_are_powers_and_beyond_their_range_tangents() -> None:
+    """x^n and, where it was not seen, x0^n + n x0^(n-1) (x - x0): NumPy's polynomials say so."""
+    motion = motion_of(1)(np.arange(0.0, 10.0, 0.01))
+    q = motion.q[:, 1]
+    low, high = np.quantile(q, [0.2, 0.9]).tolist()
+    columns = Spring(joint=2, seen_from=low, seen_to=high, degree=7).columns(motion, arm())[:, 1]
+    near = np.clip(q, low, high)
+    for column, degree in zip(columns.T, [1, 0, *range(2, 8)], strict=True):
+        power = np.polynomial.Polynomial.basis(degree)
+        assert np.allclose(column, power(near) + power.deriv()(near) * (q - near), rtol=1e-12, atol=1e-12)
