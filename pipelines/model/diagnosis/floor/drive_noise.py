@@ -97,7 +97,7 @@ def _seen(model: Exact, fit: Fit, level: Array, seed: int) -> _Replica:
 
     def left(wander: Array) -> Array:
         """(rows,) [N m] with what any drive in order has, which is not simulated."""
-        load = rows.lay_each(imperfect(model.nominal, DriveNoise(level, wander), rows, seed)) * fit.weights
+        load = rows.lay_each(imperfect(model.nominal, DriveNoise(level, wander), rows, (seed,), 0)) * fit.weights
         return np.asarray(fit.left + (load - (fit.basis @ load) @ fit.basis) / fit.weights)
 
     rough = np.square(_roughness(next(rows.split(fit.left)), float(np.median(np.diff(rows.logs[0].t)))))

@@ -120,7 +120,7 @@ class _InOrder:
     def powers(self, pieces: Sequence[_Piece], steps: Mapping[float, Step]) -> list[tuple[Array, Indices]]:
         """Of each log (joints,) [N m^2] sum of squares of what the model leaves of its own replicas, and of how many rows."""
         experiments = [experiment_of(one.log) for one in pieces]
-        done = simulate_together(self.plant, experiments, self._drives, range(self.seed, self.seed + _COPIES), steps)
+        done = simulate_together(self.plant, experiments, self._drives, self._seeds, steps)
         return [self._power(one, simulated) for one, simulated in zip(pieces, done, strict=True)]
 
     def _power(self, piece: _Piece, done: Simulated) -> tuple[Array, Indices]:
@@ -130,7 +130,12 @@ class _InOrder:
     def _power_of(self, piece: _Piece, done: Simulated, k: int) -> tuple[Array, Indices]:
         copy, seen = replica((piece.log, piece.found), done, k, self.recipe), piece.rows.logs[piece.place].equations.rows
         own = gather((copy,), self.bare.columns, self.recipe, [seen], piece.place)
-        return own.power(own.y + own.lay_each(imperfect(self.arm, self.noise, own, self.seed + k)) - own.lay(self.plant.torque))
+        small = own.lay_each(imperfect(self.arm, self.noise, own, self._seeds, k))
+        return own.power(own.y + small - own.lay(self.plant.torque))
+
+    @property
+    def _seeds(self) -> range:
+        return range(self.seed, self.seed + _COPIES)
 
     @property
     def _drives(self) -> Noise:

@@ -21,7 +21,7 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns, law_slopes, rows_of
 from pipelines.model.diagnosis.floor.replay import as_recorded, experiment_of
 from pipelines.model.diagnosis.rows.data import Data, gather
-from pipelines.model.diagnosis.rows.imperfections import DriveNoise, small_loads
+from pipelines.model.diagnosis.rows.imperfections import DriveNoise, drive_waves, small_loads
 from pipelines.model.diagnosis.rows.whitening import Whitening
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed, reconstruct
@@ -120,18 +120,19 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
         parts = [replica(motions[place], done, k, recipe) for place, done in runs.items()]
         rows = [data.logs[place].equations.rows for place in places]
         own = gather(tuple(parts), columns, recipe, rows)
-        small = own.lay_each(imperfect(model.nominal, noise, own, seed + k))
+        small = own.lay_each(imperfect(model.nominal, noise, own, seeds, k))
         slopes, _ = law_slopes(own, columns, model.beta)
         found.append(fit_columns(own, np.concatenate([rows_of(own, columns), *slopes]), own.y + small, weight))
     return Twin(tuple(found), places, noise)
 
 
-def imperfect(arm: Arm, noise: DriveNoise, own: Data, seed: int) -> Callable[[int, Motion], Array]:
-    """Small loads (samples, joints) [N m] of a replica in each of its logs `own`, drawn by `seed`."""
+def imperfect(arm: Arm, noise: DriveNoise, own: Data, seeds: Sequence[int], k: int) -> Callable[[int, Motion], Array]:
+    """Small loads (samples, joints) [N m] of replica `k` of those that `seeds` draw, in each of its logs `own`."""
+    waves = drive_waves(own.n_joints, seeds)[k]
+
     def loads(log: int, motion: Motion) -> Array:
         step = own.logs[log - own.first].log.sample_time
-        return small_loads(motion, arm, noise.wander, step, np.random.default_rng([_NUISANCE, seed]),
-                           np.random.default_rng([_NUISANCE, seed, log]))
+        return small_loads(motion, arm, noise.wander, step, waves, np.random.default_rng([_NUISANCE, seeds[k], log]))
 
     return loads
 

@@ -1,12 +1,14 @@
 """What any drive in order has: a torque constant that ripples with the angle, a wander of the amplifier's zero.
 
 Replicas of the twin get them, drawn anew for each, so that thresholds know them: a ripple of a thousandth on a joint that carries
-gravity looks like cogging on every arm. A small load shows in the torque residual as it is, whatever the controller does about
+gravity looks like cogging on every arm, one of few waves a turn on a joint that rubs like friction that depends on position. A
+small load shows in the torque residual as it is, whatever the controller does about
 it, so that it is added there and not simulated.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +17,13 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["RIPPLE", "RIPPLE_ORDERS", "DriveNoise", "small_loads"]
+__all__ = ["RIPPLE", "RIPPLE_ORDERS", "DriveNoise", "DriveWaves", "drive_waves", "small_loads"]
 
 RIPPLE = 1e-3  # of the torque
 _COGGING = 2e-5  # of the largest rated torque
 RIPPLE_ORDERS = (6, 40)  # waves a turn, and of cogging
 _CORNER = (1.0, 5.0)  # [Hz]
+_WAVES = 20040509  # of the seeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,22 +34,38 @@ class DriveNoise:
     wander: Array  # [N m] of the amplifier's zero, slow
 
 
-def small_loads(motion: Motion, arm: Arm, wander: Array, sample_time: float, drives: np.random.Generator,
+@dataclass(frozen=True, eq=False)
+class DriveWaves:
+    """Of the drives of one replica, the same in all its logs. Arrays (2, joints): of the ripple, of cogging."""
+
+    order: Array  # [1/rev]
+    phase: Array  # [rad] at the joint's zero
+
+
+def drive_waves(joints: int, seeds: Sequence[int]) -> list[DriveWaves]:
+    """Of each replica, whose orders together are spread over all there may be: of as many equal parts of the range each replica
+    has one (McKay, Beckman & Conover 1979). Ten that are drawn without looking at each other mostly leave out the lowest, which
+    the machine at hand may have."""
+    rng = np.random.default_rng([_WAVES, *seeds])
+    count, (low, high) = len(seeds), RIPPLE_ORDERS
+    part = rng.permuted(np.tile(np.arange(count)[:, None, None], (1, 2, joints)), axis=0)
+    order = np.floor(low + (high - low) * (part + rng.random(part.shape)) / count)
+    phase = rng.uniform(-np.pi, np.pi, part.shape)
+    return [DriveWaves(*one) for one in zip(order, phase, strict=True)]
+
+
+def small_loads(motion: Motion, arm: Arm, wander: Array, sample_time: float, drives: DriveWaves,
                 rng: np.random.Generator) -> Array:
-    """(samples, joints) [N m] of one replica in one log; its ripple is that of its drives and the same in all logs.
+    """(samples, joints) [N m] of one replica in one log.
 
     Args:
         wander: (joints,) [N m] root mean square of the amplifier's wander.
-        drives: what is drawn of it belongs to the drives: seeded alike for all logs of a replica.
         rng: for what happens in this log.
     """
-    joints = motion.q.shape[1]
-    order = drives.integers(*RIPPLE_ORDERS, size=(2, joints))
-    phase = drives.uniform(-np.pi, np.pi, (2, joints))
     tau = arm.torque(motion)
     largest = _largest(arm, tau)
-    ripple = RIPPLE * tau * np.sin(order[0] * motion.q + phase[0])
-    cogging = _COGGING * largest * np.sin(order[1] * motion.q + phase[1])
+    ripple = RIPPLE * tau * np.sin(drives.order[0] * motion.q + drives.phase[0])
+    cogging = _COGGING * largest * np.sin(drives.order[1] * motion.q + drives.phase[1])
     return np.asarray(ripple + cogging + _wander(wander, len(tau), sample_time, rng))
 
 

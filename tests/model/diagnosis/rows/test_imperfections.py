@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.rows.imperfections import small_loads
+from pipelines.model.diagnosis.rows.imperfections import drive_waves, small_loads
 from pipelines.model.rigid.body import Motion
 
 
@@ -24,6 +24,26 @@ def test_the_cogging_of_a_wrist_is_none_of_a_slide(rated: tuple[float, ...], mos
         tau[-1] = 7.0
     arm: Any = SimpleNamespace(torque=lambda motion: tau, robot=SimpleNamespace(
         joints=[SimpleNamespace(torque=one) for one in rated], revolute=(False, True, True)))
-    rng = np.random.default_rng(3)
-    found = small_loads(Motion(t, q, np.zeros_like(q), np.zeros_like(q)), arm, np.zeros(3), 5e-4, rng, rng)[:-1]
+    drives, = drive_waves(3, [3])
+    still = Motion(t, q, np.zeros_like(q), np.zeros_like(q))
+    found = small_loads(still, arm, np.zeros(3), 5e-4, drives, np.random.default_rng(3))[:-1]
     np.testing.assert_allclose(np.abs(found).max(axis=0), 2e-5 * np.array(most), rtol=0.02)
+
+
+@pytest.mark.parametrize("first", range(6))
+def test_drives_of_ten_replicas_have_all_orders_between_them(first: int) -> None:
+    """6 to 39 waves a turn: in each tenth of that range one replica has its ripple, at every joint, and none beyond."""
+    waves = drive_waves(3, range(first, first + 10))
+    orders = np.array([one.order for one in waves])
+    assert (orders == np.round(orders)).all()
+    for place in np.ndindex(2, 3):
+        spread = np.sort(orders[:, *place])
+        assert 6 <= spread[0] <= 9
+        assert 36 <= spread[-1] <= 39
+        assert np.diff(spread).max() <= 7  # two tenths
+    assert len({tuple(one.tolist()) for one in orders.reshape(10, -1).T}) == 6  # not the same at every joint
+
+
+def test_drives_are_drawn_alike_for_the_same_replicas() -> None:
+    one, other = (drive_waves(2, range(4, 8)) for _ in range(2))
+    assert all(np.array_equal(a.order, b.order) and np.array_equal(a.phase, b.phase) for a, b in zip(one, other, strict=True))
