@@ -9,6 +9,7 @@
     borne_out     where no floor says what passes: time that a cause was not chosen by
     hypotheses    one cause fitted exactly, by each of its laws
     parsimony     of those that explain nearly the same, the plainest
+    barred        below its threshold, and decidedly better than what is above its own
     elsewhere     the same cause at another joint
     unnameable    what explains the most and cannot be named
     curves        by which curve friction changes its sign, beside what was found

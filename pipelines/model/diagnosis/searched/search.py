@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.fitted.refit import Refined, refine
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screened.screen import Screened, screen
+from pipelines.model.diagnosis.searched.barred import better_than
 from pipelines.model.diagnosis.searched.borne_out import borne_out
 from pipelines.model.diagnosis.searched.case import Case, HeldOut, held_out
 from pipelines.model.diagnosis.searched.curves import with_curves_anew
@@ -269,11 +270,15 @@ def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, c
     refused |= {id(one.screened) for one in asked if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
     tried = [one for one in tried if id(one.screened) not in refused]
     best = (chosen or fewest(tried)) if more else None
+    better = None if best is None or chosen is not None else better_than(best, case, now, screened, gate.passed)
+    if better is not None:
+        best, tried = better, [better, *tried]
     if best is not None and case.shared is not None:
         best = at_its_joint(best, tried, now, case.shared)
     other = unnameable(gate.passed, best, explored.tried, now, case)
     best = None if other is not None else best
-    trials = ledger(screened, gate.judged, thresholds, explored.tried, best, now, number, refused)
+    fitted_there = explored.tried if better is None else (better, *explored.tried)
+    trials = ledger(screened, gate.judged, thresholds, fitted_there, best, now, number, refused)
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
 
 
