@@ -65,7 +65,7 @@ class Simulation:
     how: Literal["closed-loop", "windowed", "none"]
     position_rms: Array  # [rad] (joints,)
     tip_rms: float  # [m]
-    power: Array  # [rad^2] (blocks,) summed over the joints and the samples of each block of time
+    power: Array  # (blocks,) squared error summed over the joints, in units of each, and the samples of each block of time
     samples: Array  # (blocks,)
     first: Strayed | None = None  # in the first of the logs; None where no controller is known
     span: tuple[SimulatedSpan, ...] = ()  # of each log that was simulated
@@ -221,13 +221,23 @@ def _all(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -
         span.append(SimulatedSpan(log.name, between * int(known.sum())))
     each = np.concatenate(square)
     block = np.arange(len(each)) * _BLOCKS // max(len(each), 1)
-    power = np.asarray(np.bincount(block, each.sum(axis=1), minlength=_BLOCKS), dtype=np.float64)
+    units = _units(arm, np.concatenate([seen[np.isfinite(seen).all(axis=1)] for _, seen, _ in pairs]))
+    power = np.asarray(np.bincount(block, each @ units**-2, minlength=_BLOCKS), dtype=np.float64)
     samples = np.asarray(np.bincount(block, minlength=_BLOCKS), dtype=np.float64)
     (log, _), (q, seen, _) = motions[0], pairs[0]
     first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
     return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
                       float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first, tuple(span),
                       longest)
+
+
+def _units(arm: Arm, q: Array) -> Array:
+    """(joints,) in which errors of several joints are added up: radians, or metres; where some turn and others slide, the standard
+    deviation of what each was measured to do, `q` (samples, joints)."""
+    turning = arm.robot.revolute
+    if all(turning) or not any(turning):
+        return np.ones(len(turning))
+    return np.asarray(np.maximum(np.std(q, axis=0), 1e-9))
 
 
 def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array, float]]:

@@ -202,3 +202,22 @@ def test_rows_of_a_joint_that_is_held_do_not_count() -> None:
     counted = {(log, joint): bool(data.counts[(data.log_of == log) & (data.joint == joint)].all())
                for log in (0, 1) for joint in (0, 1, 2)}
     assert counted == {(0, 0): True, (0, 1): True, (0, 2): True, (1, 0): True, (1, 1): False, (1, 2): False}
+
+
+def test_a_slide_counts_by_its_own_travel_beside_a_joint_that_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slide that moves over five centimetres is 5 mm off, then half a millimetre; a wrist that turns over two radians is 20 mrad
+    off, then 25: metres beside radians would tell of the wrist alone."""
+    t = np.linspace(0.0, 10.0, 2000)
+    measured = np.stack([0.025 * np.sin(t), np.sin(1.3 * t)], axis=1)
+    off = {"before": np.array([5e-3, 0.020]), "after": np.array([5e-4, 0.025])}
+    log: Any = SimpleNamespace(name="log", t=t)
+    found = {}
+    for revolute in ((False, True), (True, True)):
+        body = SimpleNamespace(tip=lambda q: q)
+        for when, error in off.items():
+            arm: Any = SimpleNamespace(n_joints=2, robot=SimpleNamespace(revolute=revolute), body=body)
+            monkeypatch.setattr(gains, "_closed", lambda *_, error=error: [(measured + error, measured, 5e-3)])
+            found[revolute, when] = gains._all(arm, [(log, Any)], True, False, 10.0)
+    slides, turns = (gains.nearer(found[kind, "before"], found[kind, "after"]) for kind in ((False, True), (True, True)))
+    assert slides
+    assert not turns
