@@ -128,7 +128,7 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
 
 def imperfect(arm: Arm, noise: DriveNoise, own: Data, seeds: Sequence[int], k: int) -> Callable[[int, Motion], Array]:
     """Small loads (samples, joints) [N m] of replica `k` of those that `seeds` draw, in each of its logs `own`."""
-    waves = drive_waves(own.n_joints, seeds)[k]
+    waves = drive_waves(arm.robot.revolute, seeds)[k]
 
     def loads(log: int, motion: Motion) -> Array:
         step = own.logs[log - own.first].log.sample_time

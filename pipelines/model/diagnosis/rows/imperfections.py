@@ -22,6 +22,7 @@ __all__ = ["RIPPLE", "RIPPLE_ORDERS", "DriveNoise", "DriveWaves", "drive_waves",
 RIPPLE = 1e-3  # of the torque
 _COGGING = 2e-5  # of the largest rated torque
 RIPPLE_ORDERS = (6, 40)  # waves a turn, and of cogging
+_SLIDES = 10.0  # times as many in 2π m of a slide: a linear motor's magnets are 16 to 105 mm apart, and so are turns of a screw
 _CORNER = (1.0, 5.0)  # [Hz]
 _WAVES = 20040509  # of the seeds
 
@@ -38,18 +39,20 @@ class DriveNoise:
 class DriveWaves:
     """Of the drives of one replica, the same in all its logs. Arrays (2, joints): of the ripple, of cogging."""
 
-    order: Array  # [1/rev]
+    order: Array  # [1/rev], of a slide in 2π m
     phase: Array  # [rad] at the joint's zero
 
 
-def drive_waves(joints: int, seeds: Sequence[int]) -> list[DriveWaves]:
-    """Of each replica, whose orders together are spread over all there may be: of as many equal parts of the range each replica
-    has one (McKay, Beckman & Conover 1979). Ten that are drawn without looking at each other mostly leave out the lowest, which
-    the machine at hand may have."""
+def drive_waves(revolute: Sequence[bool], seeds: Sequence[int]) -> list[DriveWaves]:
+    """Of joints that turn or slide, for each replica: its orders and those of the others are spread over all there may be.
+
+    Of as many equal parts of the range each replica has one (McKay, Beckman & Conover 1979). Ten that are drawn without looking at
+    each other mostly leave out the lowest, which the machine at hand may have.
+    """
     rng = np.random.default_rng([_WAVES, *seeds])
     count, (low, high) = len(seeds), RIPPLE_ORDERS
-    part = rng.permuted(np.tile(np.arange(count)[:, None, None], (1, 2, joints)), axis=0)
-    order = np.floor(low + (high - low) * (part + rng.random(part.shape)) / count)
+    part = rng.permuted(np.tile(np.arange(count)[:, None, None], (1, 2, len(revolute))), axis=0)
+    order = np.floor(low + (high - low) * (part + rng.random(part.shape)) / count) * np.where(revolute, 1.0, _SLIDES)
     phase = rng.uniform(-np.pi, np.pi, part.shape)
     return [DriveWaves(*one) for one in zip(order, phase, strict=True)]
 

@@ -20,10 +20,16 @@ _WORSE = 1.1  # times what the best leaves of its joint: a fault far above the n
 
 def fewest(tried: Sequence[Tried]) -> Tried | None:
     """Of those at the joint of the best that leave nearly as little, one whose further number is worth it, else the one with
-    fewest; where the best is of the arm, of those at any joint; none where the best leaves no less, held out or on a par."""
+    fewest; where the best is of the arm, of those at any joint; none where the best leaves no less, held out or on a par.
+
+    What happened once is ranked by the log that it was fitted to, which is no held-out error: what lasts, leaves as little of the
+    fitted logs and less of the others is better.
+    """
     possible = [one for one in tried if max(one.error, one.rank) < 1.0 and one.possible]
     if not possible:
         return None
+    if possible[0].log is not None:
+        possible = [one for one in possible if one.log is None and one.done.rss <= possible[0].done.rss] or possible
     best = possible[0]
     joint = best.screened.joint
     own = slice(None) if joint is None else slice(joint - 1, joint)

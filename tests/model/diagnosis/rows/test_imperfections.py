@@ -24,7 +24,7 @@ def test_the_cogging_of_a_wrist_is_none_of_a_slide(rated: tuple[float, ...], mos
         tau[-1] = 7.0
     arm: Any = SimpleNamespace(torque=lambda motion: tau, robot=SimpleNamespace(
         joints=[SimpleNamespace(torque=one) for one in rated], revolute=(False, True, True)))
-    drives, = drive_waves(3, [3])
+    drives, = drive_waves((False, True, True), [3])
     still = Motion(t, q, np.zeros_like(q), np.zeros_like(q))
     found = small_loads(still, arm, np.zeros(3), 5e-4, drives, np.random.default_rng(3))[:-1]
     np.testing.assert_allclose(np.abs(found).max(axis=0), 2e-5 * np.array(most), rtol=0.02)
@@ -33,7 +33,7 @@ def test_the_cogging_of_a_wrist_is_none_of_a_slide(rated: tuple[float, ...], mos
 @pytest.mark.parametrize("first", range(6))
 def test_drives_of_ten_replicas_have_all_orders_between_them(first: int) -> None:
     """6 to 39 waves a turn: in each tenth of that range one replica has its ripple, at every joint, and none beyond."""
-    waves = drive_waves(3, range(first, first + 10))
+    waves = drive_waves((True, True, True), range(first, first + 10))
     orders = np.array([one.order for one in waves])
     assert (orders == np.round(orders)).all()
     for place in np.ndindex(2, 3):
@@ -45,5 +45,11 @@ def test_drives_of_ten_replicas_have_all_orders_between_them(first: int) -> None
 
 
 def test_drives_are_drawn_alike_for_the_same_replicas() -> None:
-    one, other = (drive_waves(2, range(4, 8)) for _ in range(2))
+    one, other = (drive_waves((True, False), range(4, 8)) for _ in range(2))
     assert all(np.array_equal(a.order, b.order) and np.array_equal(a.phase, b.phase) for a, b in zip(one, other, strict=True))
+
+
+def test_magnets_along_a_slide_are_centimetres_apart() -> None:
+    pitch = np.array([2.0 * np.pi / one.order[:, 0] for one in drive_waves((False, True), range(10))])  # [m]
+    assert 0.01 < pitch.min() < 0.02
+    assert 0.07 < pitch.max() < 0.11

@@ -54,6 +54,22 @@ def test_a_further_number_is_taken_for_what_it_is_worth(less: float, rank: float
     assert fewest([whole, offset]) is offset
 
 
+@pytest.mark.parametrize(("left", "held_out", "taken"), [(0.66, 0.9, True), (0.66, 1.01, False), (0.8, 0.7, False)])
+def test_what_lasts_is_better_than_what_happened_once_and_leaves_more(left: float, held_out: float, taken: bool) -> None:
+    """An arm that meets its torque's limit again and again, told as a touch in one log: that leaves 0.74 of the fitted logs, with
+    which it is ranked, for the others are none of its business. The limit leaves less of them, and of the others as well."""
+
+    def fit(rss: float, error: float, rank: float, log: int | None, count: int) -> Tried:
+        model = SimpleNamespace(effects=(SimpleNamespace(effect=None, count=count, possible=True),))
+        done: Any = SimpleNamespace(rss=rss, model=model, rms=np.full(3, rss), data=SimpleNamespace(rows=3000))
+        screened: Any = SimpleNamespace(joint=None if log is not None else 3)
+        effect: Any = SimpleNamespace(name="contact" if log is not None else "torque_saturation", twins=())
+        return Tried(screened, effect, log, done, error, rank, 0.1)
+
+    touch, limit = fit(0.74, 0.74, 0.74, 1, 5), fit(left, held_out, float(np.sqrt(left * held_out)), None, 1)
+    assert fewest(sorted([touch, limit], key=lambda one: one.rank)) is (limit if taken else touch)
+
+
 def test_deviations_from_a_plane_are_the_least_that_scipy_finds() -> None:
     rng = np.random.default_rng(4)
     numbers, plane, root = rng.standard_normal(4), rng.standard_normal((4, 2)), rng.standard_normal((4, 4))
