@@ -19,6 +19,8 @@ _ROUNDED = 1e-11  # difference of orders that is rounding
 # Of the squared error that the whole order leaves, at most. A recorded drive with orders 7, 12 and 28 left .9 by a free one in
 # place of the first, made-up waves of 12, 13 and 14 a turn .74; one of 6.8 alone on its joint leaves noise.
 _ALL_BUT = 0.25
+_FEWEST = 1.25  # waves in the travel: a search begins at one and a half, and a fit may move it; half a wave is a spring
+_STILL = 1e-3  # [rad or m] of travel: none
 _APART = 0.25  # of what the range tells apart: nearer to a whole order it is 45 degrees off that at either end at most
 
 
@@ -35,6 +37,7 @@ class Cogging(Effect):
     harmonics: int = 3  # how many m there are
     whole: bool = False  # whether k is held as it is
     apart: float = 0.0  # how far a k that is not held is from a whole number at least
+    fewest: float = 0.0  # k at least: with fewer waves in the travel it could be any curve
 
     name = "cogging"
     title = "Cogging"
@@ -87,7 +90,8 @@ class Cogging(Effect):
         around = turning and self.goes_round(motion, NEARLY)
         for order in orders_along(travel, turning):
             whole = around and order.is_integer()
-            yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel if whole else 0.0)
+            yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel if whole else 0.0,
+                          fewest=0.0 if around else _FEWEST * 2.0 * math.pi / max(travel, _STILL))
 
     def again(self, motion: Motion) -> bool:
         """Magnets, teeth and poles each have their own order; a turn tells them apart, on much less any curve is a few waves."""
@@ -110,7 +114,8 @@ class Cogging(Effect):
         return super().decided if self.whole or self.apart else _ALL_BUT
 
     def possible(self, values: Values) -> bool:
-        return super().possible(values) and (self.whole or abs(self.order - round(self.order)) >= self.apart)
+        apart = self.whole or abs(self.order - round(self.order)) >= self.apart
+        return super().possible(values) and apart and values["order"] >= self.fewest
 
     def own_load(self, values: Values) -> OwnLoad:
         shaped = self.at(values)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.spring import Spring
 from tests.model.estimation.experiments import arm, motion_of
 
@@ -38,3 +41,15 @@ def test_columns_of_a_spring_are_powers_and_beyond_their_range_tangents() -> Non
     for column, degree in zip(columns.T, [1, 0, *range(2, 8)], strict=True):
         power = np.polynomial.Polynomial.basis(degree)
         assert np.allclose(column, power(near) + power.deriv()(near) * (q - near), rtol=1e-12, atol=1e-12)
+
+
+def test_half_a_wave_in_the_travel_is_no_cogging() -> None:
+    """With fewer waves than one and a quarter a wave with harmonics is any curve, a spring's too."""
+    motion = motion_of(1)(np.arange(0.0, 10.0, 0.01))
+    travel = float(np.ptp(motion.q[:, 1]))
+    shapes = list(Cogging(joint=2).shapes(motion, arm()))
+    assert len(shapes) > 10
+    for waves, possible in ((0.5, False), (1.1, False), (1.4, True), (7.0, True)):
+        one = replace(shapes[0].full(), whole=False, apart=0.0, order=waves * 2.0 * np.pi / travel)
+        assert one.possible(one.values(np.ones(6))) is possible
+    assert all(one.possible(one.values(np.ones(2))) for one in shapes)
