@@ -19,7 +19,7 @@ class RotorInertia(Effect):
 
     name = "rotor_inertia"
     title = "Rotor inertia"
-    parameters = (Quantity("inertia", "kg m^2", 0.0, LARGE, "inertia at joint side"),)
+    parameters = (Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "inertia at joint side"),)
     signature = "A torque in proportion to the joint's own acceleration, the same in every posture."
     explanation = "The rotor and the gear's fast shaft turn with the motor; the gear ratio enters squared."
     remedy = "Add it to the model; it is a property of the machine, not a fault."

@@ -29,7 +29,7 @@ class TransmissionCoupling(Effect):
     title = "A motor that turns with two joints"
     parameters = (
         Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
-        Quantity("inertia", "kg m^2", 0.0, LARGE, "of the motor, at joint side"),
+        Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "of the motor, at joint side"),
         Quantity("viscous", "N m s/rad", 0.0, LARGE, "viscous friction of the motor, at joint side"),
         Quantity("coulomb", "N m", 0.0, LARGE, "dry friction of the motor, at joint side"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which dry friction changes sign", shape=True),

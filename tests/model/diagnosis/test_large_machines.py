@@ -13,8 +13,11 @@ import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.inputs import Logs
 from pipelines.model.diagnosis.settings import DiagnosisSettings
+from pipelines.model.diagnosis.wanted import Wanted
+from pipelines.model.effects.quadratic_drag import QuadraticDrag
 
 _ROBOT = """name = "slide"
 gravity = [-9.81, 0.0, 0.0]
@@ -60,3 +63,13 @@ def test_what_is_large_on_a_small_arm_has_its_name_on_a_large_one(cause: str, nu
     told = found.findings[0].parameters[number]
     assert told.std is not None
     assert told.value == pytest.approx(size, abs=max(4.0 * told.std, 0.05 * abs(size)))
+
+
+def test_a_cause_that_would_have_to_push_is_refused_for_that() -> None:
+    """Friction that grows less than its speed is no drag: fitted, that takes nearly all off the held-out error, with a coefficient
+    below zero."""
+    def less(q: Array, v: Array) -> Array:
+        return -100.0 * v * np.abs(v)
+
+    found = extend(Logs((slide(1, "identify", less),), (slide(3, "validate", less),)), (Wanted(QuadraticDrag(joint=1)),))
+    assert [one.reason for one in found.rejected] == ["fitted exactly, its numbers are none that it can have"]
