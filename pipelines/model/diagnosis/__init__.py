@@ -4,7 +4,8 @@
 causes that somebody names. Where to look, in that order:
 
     asked           settings, gates, inputs, memory
-    rows            data, sharper, stretch, signals; kept, what was laid already; ripple and whitening, noise of rows
+    rows            data, sharper, stretch, signals; at_rest, which do not count; kept, what was laid already; ripple and whitening,
+                    noise of rows
     nominal model   nominal, dissipation, curves, change_of_sign, terms_apart; linear, least squares around a solution
     what acts       exact, record, slopes, refit; beside, what is known from elsewhere; numbers, as they are reported
     responses       responding, compliance: what gives way is named by them, and subtracted first
