@@ -132,7 +132,8 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         gain=found.gain, residual_rms=found.before, after_rms=found.after, held_out=found.held_out,
         standing=tuple(one.place for one in found.standing), robot=name, joints=tuple(joint.name for joint in robot.joints),
         rated=tuple(joint.torque for joint in robot.joints), doctor=said, model=model, derived=_derived(found, settings),
-        laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name, fewer_terms=found.fewer)
+        laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name, fewer_terms=found.fewer,
+        revolute=tuple(robot.revolute))
 
 
 def _each(wanted: Sequence[Wanted]) -> tuple[Wanted, ...]:

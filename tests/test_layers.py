@@ -32,7 +32,7 @@ LAYERS = {
 CALL_STAGES = {"pipelines.run"}
 WITHIN = "pipelines.model.diagnosis"
 # Its folders, and the modules beside them, from the bottom up. It is not the order in which things happen: `given` runs a search.
-DIAGNOSIS = ("rows", "asked", "fitted", "screened", "floor", "result", "worth", "unseen", "reference", "searched", "given", "named",
+DIAGNOSIS = ("rows", "fitted", "asked", "screened", "floor", "result", "worth", "unseen", "reference", "searched", "given", "named",
              "believed", "memory", "answered", "extend", "changed", "diagnose")
 CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".terms")}  # of the effects, all that one of them may import
 DOORS = {

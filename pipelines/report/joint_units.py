@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
@@ -70,9 +69,8 @@ def unit_of(limits: Iterable[Limited], quantity: str) -> str:
 
 
 def units_in(found: Diagnosis | Extension) -> Units:
-    """By what a result says of its joints: a diagnosis in the curves over their positions, an extension in its model's robot."""
+    """By what a result says of its joints: a diagnosis in the curves over their positions, an extension itself."""
     if isinstance(found, Extension):
-        joints = tomllib.loads(found.model.robot).get("joint", ()) if found.model is not None else ()
-        return Units(tuple(one.get("type", "revolute") != "prismatic" for one in joints))
+        return Units(found.revolute)
     sliding = {curve.joint for one in found.evidence for curve in one.curves if curve.against == "position" and curve.unit == "m"}
     return Units(tuple(j + 1 not in sliding for j in range(len(found.residual_rms.identify))))

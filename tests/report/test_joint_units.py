@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.log.model_file import ModelFile
 from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.result import BeforeAfter, Curve, Diagnosis, Evidence, Gain, ResidualRms, TorqueGain
 from pipelines.model.excitation.limits import Limit
@@ -37,11 +36,10 @@ def test_a_diagnosis_says_which_joints_slide() -> None:
     assert each("rad or m", "/s") == "rad/s or m/s"
 
 
-def test_an_extension_says_it_by_its_robot() -> None:
+def test_an_extension_says_it_also_where_it_has_no_model() -> None:
+    """The newtons that a slide's refused cause leaves are no newton metres."""
     whole: Any = {field.name: None for field in fields(Extension)}
-    robot = '[[joint]]\ntype = "prismatic"\n[[joint]]\nname = "elbow"\n'
-    assert units_in(Extension(**(whole | {"model": ModelFile("m", robot, ())}))).turning == (False, True)
-    assert units_in(Extension(**whole)) == Units()
+    assert units_in(Extension(**(whole | {"revolute": (False, True)}))).torque == "N or N m"
 
 
 def test_headings_bear_the_units_of_the_arm() -> None:

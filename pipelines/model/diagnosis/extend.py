@@ -42,7 +42,7 @@ from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRm
 from pipelines.model.diagnosis.screened.candidates import place_of
 from pipelines.model.diagnosis.searched.beside import Held, acted, judged
 from pipelines.model.diagnosis.searched.case import Case
-from pipelines.model.diagnosis.searched.ledger import UNBELIEVABLE
+from pipelines.model.diagnosis.searched.ledger import IMPOSSIBLE, UNBELIEVABLE
 from pipelines.model.diagnosis.searched.search import Found, search
 from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
 from pipelines.model.diagnosis.worth.gains import farther, gain_of, simulation_errors, torque_gain_of
@@ -54,6 +54,7 @@ __all__ = ["Extended", "extend"]
 
 _STANDS = "the reference logs show it too, so that it stands in the model already, as it was"
 _NOT_MOVED = "since the reference logs the base parameters have not moved as it moves them"
+_REFUSED = {UNBELIEVABLE: UNBELIEVABLE, IMPOSSIBLE: "fitted exactly, its numbers are none that it can have"}
 _ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
 
 
@@ -189,8 +190,9 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: boo
             why[step.best.effect.name, step.best.effect.joint] = doubt
         there |= {(step.best.effect.name, step.best.effect.joint)} if step.best is not None else set()
     taken = {(one.cause, one.joint) for one in told}
-    unlike = {(trial.cause, trial.joint) for step in found.steps for trial in step.trials if trial.reason == UNBELIEVABLE}
-    why |= {place: UNBELIEVABLE if place in unlike else "it takes nothing off the held-out error"
+    none_such = {(trial.cause, trial.joint): _REFUSED[trial.reason] for step in found.steps for trial in step.trials
+                 if trial.reason in _REFUSED}
+    why |= {place: none_such.get(place, "it takes nothing off the held-out error")
             for place in ((f.cause, f.joint) for f in case.families) if place not in taken}
     return found, told, why
 

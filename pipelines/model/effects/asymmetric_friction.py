@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["AsymmetricFriction"]
@@ -30,8 +30,8 @@ class AsymmetricFriction(Effect):
     name = "asymmetric_friction"
     title = "Asymmetric friction"
     parameters = (
-        Quantity("coulomb_difference", "N m", -20.0, 20.0, "Coulomb friction of the positive minus the negative direction"),
-        Quantity("viscous_difference", "N m s/rad", -10.0, 10.0, "viscous friction of the positive minus the negative direction"),
+        Quantity("coulomb_difference", "N m", -LARGE, LARGE, "Coulomb friction of the positive minus the negative direction"),
+        Quantity("viscous_difference", "N m s/rad", -LARGE, LARGE, "viscous friction of the positive minus the negative direction"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
         Quantity("gradual", "1", 0.0, 1.0, "1: the directions go over into each other as friction changes its sign, 0: at once",
                  shape=True, discrete=True, unsaid=0.0),

@@ -49,10 +49,10 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.terms import ArmModel, Hooks, OwnLoad, Predict, Quantity, SpeedCurve, Values, friction_at
+from pipelines.model.effects.terms import LARGE, ArmModel, Hooks, OwnLoad, Predict, Quantity, SpeedCurve, Values, friction_at
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["ArmModel", "Effect", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
+__all__ = ["LARGE", "ArmModel", "Effect", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
 
 
 @dataclass(frozen=True)

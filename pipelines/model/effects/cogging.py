@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import NEARLY, orders_along
 
@@ -43,13 +43,13 @@ class Cogging(Effect):
     title = "Cogging"
     parameters = (
         Quantity("order", "1/rev", 0.25, 1000.0, "waves in one turn of the joint", shape=True),
-        Quantity("amplitude", "N m", 0.0, 50.0, "of the first wave"),
+        Quantity("amplitude", "N m", 0.0, LARGE, "of the first wave"),
         Quantity("phase", "rad", -math.pi, math.pi, "angle of the first wave at the joint's zero", period=2.0 * math.pi),
         Quantity("order_2", "1/rev", 0.5, 2000.0, "twice the order", derived=True),
-        Quantity("amplitude_2", "N m", 0.0, 50.0, "of the second harmonic"),
+        Quantity("amplitude_2", "N m", 0.0, LARGE, "of the second harmonic"),
         Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", period=2.0 * math.pi),
         Quantity("order_3", "1/rev", 0.75, 3000.0, "three times the order", derived=True),
-        Quantity("amplitude_3", "N m", 0.0, 50.0, "of the third harmonic"),
+        Quantity("amplitude_3", "N m", 0.0, LARGE, "of the third harmonic"),
         Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", period=2.0 * math.pi),
     )
     signature = "A torque that repeats along the turn of the joint, the same at every speed and in both directions."

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ConcaveFriction"]
@@ -34,7 +34,7 @@ class ConcaveFriction(Effect):
     name = "concave_friction"
     title = "Concave friction"
     parameters = (
-        Quantity("amplitude", "N m", 0.0, 20.0, "torque at which it levels off"),
+        Quantity("amplitude", "N m", 0.0, LARGE, "torque at which it levels off"),
         Quantity("speed", "rad/s", 0.01, 20.0, "speed at which it levels off", shape=True),
         Quantity("knee", "1", 0.0, 6.0, "how abruptly it levels off; 0: as tanh does", shape=True, unsaid=0.0),
     )

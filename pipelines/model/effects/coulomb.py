@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Coulomb"]
@@ -41,7 +41,7 @@ class Coulomb(Effect):
     name = "coulomb"
     title = "Coulomb friction"
     parameters = (
-        Quantity("level", "N m", 0.0, 50.0, "friction torque while moving"),
+        Quantity("level", "N m", 0.0, LARGE, "friction torque while moving"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
         Quantity("roundness", "1", 0.4, 3.5, "how gradually it changes sign; 1: as tanh, 3: as arctan", shape=True, unsaid=1.0),
     )

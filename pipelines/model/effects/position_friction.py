@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["PositionFriction"]
@@ -37,13 +37,13 @@ class PositionFriction(Effect):
     name = "position_friction"
     title = "Friction that depends on position"
     parameters = (
-        Quantity("amplitude", "N m", 0.0, 20.0, "by how much friction rises and falls along the turn"),
+        Quantity("amplitude", "N m", 0.0, LARGE, "by how much friction rises and falls along the turn"),
         Quantity("order", "1/rev", 0.25, 100.0, "waves in one turn of the joint", shape=True),
         Quantity("phase", "rad", -math.pi, math.pi, "angle of the wave at the joint's zero", period=2.0 * math.pi),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
-        Quantity("amplitude_2", "N m", 0.0, 20.0, "of the second harmonic", unsaid=0.0),
+        Quantity("amplitude_2", "N m", 0.0, LARGE, "of the second harmonic", unsaid=0.0),
         Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", unsaid=0.0, period=2.0 * math.pi),
-        Quantity("amplitude_3", "N m", 0.0, 20.0, "of the third harmonic", unsaid=0.0),
+        Quantity("amplitude_3", "N m", 0.0, LARGE, "of the third harmonic", unsaid=0.0),
         Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", unsaid=0.0, period=2.0 * math.pi),
     )
     signature = "Friction whose size changes with the angle of the joint, always against the motion."

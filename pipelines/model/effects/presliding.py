@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Presliding"]
@@ -59,7 +59,7 @@ class Presliding(Effect):
     name = "presliding"
     title = "Presliding"
     parameters = (
-        Quantity("amplitude", "N m", 0.0, 50.0, "friction that turns over with travel"),
+        Quantity("amplitude", "N m", 0.0, LARGE, "friction that turns over with travel"),
         Quantity("distance", "rad", 1e-6, 0.2, "travel over which it turns over", shape=True),
         Quantity("elastic", "1", -1.0, 0.9, "share of the largest bending up to which nothing slides", shape=True, unsaid=-1.0),
         Quantity("damping_time", "s", 0.0, 0.1, "damping of the bristles over their stiffness", shape=True),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["QuadraticDrag"]
@@ -18,7 +18,7 @@ class QuadraticDrag(Effect):
 
     name = "quadratic_drag"
     title = "Quadratic drag"
-    parameters = (Quantity("coefficient", "N m s^2/rad^2", 0.0, 10.0, "torque at unit speed"),)
+    parameters = (Quantity("coefficient", "N m s^2/rad^2", 0.0, LARGE, "torque at unit speed"),)
     signature = "A torque that grows with the square of speed, against the motion."
     explanation = "Windage, and oil that is churned by gears or fills a bearing."
     remedy = "Check the oil level; compensate it in the feed-forward."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["RotorInertia"]
@@ -19,7 +19,7 @@ class RotorInertia(Effect):
 
     name = "rotor_inertia"
     title = "Rotor inertia"
-    parameters = (Quantity("inertia", "kg m^2", 0.0, 100.0, "inertia at joint side"),)
+    parameters = (Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "inertia at joint side"),)
     signature = "A torque in proportion to the joint's own acceleration, the same in every posture."
     explanation = "The rotor and the gear's fast shaft turn with the motor; the gear ratio enters squared."
     remedy = "Add it to the model; it is a property of the machine, not a fault."

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Stribeck"]
@@ -35,7 +35,7 @@ class Stribeck(Effect):
     name = "stribeck"
     title = "Stribeck friction"
     parameters = (
-        Quantity("amplitude", "N m", 0.0, 20.0, "friction at standstill above that at speed"),
+        Quantity("amplitude", "N m", 0.0, LARGE, "friction at standstill above that at speed"),
         Quantity("speed", "rad/s", 1e-3, 5.0, "speed over which it falls", shape=True),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
         Quantity("tail", "1", 0.0, 3.0, "how long it lasts beyond its speed: not at all, or as a power of speed", shape=True,

@@ -19,9 +19,13 @@ import numpy as np
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["ArmModel", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
+__all__ = ["LARGE", "ArmModel", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
 
 Values = Mapping[str, float]
+
+# Of torques, forces and inertias: more than any machine has. How much of them a cause makes no table says before the logs do, for
+# the slide of a gantry rubs with more newtons than a small arm's motor can give.
+LARGE = 1e5
 
 
 class ArmModel(Protocol):

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ThreeSigmoid"]
@@ -33,9 +33,9 @@ class ThreeSigmoid(Effect):
     name = "three_sigmoid"
     title = "Friction of three sigmoids"
     parameters = (
-        *(Quantity(f"f{k}", "N m", -50.0, 50.0, f"height of sigmoid {k}") for k in (1, 2, 3)),
+        *(Quantity(f"f{k}", "N m", -LARGE, LARGE, f"height of sigmoid {k}") for k in (1, 2, 3)),
         *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2, 3)),
-        Quantity("b", "N m s/rad", 0.0, 20.0, "viscous coefficient"),
+        Quantity("b", "N m s/rad", 0.0, LARGE, "viscous coefficient"),
     )
     signature = "A friction curve that jumps at zero speed, dips at low speed and rises with speed."
     explanation = "Dry, boundary and fluid friction together: the lubricant film builds up with speed."

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueOffset"]
@@ -18,7 +18,7 @@ class TorqueOffset(Effect):
 
     name = "torque_offset"
     title = "Torque offset"
-    parameters = (Quantity("offset", "N m", -20.0, 20.0, "constant torque to add to the model"),)
+    parameters = (Quantity("offset", "N m", -LARGE, LARGE, "constant torque to add to the model"),)
     signature = "A torque that is the same at any position, speed and time, also at rest."
     explanation = "The zero of the current sensor or of the amplifier is off, or a cable or spring pulls evenly."
     remedy = "Calibrate the zero of the current measurement; look for a cable under tension."

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TransmissionCoupling"]
@@ -29,9 +29,9 @@ class TransmissionCoupling(Effect):
     title = "A motor that turns with two joints"
     parameters = (
         Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
-        Quantity("inertia", "kg m^2", 0.0, 100.0, "of the motor, at joint side"),
-        Quantity("viscous", "N m s/rad", 0.0, 500.0, "viscous friction of the motor, at joint side"),
-        Quantity("coulomb", "N m", 0.0, 500.0, "dry friction of the motor, at joint side"),
+        Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "of the motor, at joint side"),
+        Quantity("viscous", "N m s/rad", 0.0, LARGE, "viscous friction of the motor, at joint side"),
+        Quantity("coulomb", "N m", 0.0, LARGE, "dry friction of the motor, at joint side"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which dry friction changes sign", shape=True),
     )
     signature = "Inertia and friction that follow the sum of two joints' speeds, felt at both."

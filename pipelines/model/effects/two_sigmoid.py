@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TwoSigmoid"]
@@ -32,9 +32,9 @@ class TwoSigmoid(Effect):
     name = "two_sigmoid"
     title = "Friction of two sigmoids"
     parameters = (
-        *(Quantity(f"f{k}", "N m", -50.0, 50.0, f"height of sigmoid {k}") for k in (1, 2)),
+        *(Quantity(f"f{k}", "N m", -LARGE, LARGE, f"height of sigmoid {k}") for k in (1, 2)),
         *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2)),
-        Quantity("b", "N m s/rad", 0.0, 20.0, "viscous coefficient"),
+        Quantity("b", "N m s/rad", 0.0, LARGE, "viscous coefficient"),
     )
     signature = "A friction curve that jumps at zero speed, and dips or rises once more before it grows with speed."
     explanation = "Dry and fluid friction together, and one passage between them: the lubricant film builds up with speed."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Viscous"]
@@ -16,7 +16,7 @@ class Viscous(Effect):
 
     name = "viscous"
     title = "Viscous friction"
-    parameters = (Quantity("coefficient", "N m s/rad", 0.0, 20.0, "torque per unit of speed"),)
+    parameters = (Quantity("coefficient", "N m s/rad", 0.0, LARGE, "torque per unit of speed"),)
     signature = "A torque in proportion to speed, the same in both directions."
     explanation = "Sheared lubricant, and eddy currents in the motor."
     remedy = "Compensate it in the feed-forward; it falls as the joint warms up, so log the temperature."

@@ -19,13 +19,13 @@ from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
+__all__ = ["FEWEST_OF_JOINT", "Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
            "of_each", "refuse_too_few", "with_cutoff"]
 
 Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
 _FEWEST = 200  # equations of a fit: ten a parameter of the RRR arm with friction
-_FEWEST_OF_JOINT = 20
+FEWEST_OF_JOINT = 20
 _STRETCHES = 20  # of held-out logs, to see how far errors scatter
 _MOSTLY = 0.01  # of the samples saturated: that is why none is left
 
@@ -150,7 +150,7 @@ def _fast_enough(equations: Sequence[LogEquations], motions: Motions) -> None:
 def _enough(equations: Sequence[LogEquations], log: ExperimentLog, fewest: int) -> None:
     counts = np.sum([one.counts * one.repeats for one in equations], axis=0)
     j = int(np.argmin(counts))
-    if counts[j] < _FEWEST_OF_JOINT:
+    if counts[j] < FEWEST_OF_JOINT:
         raise InputRejected("T08", f"{counts[j]:.0f} equations of joint {j + 1} are left", where=log.source or log.name,
                             remedy="lower --min-speed or --decimate, or record longer")
     if counts.sum() < fewest:

@@ -50,4 +50,5 @@ class Extension:
     model: ModelFile | None  # None where nothing was accepted
     laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
     fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart
+    revolute: tuple[bool, ...] = ()  # which joints turn; the others slide
     derived: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED, repr=False)

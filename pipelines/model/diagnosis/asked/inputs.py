@@ -17,11 +17,12 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.asked.at_rest import rests, sticking
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.rows.data import Data, gather
 from pipelines.model.diagnosis.rows.sharper import sharpened
-from pipelines.model.estimation.logs import Motions, Recipe, equations_of, motions_of, refuse_too_few, with_cutoff
+from pipelines.model.estimation.logs import FEWEST_OF_JOINT, Motions, Recipe, equations_of, motions_of, refuse_too_few, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstruction
@@ -110,15 +111,33 @@ def narrowed(prepared: Prepared, cutoff_hz: float, min_speed: Sequence[float]) -
 def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging: Motions, referring: Motions) -> Prepared:
     fastest = [np.abs(found.motion.dq[found.good.kept]).max(axis=0, initial=0.0) for _, found in (*fitted, *judging, *referring)]
     held = list(np.array(fastest) < _HELD * np.max(fastest, axis=0))
-    rows: list[Data | None] = []
-    first = 0
-    for part in (fitted, judging, referring):
+    parts, first = (fitted, judging, referring), 0
+    for part in parts:
         _refuse_held(part, held[first:first + len(part)], part is fitted)
-        rows.append(_moving(part, columns, recipe, held[first:first + len(part)], first) if part else None)
         first += len(part)
+    rows = _all_rows(parts, columns, recipe, held)
+    motions = (*fitted, *judging, *referring)
+    at_rest = rests(motions, recipe.cutoff_hz, np.max(fastest, axis=0))
+    if all(log.controller is None for log, _ in motions) and any(own.any() for own in at_rest):  # a twin rests as its arm does
+        moving = _all_rows(parts, columns, recipe, [still | own for still, own in zip(held, at_rest, strict=True)])
+        if _enough(moving) and (stuck := sticking([one for one in rows if one], [one for one in moving if one], columns)).any():
+            rows = _all_rows(parts, columns, recipe, [still | (own & stuck) for still, own in zip(held, at_rest, strict=True)])
     data, judge, reference = rows
     assert data is not None  # prepare refuses logs without any to fit
     return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
+
+
+def _all_rows(parts: Sequence[Motions], columns: Columns, recipe: Recipe, still: Sequence[Joints]) -> list[Data | None]:
+    """Of each part, None of one without logs; those do not count in which a joint is `still`, (joints,) or (samples, joints)."""
+    ends = np.cumsum([0, *map(len, parts)]).tolist()
+    return [_moving(part, columns, recipe, still[first:last], first) if part else None
+            for part, first, last in zip(parts, ends, ends[1:], strict=False)]
+
+
+def _enough(rows: Sequence[Data | None]) -> bool:
+    """Whether every joint moves in the fitted logs for as many equations as a fit asks for."""
+    data = rows[0]
+    return data is not None and bool((np.bincount(data.joint[data.counts], minlength=data.n_joints) >= FEWEST_OF_JOINT).all())
 
 
 def _refuse_held(motions: Motions, held: Sequence[Joints], fitted: bool) -> None:
@@ -134,7 +153,8 @@ def _refuse_held(motions: Motions, held: Sequence[Joints], fitted: bool) -> None
 
 
 def _moving(motions: Motions, columns: Columns, recipe: Recipe, held: Sequence[Joints], first: int) -> Data:
-    """The rows of logs; those of a joint that is held throughout a log do not count: it sticks, and no law tells its torque."""
+    """The rows of logs; those of a joint that is held, as it is throughout some, do not count: it sticks, and no law tells its
+    torque."""
     if not any(still.any() for still in held):
         return gather(motions, columns, recipe, first=first)
     equations = equations_of(motions, recipe, columns)

@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.screened.screen import Screened
+from pipelines.model.diagnosis.searched.ledger import UNBELIEVABLE
 from pipelines.model.diagnosis.searched.search import Found, Step
+from pipelines.model.effects import find_effect
+from pipelines.model.words import within
 
 __all__ = ["REST_OF_A_LAW", "REST_UNKNOWN", "Ruling", "at_floor", "excess", "explained", "held_out_high", "mostly_lost",
-           "much_without_name", "rule", "seen_in", "stands_high", "takes_most", "too_little", "without_steps"]
+           "much_without_name", "rule", "seen_in", "stands_high", "takes_most", "too_little", "unbelieved", "without_steps"]
 
 _HALF = 0.5  # of the excess over the floor
 _ABOVE = 1.6  # times the floor: what stands higher is not explained
@@ -106,6 +109,8 @@ def _ruled(found: Found, floor: Array, known: bool, accepted: list[Step], any_sh
     if not accepted:
         if len(joints) and known:
             return Ruling("unknown", (), f"the residual of {high} stands above the floor, and no cause explains it")
+        if not known and (why := unbelieved(found, floor)):
+            return Ruling("unknown", (), why)
         return Ruling("nothing-wrong", (), _NO_FLOOR if len(joints) else "")
     once = {k: _MISFIT for k, step in enumerate(accepted) if gap and _happened(step)}
     if not known:
@@ -171,6 +176,16 @@ def much_without_name(found: Found, doubts: Mapping[int, str], floor: Array) -> 
         before, after = np.square(step.before.rms), np.square(step.best.done.rms)
         joints |= set(np.flatnonzero((before - after > _HALF * before) & (step.before.rms > _TIMES * floor)).tolist())
     return _named(sorted(joints))
+
+
+def unbelieved(found: Found, floor: Array) -> str:
+    """Which cause would take most of what stands far above the noise, where the arm could not have moved so with it; in words, and
+    empty where there is none. Something is wrong then: a drive, say, that is clipped so often that its limit shows in no log."""
+    if not (found.final.rms > _TIMES * floor).any():
+        return ""
+    refused = [one for step in found.steps for one in step.trials if one.reason == UNBELIEVABLE and one.exact_gain > _HALF]
+    return "; ".join(f"{within(find_effect(one.cause).title)}{'' if one.joint is None else f' at joint {one.joint}'} would explain "
+                     f"{100.0 * one.exact_gain:.0f} % of what is left, and yet {UNBELIEVABLE}" for one in refused[:1])
 
 
 def _one_more(step: Step, before: Sequence[Step]) -> bool:

@@ -147,7 +147,19 @@ def _refitted(case: Case, now: Refined, one: Screened, effect: Effect, error: He
     left = error.share(done, case)
     rank = float(np.nan_to_num(np.sqrt(left * done.rss / now.rss), nan=np.inf))
     believable = done.model.effects[-1].effect.believable([log.motion for log in case.data.logs], done.model.nominal)
-    return Tried(one, effect, None, done, left, rank, _visibility(now, table), believable=believable)
+    return Tried(one, effect, None, done, left, rank, _visibility(now, table), believable=believable, of_size=_of_size(done))
+
+
+def _of_size(done: Refined) -> bool:
+    """Whether no torque among the numbers of the last effect is beyond the largest that the fitted logs show of joints of its kind.
+
+    A hump of friction far wider than the speeds that were seen is a straight line there, of any height that its width makes up for.
+    """
+    last, revolute = done.model.effects[-1].effect, np.array(done.model.arm.robot.revolute)
+    kind = revolute == revolute[(last.joint or 1) - 1]
+    largest = float(np.abs(done.data.y[kind[done.data.joint] & done.data.counts]).max(initial=0.0))
+    values = done.model.effects[-1].values
+    return all(abs(values[q.name]) <= largest for q in last.parameters if q.unit == "N m" and not q.shape)
 
 
 def best_form(case: Case, now: Refined, best: Tried, error: HeldOut) -> Tried:

@@ -14,11 +14,12 @@ from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screened.screen import Screened
 from pipelines.model.effects.base import Effect
 
-__all__ = ["ACCEPTED", "UNBELIEVABLE", "WEAKER", "Tried", "ledger", "line_of_moved"]
+__all__ = ["ACCEPTED", "IMPOSSIBLE", "UNBELIEVABLE", "WEAKER", "Tried", "ledger", "line_of_moved"]
 
 ACCEPTED = "accepted"
 WEAKER = "weaker than others"
 UNBELIEVABLE = "the arm could not have moved so with it"
+IMPOSSIBLE = "impossible numbers"
 _REFUSED = "time held out does not bear it out"
 _THERE = "found there already, and not asked again"
 _TOO_LITTLE = "takes next to nothing"  # so that nobody has asked what it would have to
@@ -38,11 +39,12 @@ class Tried:
     visibility: float
     sure: bool = False  # it leaves less than another with a number fewer, by more than the number is worth
     believable: bool = True  # an arm with it could have moved as it did
+    of_size: bool = True  # it needs no torque beyond any that the machine has given
 
     @property
     def possible(self) -> bool:
         """Whether the cause's numbers lie in their ranges, and the logs could be of an arm with them."""
-        return self.believable and self.done.model.effects[-1].possible
+        return self.believable and self.of_size and self.done.model.effects[-1].possible
 
 
 def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
@@ -66,7 +68,7 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
                   _THERE if fitted is None and (one.cause, one.joint) in there else
                   WEAKER if fitted is None else
                   UNBELIEVABLE if not fitted.believable else
-                  "impossible numbers" if not fitted.possible else
+                  IMPOSSIBLE if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else
                   "fitted exactly it stays below its threshold" if fitted.log is not None and id(one) in refused else
                   _REFUSED if id(one) in refused else

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
-from pipelines.model.diagnosis.named.verdict import excess, explained, much_without_name, rule
+from pipelines.model.diagnosis.named.verdict import excess, explained, much_without_name, rule, unbelieved
+from pipelines.model.diagnosis.result import Trial
+from pipelines.model.diagnosis.searched.ledger import UNBELIEVABLE
 from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
@@ -33,9 +35,9 @@ def found(nominal: Any, *after: Any, other: Any = None, effects: Sequence[Effect
     """A search that accepted one cause after the other, with what each left; cogging at joint 2 where nothing else is given."""
     before, steps = nominal, []
     for one, effect in zip_longest(after, effects, fillvalue=Cogging(2)):
-        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=one, effect=effect), other=None))
+        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=one, effect=effect), other=None, trials=()))
         before = one
-    steps.append(SimpleNamespace(before=before, best=None, other=other))
+    steps.append(SimpleNamespace(before=before, best=None, other=other, trials=()))
     return SimpleNamespace(nominal=nominal, steps=steps, final=before)
 
 
@@ -220,3 +222,16 @@ def test_what_follows_a_law_far_above_the_noise_is_no_arm_in_order(before: float
     be what friction has beside its law, and near the noise every arm has something."""
     made = searched(left(0.01, before, 0.01), (Cogging(2), left(0.01, after, 0.01)))
     assert much_without_name(made, {0: "not sure"} if doubted else {}, FLOOR) == where
+
+
+@pytest.mark.parametrize(("rest", "gain", "reason", "said"), [
+    (0.3, 0.98, UNBELIEVABLE, "torque that is clipped at joint 2 would explain 98 % of what is left"),
+    (0.3, 0.98, "weaker than others", ""), (0.3, 0.2, UNBELIEVABLE, ""), (0.05, 0.98, UNBELIEVABLE, "")])
+def test_a_drive_that_is_clipped_nearly_all_the_time_is_no_arm_in_order(rest: float, gain: float, reason: str, said: str) -> None:
+    """Its limit is told from no other cause, for next to no torque came out below; that nothing is wrong would be worse said."""
+    trial = Trial(1, "torque_saturation", 2, gain, 0.02, 0.2, gain, False, reason)
+    nothing: Any = left(0.01, rest, 0.01)
+    made: Any = SimpleNamespace(final=nothing, steps=[SimpleNamespace(best=None, trials=(trial,))])
+    told = unbelieved(made, FLOOR)
+    assert told.startswith(said)
+    assert bool(told) == bool(said)
