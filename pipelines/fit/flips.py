@@ -29,7 +29,7 @@ def by_flips(gains: Array) -> float:
     """
     size = np.abs(gains[gains != 0.0])
     whole = float(gains.sum())
-    if whole <= 0.0:
+    if not whole > 0.0:  # nor of what is no number
         return 1.0
     least = whole - _ROUNDING * float(size.sum())
     if len(size) <= _ALL:

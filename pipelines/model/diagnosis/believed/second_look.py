@@ -114,7 +114,7 @@ def _in_white(case: Case, twin: Twin) -> tuple[Case, Twin, Array]:
     weight = 1.0 / np.maximum(refine(there.model, there.data, there.weight).rms, 1e-12)
     same = twin.through(whitening, noise)
     first, residuals = same.weighted(weight)
-    bounds = Thresholds.of_twin(first, residuals, there.families, case.model.nominal, _USELESS)
+    bounds = Thresholds.of_twin(first, residuals, there.families, case.model.nominal, _USELESS, twin.replicas)
     return replace(there, weight=weight, thresholds=bounds, white=True), same, following(first, residuals).max(axis=1)
 
 

@@ -38,9 +38,10 @@ class Thresholds:
     several: tuple[int, ...] = ()  # which of the families these are, in the order of `wide`
 
     @classmethod
-    def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], arm: Arm, useless: float = USELESS) -> Thresholds:
+    def of_twin(cls, fit: Fit, residuals: Array, families: Sequence[Family], arm: Arm, useless: float = USELESS,
+                replicas: int | None = None) -> Thresholds:
         """`residuals` (replicas, rows), weighted, that `fit` leaves: as `Twin.weighted` makes them; `useless`: share of the squared
-        residual of a joint that is of no use to anybody."""
+        residual of a joint that is of no use to anybody; `replicas` of which they are, where there are several of each."""
         data, weight = fit.data, fit.weight
         found = screen(data, fit, families, arm, residuals)
         own = np.array([one.gain.max() for one in found])
@@ -53,7 +54,7 @@ class Thresholds:
         gain = TIMES * np.max([np.where(once, ONCE, 1.0) * own, np.where(once, 0.0, usual[place]), useless * left[place]], axis=0)
         several = sorted(_on_several(data, families, arm), key=lambda place: joints[place] is not None)
         wide = Wide.of_twin(fit, residuals, [families[place] for place in several], usual, useless / USELESS * left, arm)
-        return cls(gain, own, f"{len(residuals)} replicas of the twin", weight, joints, wide, tuple(several))
+        return cls(gain, own, f"{replicas or len(residuals)} replicas of the twin", weight, joints, wide, tuple(several))
 
     def at(self, weight: Array) -> Thresholds:
         """The same with other weights: a cause acts on its joint; one on several is looked for anew, or counts where most."""

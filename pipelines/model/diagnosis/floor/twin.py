@@ -31,6 +31,7 @@ from pipelines.model.simulation import Noise, Simulated, simulate_together
 __all__ = ["Twin", "imperfect", "make_twin", "not_replayable", "replayable", "replica"]
 
 _NUISANCE = 20040509
+_DRIVES = 10  # sets of drives, at least: a replica of which there are few is looked at with several
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,7 @@ class Twin:
     fits: tuple[Fit, ...]  # of each replica
     places: tuple[int, ...]  # which of the logs
     noise: DriveNoise
+    replicas: int = 0  # that were simulated; with several sets of drives each where there are few
 
     @property
     def data(self) -> Data:
@@ -70,7 +72,7 @@ class Twin:
             there = one.data.whitened(whitening, weight)
             table, y = (there.clear(one.data.through(whitening, x)) for x in (one.table, one.y))
             fits.append(fit_columns(there, table, y, one.weight))
-        return Twin(tuple(fits), self.places, self.noise)
+        return Twin(tuple(fits), self.places, self.noise, self.replicas)
 
     def _weighted(self, k: int, weight: Array) -> Fit:
         """Made anew when it is asked for: each would keep a basis as large as its table, and there are many replicas."""
@@ -106,9 +108,13 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
               seed: int) -> Twin:
     """Replicas of every log that can be simulated, of which there is one at least.
 
+    What drives have is added to what was simulated: the orders of ten ripples cost little, and three would leave out most.
+
     Raises:
         InputRejected: D15, D17: the fitted arm cannot be simulated.
     """
+    each = -(-_DRIVES // replicas)
+    drives = range(seed, seed + replicas * each)
     places = replayable([log for log, _ in motions])
     columns = model.columns
     drawn = Noise(noise.white, np.zeros_like(noise.white))
@@ -120,10 +126,12 @@ def make_twin(model: Exact, weight: Array, data: Data, motions: Motions, recipe:
         parts = [replica(motions[place], done, k, recipe) for place, done in runs.items()]
         rows = [data.logs[place].equations.rows for place in places]
         own = gather(tuple(parts), columns, recipe, rows)
-        small = own.lay_each(imperfect(model.nominal, noise, own, seeds, k))
         slopes, _ = law_slopes(own, columns, model.beta)
-        found.append(fit_columns(own, np.concatenate([rows_of(own, columns), *slopes]), own.y + small, weight))
-    return Twin(tuple(found), places, noise)
+        table = np.concatenate([rows_of(own, columns), *slopes])
+        for own_drives in range(k, len(drives), replicas):
+            small = own.lay_each(imperfect(model.nominal, noise, own, drives, own_drives))
+            found.append(fit_columns(own, table, own.y + small, weight))
+    return Twin(tuple(found), places, noise, replicas)
 
 
 def imperfect(arm: Arm, noise: DriveNoise, own: Data, seeds: Sequence[int], k: int) -> Callable[[int, Motion], Array]:

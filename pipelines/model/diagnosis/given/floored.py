@@ -82,7 +82,7 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
     model, twin = _likely(prepared, rough, chosen, places[0])
     weight = rough[0].before.weight
     weighted = twin.weighted(weight)
-    found = Thresholds.of_twin(*weighted, case.families, model.nominal)
+    found = Thresholds.of_twin(*weighted, case.families, model.nominal, replicas=twin.replicas)
     made = Calibration(
         origin_of("twin", [prepared.motions[place][0] for place in places], model.nominal, chosen), conditions_of(prepared), weight,
         twin.rms, twin.noise.white, bounds_of(case.families, found.gain, found.own), found.wide,

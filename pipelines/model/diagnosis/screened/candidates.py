@@ -152,7 +152,8 @@ def _own(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm) -> tuple[Mask
     and from what the record of that joint passes through, where there is such a thing."""
     joint = some[0].joint or 1
     through = changing(whole, joint)
-    laid = [one.keep((tuple(some), one.kept.number(whole)) if through else tuple(some), partial(_laid_own, one, some, arm, through))
+    passed = tuple((acting.place, tuple(acting.values.items())) for acting in through)
+    laid = [one.keep((tuple(some), passed) if through else tuple(some), partial(_laid_own, one, some, arm, through))
             for one in data.logs]
     return np.arange(data.n_joints) == joint - 1, [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
 

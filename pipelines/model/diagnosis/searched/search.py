@@ -270,14 +270,14 @@ def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, c
     refused |= {id(one.screened) for one in asked if one.error >= 1.0 or not borne_out(case, one.screened, now, one.done)}
     tried = [one for one in tried if id(one.screened) not in refused]
     best = (chosen or fewest(tried)) if more else None
-    better = None if best is None or chosen is not None else better_than(best, case, now, screened, gate.passed)
+    better = None if best is None or chosen is not None else better_than(best, case, now, screened, gate)
     if better is not None:
         best, tried = better, [better, *tried]
     if best is not None and case.shared is not None:
         best = at_its_joint(best, tried, now, case.shared)
     other = unnameable(gate.passed, best, explored.tried, now, case)
     best = None if other is not None else best
-    fitted_there = explored.tried if better is None else (better, *explored.tried)
+    fitted_there = explored.tried if better is None or best is not better else (better, *explored.tried)
     trials = ledger(screened, gate.judged, thresholds, fitted_there, best, now, number, refused)
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
 
