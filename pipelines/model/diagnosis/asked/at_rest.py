@@ -10,6 +10,7 @@ count as all else: it is asked whether a model leaves more there than where the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -34,7 +35,8 @@ _MORE = 2.0  # times what is left where the joint moves
 
 
 def rests(motions: Motions, cutoff_hz: float | None, fastest: Array) -> list[Mask]:
-    """(samples, joints) of each log where a joint stands for a period of the low-pass or longer.
+    """(samples, joints) of each log where a joint stands for a period of the low-pass or longer, and for another one to either
+    side, over which the low-pass spreads what held it: at low speed that would be a hump of friction.
 
     Args:
         fastest: (joints,) [rad/s] largest speed in all logs.
@@ -44,12 +46,13 @@ def rests(motions: Motions, cutoff_hz: float | None, fastest: Array) -> list[Mas
 
 
 def _rests(speed: Array, least: float, fastest: Array) -> Mask:
-    out = np.zeros(speed.shape, dtype=bool)
+    out, reach = np.zeros(speed.shape, dtype=bool), math.ceil(least)
     for j in range(speed.shape[1]):
         slow, still = speed[:, j] < _SLOW * fastest[j], np.cumsum(np.append(0, speed[:, j] < _STILL * fastest[j]))
         edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
         for start, stop in edges.reshape(-1, 2):
-            out[start:stop, j] = stop - start > least and still[stop] - still[start] > _MOSTLY * (stop - start)
+            if stop - start > least and still[stop] - still[start] > _MOSTLY * (stop - start):
+                out[max(0, start - reach):stop + reach, j] = True
     return out
 
 
