@@ -129,6 +129,11 @@ class ExperimentLog:
         return name in self.signals
 
     @property
+    def controlled(self) -> bool:
+        """Whether it says how its controller works."""
+        return self.controller is not None and self.controller.law != "unknown"
+
+    @property
     def t(self) -> Array:
         return self["t"]
 

@@ -1,4 +1,4 @@
-"""What is asked, of which logs, and whether they can be asked that: before any row is fitted.
+"""What is asked, of which logs, and whether they can be asked that: before any cause is looked for.
 
     settings     what can be chosen
     inputs       the logs, prepared: to fit, to judge, to refer to

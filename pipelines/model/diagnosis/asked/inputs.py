@@ -118,7 +118,7 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
     rows = _all_rows(parts, columns, recipe, held)
     motions = (*fitted, *judging, *referring)
     at_rest = rests(motions, recipe.cutoff_hz, np.max(fastest, axis=0))
-    if all(log.controller is None for log, _ in motions) and any(own.any() for own in at_rest):  # a twin rests as its arm does
+    if not any(log.controlled for log, _ in motions) and any(own.any() for own in at_rest):  # a twin rests as its arm does
         moving = _all_rows(parts, columns, recipe, [still | own for still, own in zip(held, at_rest, strict=True)])
         if _enough(moving) and (stuck := sticking([one for one in rows if one], [one for one in moving if one], columns)).any():
             rows = _all_rows(parts, columns, recipe, [still | (own & stuck) for still, own in zip(held, at_rest, strict=True)])

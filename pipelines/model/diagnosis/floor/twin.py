@@ -95,7 +95,7 @@ def replayable(logs: Sequence[ExperimentLog]) -> tuple[int, ...]:
 def not_replayable(logs: Sequence[ExperimentLog]) -> str:
     """Why the first of the logs that describe their controller cannot be replayed all the same; empty where none describes it."""
     for log in logs:
-        if log.controller is None or log.controller.law == "unknown":
+        if not log.controlled:
             continue
         try:
             experiment_of(log)

@@ -181,9 +181,9 @@ def much_without_name(found: Found, doubts: Mapping[int, str], floor: Array) -> 
 def unbelieved(found: Found, floor: Array) -> str:
     """Which cause would take most of what stands far above the noise, where the arm could not have moved so with it; in words, and
     empty where there is none. Something is wrong then: a drive, say, that is clipped so often that its limit shows in no log."""
-    if not (found.final.rms > _TIMES * floor).any():
-        return ""
-    refused = [one for step in found.steps for one in step.trials if one.reason == UNBELIEVABLE and one.exact_gain > _HALF]
+    high = found.final.rms > _TIMES * floor
+    refused = [one for step in found.steps for one in step.trials if one.reason == UNBELIEVABLE and one.exact_gain > _HALF
+               and (high.any() if one.joint is None else high[one.joint - 1])]
     return "; ".join(f"{within(find_effect(one.cause).title)}{'' if one.joint is None else f' at joint {one.joint}'} would explain "
                      f"{100.0 * one.exact_gain:.0f} % of what is left, and yet {UNBELIEVABLE}" for one in refused[:1])
 

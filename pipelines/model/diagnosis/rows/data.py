@@ -156,6 +156,12 @@ class Data:
         clear = self.clear(measured if self.known is None else measured - self.known)
         return clear if self.taken is None else clear - self.taken
 
+    def largest_torque(self, joint: int | None) -> float:
+        """[N m] the largest that the logs show of the joints that turn, or slide, as `joint`, from 1, does; of all for None."""
+        revolute = np.array(self.logs[0].log.robot.revolute)
+        alike = np.full(len(revolute), True) if joint is None else revolute == revolute[joint - 1]
+        return float(max(np.abs(one.plain * one.weighed)[alike].max(initial=0.0) for one in self.logs))
+
     @cached_property
     def ripple(self) -> Ripple | None:
         """That of drives in order, where models are to be fitted beside it."""

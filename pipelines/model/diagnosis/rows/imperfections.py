@@ -2,8 +2,8 @@
 
 Replicas of the twin get them, drawn anew for each, so that thresholds know them: a ripple of a thousandth on a joint that carries
 gravity looks like cogging on every arm, one of few waves a turn on a joint that rubs like friction that depends on position. A
-small load shows in the torque residual as it is, whatever the controller does about
-it, so that it is added there and not simulated.
+small load shows in the torque residual as it is, whatever the controller does about it, so that it is added there and not
+simulated.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["RIPPLE", "RIPPLE_ORDERS", "DriveNoise", "DriveWaves", "drive_waves", "small_loads"]
+__all__ = ["RIPPLE", "DriveNoise", "DriveWaves", "drive_waves", "ripple_orders", "small_loads"]
 
 RIPPLE = 1e-3  # of the torque
 _COGGING = 2e-5  # of the largest rated torque
-RIPPLE_ORDERS = (6, 40)  # waves a turn, and of cogging
-_SLIDES = 10.0  # times as many in 2π m of a slide: a linear motor's magnets are 16 to 105 mm apart, and so are turns of a screw
+_ORDERS = (6, 40)  # waves a turn, and of cogging
+_SLIDES = 10.0  # times as many in 2π m of a slide: magnets of linear motors, and turns of a screw, are some centimetres apart
 _CORNER = (1.0, 5.0)  # [Hz]
 _WAVES = 20040509  # of the seeds
 
@@ -33,6 +33,11 @@ class DriveNoise:
 
     white: Array  # [N m] from sample to sample
     wander: Array  # [N m] of the amplifier's zero, slow
+
+
+def ripple_orders(revolute: bool) -> Array:
+    """All that a drive may have [1/rev], of a slide in 2π m."""
+    return np.asarray(np.arange(*_ORDERS) * (1.0 if revolute else _SLIDES), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +55,7 @@ def drive_waves(revolute: Sequence[bool], seeds: Sequence[int]) -> list[DriveWav
     each other mostly leave out the lowest, which the machine at hand may have.
     """
     rng = np.random.default_rng([_WAVES, *seeds])
-    count, (low, high) = len(seeds), RIPPLE_ORDERS
+    count, (low, high) = len(seeds), _ORDERS
     part = rng.permuted(np.tile(np.arange(count)[:, None, None], (1, 2, len(revolute))), axis=0)
     order = np.floor(low + (high - low) * (part + rng.random(part.shape)) / count) * np.where(revolute, 1.0, _SLIDES)
     phase = rng.uniform(-np.pi, np.pi, part.shape)

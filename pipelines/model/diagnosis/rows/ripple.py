@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.rows.imperfections import RIPPLE, RIPPLE_ORDERS
+from pipelines.model.diagnosis.rows.imperfections import RIPPLE, ripple_orders
 
 if TYPE_CHECKING:
     from pipelines.model.diagnosis.rows.data import Data, LogData
@@ -85,7 +85,7 @@ def _rippled(one: LogData, joint: int) -> Array:
     Of torque that has passed the low-pass: right to 3 % at a usual cut-off, where no wave is as quick; below 10 Hz the highest
     orders are up to a fourth too large.
     """
-    orders = np.arange(*RIPPLE_ORDERS)
+    orders = ripple_orders(one.log.robot.revolute[joint])
     turn = one.at_rows(one.motion.q)[:, joint, None] * orders
     size = RIPPLE / np.sqrt(2.0 * len(orders)) * one.plain[joint, :, None]
     waves = (size * np.concatenate([np.cos(turn), np.sin(turn)], axis=1)).T

@@ -155,10 +155,8 @@ def _of_size(done: Refined) -> bool:
 
     A hump of friction far wider than the speeds that were seen is a straight line there, of any height that its width makes up for.
     """
-    last, revolute = done.model.effects[-1].effect, np.array(done.model.arm.robot.revolute)
-    kind = revolute == revolute[(last.joint or 1) - 1]
-    largest = float(np.abs(done.data.y[kind[done.data.joint] & done.data.counts]).max(initial=0.0))
-    values = done.model.effects[-1].values
+    last, values = done.model.effects[-1].effect, done.model.effects[-1].values
+    largest = done.data.largest_torque(last.joint)
     return all(abs(values[q.name]) <= largest for q in last.parameters if q.unit == "N m" and not q.shape)
 
 

@@ -18,6 +18,7 @@ __all__ = ["ACCEPTED", "IMPOSSIBLE", "UNBELIEVABLE", "WEAKER", "Tried", "ledger"
 
 ACCEPTED = "accepted"
 WEAKER = "weaker than others"
+BETTER = "below its threshold, and decidedly more than the best that is above its own"  # accepted all the same
 UNBELIEVABLE = "the arm could not have moved so with it"
 IMPOSSIBLE = "impossible numbers"
 _REFUSED = "time held out does not bear it out"
@@ -61,7 +62,9 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         accepted = best is not None and fitted is best
         if fitted is None and gain <= thresholds.gain[k] and len(rows) >= _SHOWN:
             continue
-        reason = (ACCEPTED if accepted else _TOO_LITTLE if np.isinf(thresholds.gain[k]) else
+        reason = (BETTER if accepted and gain <= thresholds.gain[k] else
+                  ACCEPTED if accepted else
+                  _TOO_LITTLE if np.isinf(thresholds.gain[k]) else
                   "below its threshold" if gain <= thresholds.gain[k] else
                   "comes again at other moments" if not one.stands_out else
                   _REFUSED if id(one) in refused and fitted is None else

@@ -66,7 +66,7 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
             amplitudes = (np.sqrt(bound) + _SIDE * np.sqrt(chance)) / one.reach * np.eye(one.width)[0]
             limit = _limit(effect, amplitudes, revolute, one.best_visibility, "analytic", slight)
         told, possible = limit or (None, False)
-        if told is not None and possible and (hidden is None or hidden.found):
+        if told is not None and possible and (hidden is None or hidden.found) and (probe is None or _of_size(told, effect, probe)):
             found.append(told)
             continue
         if told is None and (one.family.event or effect.fixed_amplitudes is not None or not np.isfinite(bound)):
@@ -74,6 +74,13 @@ def detectable(screened: Sequence[Screened], thresholds: Thresholds, revolute: t
         why = _AT_NONE if hidden is not None and not hidden.found else _TOO_MUCH
         beyond.append(NotTestable(effect.name, effect.joint, why, effect.experiment))
     return tuple(found), tuple(beyond)
+
+
+def _of_size(told: Detectable, effect: Effect, probe: Probe) -> bool:
+    """Whether a torque that is found is none beyond the largest that the machine has given."""
+    unit = next(q.unit for q in effect.parameters if q.name == told.parameter)
+    size = told.smallest.value
+    return unit != "N m" or not isinstance(size, float) or size <= probe.data.largest_torque(effect.joint)
 
 
 def _smallest(bounds: Mapping[Family, float], probe: Probe) -> dict[Family, Hidden | None]:

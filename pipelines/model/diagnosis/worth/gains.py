@@ -41,6 +41,7 @@ _LONGEST = 5.0  # [s] of a log that is simulated
 _SOFT = 1.0  # [s] the same, where something moves beside the joints of an arm, which takes many steps
 _LONGER = 6.0  # times as long, where the last arm comes no nearer than the first: what noise does to an error averages out
 _WINDOW = 0.1  # [s]
+_HELD = 1e-4  # [rad or m] standard deviation of a joint that does not move
 _FINE = 1e-3  # [s] between torques that drive a window: a faster log's are averaged, which moves an arm as far
 _EXACT = 1e-3  # of the position error, to which it is worked out
 _ROUGH = 1e-2  # the same, where something moves beside the joints: a hundredth is far less than what chance does to the error
@@ -233,11 +234,12 @@ def _all(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -
 
 def _units(arm: Arm, q: Array) -> Array:
     """(joints,) in which errors of several joints are added up: radians, or metres; where some turn and others slide, the standard
-    deviation of what each was measured to do, `q` (samples, joints)."""
+    deviation of what each was measured to do, `q` (samples, joints). What is held there has no say, for a hair is all it moves."""
     turning = arm.robot.revolute
     if all(turning) or not any(turning):
         return np.ones(len(turning))
-    return np.asarray(np.maximum(np.std(q, axis=0), 1e-9))
+    spread = np.std(q, axis=0)
+    return np.asarray(np.where(spread > _HELD, spread, np.inf))
 
 
 def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array, float]]:

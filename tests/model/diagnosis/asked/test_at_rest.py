@@ -79,6 +79,10 @@ def test_rests_are_left_out_where_friction_holds_the_joint() -> None:
     assert _counting(slide(1, "identify", 0.0, dry=0.0)) == 1.0
 
 
+def test_a_controller_that_is_not_described_makes_no_twin() -> None:
+    assert _counting(replace(slide(1, "identify", 18.0), controller=Controller("unknown"))) < 0.6
+
+
 def test_a_twin_rests_as_its_arm_does() -> None:
     """Where the log describes its controller, rows at rest stay."""
     log = replace(slide(1, "identify", 18.0), controller=Controller("pd", kp=np.array([1e5]), kd=np.array([4e3])))

@@ -58,12 +58,12 @@ def test_an_arm_in_order_whose_recorder_lost_samples_is_in_order(samples: int) -
     """Without a twin, one percent of a residual passes for a ripple of the drive."""
     fitted, judging = session()
     found = diagnose(Logs((holed(fitted, samples=samples),), (judging,)),
-                     DiagnosisSettings(limits=False, evidence=False))
+                     DiagnosisSettings(replicas=3, limits=False, evidence=False))
     assert (found.floor_origin, found.verdict) == ("twin", "nothing-wrong")
 
 
 def test_samples_lost_here_and_there_are_no_alarm() -> None:
     fitted, judging = session()
     found = diagnose(Logs((dropped(fitted, lambda k: k % 97 != 96),), (judging,)),
-                     DiagnosisSettings(limits=False, evidence=False))
+                     DiagnosisSettings(replicas=3, limits=False, evidence=False))
     assert (found.floor_origin, found.verdict) == ("twin", "nothing-wrong")

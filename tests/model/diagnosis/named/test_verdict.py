@@ -235,3 +235,12 @@ def test_a_drive_that_is_clipped_nearly_all_the_time_is_no_arm_in_order(rest: fl
     told = unbelieved(made, FLOOR)
     assert told.startswith(said)
     assert bool(told) == bool(said)
+
+
+@pytest.mark.parametrize(("joint", "verdict"), [(2, "unknown"), (3, "nothing-wrong")])
+def test_what_no_arm_could_have_moved_with_is_said_where_it_stands_high(joint: int, verdict: str) -> None:
+    """At joint 2 thirty times the noise is left. A refused cause at joint 3, where noise is left, says nothing of that."""
+    trial = Trial(1, "torque_saturation", joint, 0.98, 0.02, 0.2, 0.98, False, UNBELIEVABLE)
+    step = SimpleNamespace(best=None, trials=(trial,), other=None, before=left(0.01, 0.3, 0.01))
+    made: Any = SimpleNamespace(nominal=left(0.01, 0.3, 0.01), final=left(0.01, 0.3, 0.01), steps=[step])
+    assert rule(made, FLOOR, False).verdict == verdict

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.rows.imperfections import drive_waves, small_loads
+from pipelines.model.diagnosis.rows.imperfections import drive_waves, ripple_orders, small_loads
 from pipelines.model.rigid.body import Motion
 
 
@@ -53,3 +53,7 @@ def test_magnets_along_a_slide_are_centimetres_apart() -> None:
     pitch = np.array([2.0 * np.pi / one.order[:, 0] for one in drive_waves((False, True), range(10))])  # [m]
     assert 0.01 < pitch.min() < 0.02
     assert 0.07 < pitch.max() < 0.11
+    for turns in (True, False):  # what numbers are weighed with knows the same orders
+        known = set(ripple_orders(turns).tolist())
+        assert known >= {float(one.order[0, 0]) for one in drive_waves((turns,), range(10))}
+        assert (min(known), max(known)) == ((6.0, 39.0) if turns else (60.0, 390.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +14,12 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
-from pipelines.model.diagnosis.screened.candidates import families, whole_motion
+from pipelines.model.diagnosis.floor.thresholds import Thresholds
+from pipelines.model.diagnosis.screened.candidates import Family, families, whole_motion
 from pipelines.model.diagnosis.screened.screen import Screened, screen
 from pipelines.model.diagnosis.searched.barred import better_than
 from pipelines.model.diagnosis.searched.case import Case, HeldOut
+from pipelines.model.diagnosis.searched.gate import Gate
 from pipelines.model.diagnosis.searched.hypotheses import fitted
 from pipelines.model.effects import all_effects
 from pipelines.model.rigid.body import Motion
@@ -52,7 +54,19 @@ def looked_at(load: Callable[[Motion], Array] | None, misreads: bool) -> tuple[C
     case = Case(prepared.data, prepared.judge, model, fit.weight, every, None)
     now = refine(case.model, case.data, case.weight)
     found = screen(case.data, now.fit, every, case.arms(now.model))
-    return case, now, {one.cause: one for one in found if one.joint == 3}
+    return replace(case, thresholds=_bounds(every, fit.weight)), now, {one.cause: one for one in found if one.joint == 3}
+
+
+def _bounds(every: Sequence[Family], weight: Array) -> Thresholds:
+    """Some floor: how high it is, a gate says."""
+    gain = np.ones(len(every))
+    return Thresholds(gain, gain, "made up", weight, tuple(one.joint for one in every))
+
+
+def gate(seen: dict[str, Screened], passed: str, refused: frozenset[int] = frozenset()) -> Gate:
+    """With which one cause passes its threshold."""
+    every = tuple(seen.values())
+    return Gate(every, _bounds([one.family for one in every], np.ones(3)), (seen[passed],), refused)
 
 
 @pytest.mark.parametrize(("load", "misreads", "truth", "other"), [
@@ -62,14 +76,32 @@ def test_the_greater_cause_is_taken_whichever_passed(load: Callable[[Motion], Ar
     case, now, seen = looked_at(load, misreads)
     error = HeldOut.of(now, case)
     lesser, greater = (fitted(case, now, seen[name], error) for name in (other, truth))
-    found = better_than(lesser, case, now, tuple(seen.values()), (seen[other],))
+    every = tuple(seen.values())
+    found = better_than(lesser, case, now, every, gate(seen, other))
     assert found is not None
     assert (found.effect.name, found.effect.joint) == (truth, 3)
-    assert better_than(greater, case, now, tuple(seen.values()), (seen[truth],)) is None
+    assert better_than(greater, case, now, every, gate(seen, truth)) is None
+
+
+def test_what_held_out_time_refused_stays_out_and_so_does_all_where_no_floor_is_known() -> None:
+    case, now, seen = looked_at(pulled, False)
+    lesser, every = fitted(case, now, seen["torque_offset"], HeldOut.of(now, case)), tuple(seen.values())
+    assert better_than(lesser, case, now, every, gate(seen, "torque_offset")) is not None
+    others = frozenset(id(one) for one in every if one.cause != "torque_offset")
+    assert better_than(lesser, case, now, every, gate(seen, "torque_offset", others)) is None
+    assert better_than(lesser, replace(case, thresholds=None), now, every, gate(seen, "torque_offset")) is None
 
 
 def test_what_passed_is_not_asked_again() -> None:
     """Among those above their thresholds the search has chosen already, by its own rules."""
     case, now, seen = looked_at(pulled, False)
-    lesser = fitted(case, now, seen["torque_offset"], HeldOut.of(now, case))
-    assert better_than(lesser, case, now, tuple(seen.values()), tuple(seen.values())) is None
+    lesser, every = fitted(case, now, seen["torque_offset"], HeldOut.of(now, case)), tuple(seen.values())
+    assert better_than(lesser, case, now, every, replace(gate(seen, "torque_offset"), passed=every)) is None
+
+
+def test_what_is_no_number_is_not_better() -> None:
+    case, now, seen = looked_at(pulled, False)
+    error, every = HeldOut.of(now, case), tuple(seen.values())
+    lesser = fitted(case, now, seen["torque_offset"], error)
+    none = replace(case, judge=replace(case.judge, logs=tuple(replace(one, y=np.nan * one.y) for one in case.judge.logs)))
+    assert better_than(lesser, none, now, every, gate(seen, "torque_offset")) is None

@@ -225,3 +225,14 @@ def test_another_law_of_a_cause_is_as_sure_of_it(sure: bool, monkeypatch: pytest
     found = hypotheses.best_form(cast(Any, None), cast(Any, None), fit(straight, sure), 1.0)
     assert found.effect.degree > 1
     assert found.sure is sure
+
+
+@pytest.mark.parametrize("height", [5.0, 200.0])
+def test_a_torque_beyond_any_that_the_machine_has_given_is_no_number_of_a_cause(waving: Case, height: float) -> None:
+    """A wave of 200 N m at a joint whose motors gave 30 at most, and of 5, which they may have had."""
+    effect = find_effect("cogging")(joint=2)
+    model = waving.model.with_effect(effect.full(), np.array([height, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    done = cast(Any, SimpleNamespace(model=model, data=waving.data))
+    largest = max(float(np.abs(one.log.tau).max()) for one in waving.data.logs)
+    assert 5.0 < largest < 200.0
+    assert hypotheses._of_size(done) is (height < largest)

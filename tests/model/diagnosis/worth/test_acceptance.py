@@ -218,6 +218,12 @@ def test_a_slide_counts_by_its_own_travel_beside_a_joint_that_turns(monkeypatch:
             arm: Any = SimpleNamespace(n_joints=2, robot=SimpleNamespace(revolute=revolute), body=body)
             monkeypatch.setattr(gains, "_closed", lambda *_, error=error: [(measured + error, measured, 5e-3)])
             found[revolute, when] = gains._all(arm, [(log, Any)], True, False, 10.0)
+    held = measured * np.array([1e-5, 1.0])  # a slide that is held is 20 um off, then 40: nobody asks it
+    for when, error in (("held before", np.array([2e-5, 0.025])), ("held after", np.array([4e-5, 0.020]))):
+        monkeypatch.setattr(gains, "_closed", lambda *_, error=error: [(held + error, held, 5e-3)])
+        arm = SimpleNamespace(n_joints=2, robot=SimpleNamespace(revolute=(False, True)), body=SimpleNamespace(tip=lambda q: q))
+        found[False, when] = gains._all(arm, [(log, Any)], True, False, 10.0)
+    assert gains.nearer(found[False, "held before"], found[False, "held after"])
     slides, turns = (gains.nearer(found[kind, "before"], found[kind, "after"]) for kind in ((False, True), (True, True)))
     assert slides
     assert not turns
