@@ -34,7 +34,8 @@ _WIDE = 80  # characters of the narrowest terminal that tables are made for
 
 class Teller:
     """Progress: one line that is written over on a terminal, every step with -v, else a line now and then, that whoever reads a
-    pipe or the output of CI knows that something is done. A step that takes long is told again with its seconds. With -q nothing."""
+    pipe or the output of CI knows that something is done. A step that takes long is told again, with its seconds. With -q nothing.
+    """
 
     def __init__(self, quiet: bool, verbose: bool) -> None:
         self.live = sys.stderr.isatty() and not quiet and not verbose

@@ -196,8 +196,9 @@ def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
         ends = [k for k in range(1, len(lines)) if lines[k].stage != lines[k - 1].stage]
         for j in range(joints):
             errors = np.array([line.rms[j] if j < len(line.rms) else math.nan for line in lines])
-            axes.plot(np.insert(errors, ends, math.nan), np.insert(places, ends, math.nan), marker="o", markersize=4.0, linewidth=1.0,
-                      color=_COLOURS[j % len(_COLOURS)], alpha=1.0 if j < len(_COLOURS) else 0.5, label=f"joint {j + 1}")
+            axes.plot(np.insert(errors, ends, math.nan), np.insert(places, ends, math.nan), marker="o", markersize=4.0,
+                      linewidth=1.0, color=_COLOURS[j % len(_COLOURS)], alpha=1.0 if j < len(_COLOURS) else 0.5,
+                      label=f"joint {j + 1}")
         axes.set_xscale("log")
         style.log_ticks(axes.xaxis)
         axes.set_yticks(list(places), [_two_lines(line.step) for line in lines], fontsize=7)

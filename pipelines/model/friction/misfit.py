@@ -94,4 +94,4 @@ def _written(value: Value) -> str:
     if value.std is None or not 0.0 < value.std < math.inf:
         return f"{value.value:.3g} {value.unit}"
     place = max(0, -int(f"{value.std:.0e}".split("e")[1]))
-    return f"{value.value:.{place}f} ± {value.std:.{place}f} {value.unit}"
+    return f"{round(value.value, place) + 0.0:.{place}f} ± {value.std:.{place}f} {value.unit}"  # no minus before a zero
