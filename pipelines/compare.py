@@ -90,7 +90,7 @@ def compute(inputs: Inputs, settings: Settings) -> Comparison:
     return Comparison(
         a.command, names, differ, limit_of(len(figures), settings.alpha), settings.alpha, figures,
         tuple(name for name in first if name not in compared), tuple(name for name in second if name not in compared), left,
-        answers, effects_a, effects_b, same)
+        answers, effects_a, effects_b, same, (robot_of(a.object), robot_of(b.object)))
 
 
 def _counted(result: Mapping[str, Any]) -> _Figures:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import sys
 import textwrap
+import threading
 import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,9 @@ __all__ = ["Teller", "say_error", "say_outcome", "say_table", "say_verdict"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
 _MOST = 12  # remarks
-_SILENT = 20.0  # [s]
+_SILENT = 20.0  # [s] without a line in a pipe
+_LONG = 5.0  # [s] on one step, before a terminal is told how long
+_TICK = 1.0  # [s]
 _LOGS = 30  # named for one remark
 _NUMBERS = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z_])")  # values; p3 and q_1 are names
 _HEADS = (12, 8, 6)  # characters: a heading is broken into lines no shorter than that; shorter ones where the table is too wide
@@ -31,29 +34,64 @@ _WIDE = 80  # characters of the narrowest terminal that tables are made for
 
 class Teller:
     """Progress: one line that is written over on a terminal, every step with -v, else a line now and then, that whoever reads a
-    pipe or the output of CI knows that something is done. With -q nothing."""
+    pipe or the output of CI knows that something is done. A step that takes long is told again, with its seconds. With -q nothing.
+    """
 
     def __init__(self, quiet: bool, verbose: bool) -> None:
         self.live = sys.stderr.isatty() and not quiet and not verbose
         self.verbose, self.quiet = verbose, quiet
         self.width = 0
-        self.last = time.monotonic()
+        self.last = self.begun = time.monotonic()
+        self.words = ""
+        self._over = threading.Event()
+        self._clock: threading.Thread | None = None
 
     def __call__(self, words: str) -> None:
-        line = clean(words, 100)
+        self.words, self.begun = clean(words, 100), time.monotonic()
         if self.live:
-            sys.stderr.write("\r" + line.ljust(self.width))
-            sys.stderr.flush()
-            self.width = len(line)
-        elif self.verbose or (not self.quiet and time.monotonic() - self.last > _SILENT):
-            print(line, file=sys.stderr, flush=True)
-            self.last = time.monotonic()
+            self._over_write(self.words)
+        elif self.verbose or (not self.quiet and self.begun - self.last > _SILENT):
+            self._say(self.words)
+        if self._clock is None and not self.quiet:
+            self._over.clear()
+            self._clock = threading.Thread(target=self._remind, daemon=True)
+            self._clock.start()
+
+    def still(self) -> None:
+        """The step that is being done once more, where nothing was said for long."""
+        now = time.monotonic()
+        line = f"{self.words}, {now - self.begun:.0f} s"
+        if self.live and now - self.begun >= _LONG:
+            self._over_write(line)
+        elif not self.live and now - self.last > _SILENT:
+            self._say(line)
 
     def done(self) -> None:
+        self._over.set()
+        if self._clock is not None:
+            self._clock.join()
+            self._clock = None
         if self.live and self.width:
-            sys.stderr.write("\r" + " " * self.width + "\r")
-            sys.stderr.flush()
+            _write("\r" + " " * self.width + "\r")
             self.width = 0
+
+    def _remind(self) -> None:
+        while not self._over.wait(_TICK):
+            self.still()
+
+    def _over_write(self, line: str) -> None:
+        _write("\r" + line.ljust(self.width))
+        self.width = len(line)
+
+    def _say(self, line: str) -> None:
+        _write(f"{line}\n")
+        self.last = time.monotonic()
+
+
+def _write(text: str) -> None:
+    """In one piece: two threads tell of the progress."""
+    sys.stderr.write(text)
+    sys.stderr.flush()
 
 
 def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: bool, stream: Any = None) -> None:

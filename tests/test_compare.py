@@ -63,6 +63,16 @@ def test_the_same_arm_agrees(tmp_path: Path) -> None:
         ("torque rms validate joint 2", 0.01, 0.02)]
 
 
+def test_two_robots_are_called_two(tmp_path: Path) -> None:
+    """Named in the first words; of one robot nothing is said."""
+    one, other = written(tmp_path / "monday", 1), written(tmp_path / "friday", 2, robot="another")
+    words = "They are of two robots, arm and another: a difference is no change of one machine."
+    for moved in ((0, 0.0), (1, 40.0)):
+        third = written(tmp_path / "sunday", 2, moved, robot="another")
+        assert words in go(tmp_path, one, third).report.verdict
+    assert "robots" not in go(tmp_path, other, third).report.verdict
+
+
 def test_what_moved_is_named(tmp_path: Path) -> None:
     """One figure by ten std: it stands first, alone, with its z; the verdict names both results by their folders."""
     outcome = go(tmp_path, written(tmp_path / "monday", 1), written(tmp_path / "friday", 2, (11, 10.0 * math.sqrt(2.0))))

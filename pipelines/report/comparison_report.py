@@ -79,6 +79,7 @@ class Comparison:
     effects_a: tuple[str, ...] = ()  # laws and effects that only the first was fitted with, as commands take them
     effects_b: tuple[str, ...] = ()  # that only the second was fitted with
     same: bool = False  # the two are one, to the last digit
+    robots: tuple[str, str] = ("", "")  # whose results they are; empty where one does not say
 
 
 def comparison_report(result: Comparison) -> Report:
@@ -93,8 +94,12 @@ def _verdict(result: Comparison) -> str:
     a, b = result.names
     if result.same:
         return f"{a} and {b} are the same result, to the last digit: there is nothing to compare."
+    one, other = result.robots
+    two = bool(one and other and one != other)
+    apart = f"They are of two robots, {one} and {other}: a difference is no change of one machine." if two else ""
     if not result.differ:
-        return f"{a} and {b} agree: none of {len(result.figures)} figures differs beyond its uncertainty."
+        agree = f"{a} and {b} agree: none of {len(result.figures)} figures differs beyond its uncertainty."
+        return " ".join(filter(None, (agree, apart)))
     has = [f"{mine} has {words}, which {other} has not." for mine, other, words in (
         (a, b, _in_words(result.effects_a)), (b, a, _in_words(result.effects_b))) if words]
     beyond, words = [one for one in result.figures if one.beyond], []
@@ -107,7 +112,7 @@ def _verdict(result: Comparison) -> str:
     if told:
         words.append(f"what they say differs: {'; '.join(told[:2])}")
     rest = "; ".join(words)
-    return " ".join(filter(None, (f"{a} and {b} differ.", *has, f"{rest[:1].upper()}{rest[1:]}." if rest else "")))
+    return " ".join(filter(None, (f"{a} and {b} differ.", apart, *has, f"{rest[:1].upper()}{rest[1:]}." if rest else "")))
 
 
 def _in_words(effects: Sequence[str]) -> str:

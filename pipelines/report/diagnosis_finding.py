@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipelines.model.diagnosis.answered.words import taken_in, where
+from pipelines.model.diagnosis.answered.words import of_any_size, taken_in, where
 from pipelines.model.diagnosis.given.responding import BELOW
 from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
 from pipelines.model.effects import find_effect
@@ -52,7 +52,10 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
             f"{_share(one, nominal, floor)}; the refitted model could hide "
             f"{format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{tip_worth(one.gain)}"]
-    if math.isfinite(one.torque_rms):
+    if of_any_size(one):
+        text.append("How large its torque is these logs do not tell: rigid body and friction can take in any amount of it, and the "
+                    "size given below is one of many: fed forward, it holds on motion like that of these logs alone")
+    elif math.isfinite(one.torque_rms):
         text.append(f"Over the logs that were fitted its torque is {torque_of(one, units)} rms{taken_in(one, nominal.identify)}; "
                     "over other motion it may be more or less")
     text += _larger(one, units)

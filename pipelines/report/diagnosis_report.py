@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.model.diagnosis.answered.outcome import Result
-from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
+from pipelines.model.diagnosis.answered.words import how_much, of_any_size, taken_in, where
 from pipelines.model.diagnosis.result import Finding, Rejected, Trial
 from pipelines.model.diagnosis.searched.ledger import WEAKER
 from pipelines.model.effects import find_effect
@@ -110,6 +110,8 @@ def _advice(result: Result) -> tuple[str, ...]:
 
 def _size(one: Finding, result: Result) -> str:
     """Of its torque, and whether the model hid most of it."""
+    if of_any_size(one):
+        return "of a size that these logs do not tell"
     rated = f" ({format_number(100.0 * one.of_rated, 2)} % of the rated torque)" if math.isfinite(one.of_rated) else ""
     return f"{torque_of(one, units_in(result))} rms of torque{rated}{taken_in(one, result.residual_rms.identify)}"
 

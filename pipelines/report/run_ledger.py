@@ -179,7 +179,7 @@ def _judged(line: Line) -> str:
 def _tip(line: Line) -> str:
     if line.tip is None:
         return "–"
-    return f"{format_number(1e3 * line.tip[0], 2)} → {format_number(1e3 * line.tip[1], 2)}"
+    return f"{format_number(1e3 * line.tip[0], 3)} → {format_number(1e3 * line.tip[1], 3)}"  # as the verdict writes them
 
 
 def _two_lines(step: str) -> str:
@@ -192,11 +192,13 @@ def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
 
     def draw(drawing: Drawing) -> None:
         axes = drawing.subplots()
-        places = np.arange(len(lines))
+        places = np.arange(len(lines), dtype=np.float64)
+        ends = [k for k in range(1, len(lines)) if lines[k].stage != lines[k - 1].stage]
         for j in range(joints):
-            errors = [line.rms[j] if j < len(line.rms) else math.nan for line in lines]
-            axes.plot(errors, places, marker="o", markersize=4.0, linewidth=1.0, color=_COLOURS[j % len(_COLOURS)],
-                      alpha=1.0 if j < len(_COLOURS) else 0.5, label=f"joint {j + 1}")
+            errors = np.array([line.rms[j] if j < len(line.rms) else math.nan for line in lines])
+            axes.plot(np.insert(errors, ends, math.nan), np.insert(places, ends, math.nan), marker="o", markersize=4.0,
+                      linewidth=1.0, color=_COLOURS[j % len(_COLOURS)], alpha=1.0 if j < len(_COLOURS) else 0.5,
+                      label=f"joint {j + 1}")
         axes.set_xscale("log")
         style.log_ticks(axes.xaxis)
         axes.set_yticks(list(places), [_two_lines(line.step) for line in lines], fontsize=7)
@@ -205,5 +207,6 @@ def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
         axes.legend(fontsize=7)
 
     of = f" of {name}" if several else ""
-    caption = f"Held-out torque error{of} with each step of the model; to the left is better."
+    joined = "; joined are the steps of one stage" if len({line.stage for line in lines}) > 1 else ""
+    caption = f"Held-out torque error{of} with each step of the model{joined}; to the left is better."
     return Figure(f"ledger-{name}" if several else "ledger", caption, draw, (6.0, 1.2 + 0.28 * len(lines)))

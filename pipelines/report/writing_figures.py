@@ -134,8 +134,16 @@ def executed_figure(cases: Sequence[Case]) -> Figure | None:
             axis.set_xlabel(f"{_AXES[a]} [m]")
 
     width, height = float(np.ptp(wanted[:, a])), float(np.ptp(wanted[:, b]))
-    return Figure("executed", f"The letters as executed, on the wanted ones{_ways(drawn, 'dashed')}.", draw,
+    return Figure("executed", f"The letters as executed, on the wanted ones{_ways(drawn, 'dashed')}.{_simulated(shown)}", draw,
                   (6.0, min(len(panels) * (0.9 + 5.2 * height / max(width, 1e-9)), 9.0)))
+
+
+def _simulated(shown: Sequence[Case]) -> str:
+    """Which of the drawn cases no arm has written."""
+    which = [str(one.case) for one in shown if one.origin == "simulated"]
+    if not which or len(which) == len(shown):
+        return " All of them are simulated." if which else ""
+    return f" Simulated: case{'s' if len(which) > 1 else ''} {', '.join(which)}; measured: the others."
 
 
 def draw_strokes(axis: Axes, path: Array, drawn: Array | None, color: str, width: float, label: str, alpha: float = 1.0) -> None:

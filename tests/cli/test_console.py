@@ -108,3 +108,22 @@ def test_who_reads_a_pipe_hears_now_and_then_that_something_is_done(capsys: pyte
         teller.done()
         out, err = capsys.readouterr()
         assert (out, err.splitlines()) == ("", heard)
+
+
+def test_a_step_that_takes_minutes_is_told_again_with_its_seconds(capsys: pytest.CaptureFixture[str],
+                                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    """No search of two minutes is silent, in a pipe or on a terminal; one of seconds is not counted."""
+    now = [0.0]
+    monkeypatch.setattr("rrrid_cli.console.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("rrrid_cli.console._TICK", 1e9)  # the test is the clock
+    for live, heard in ((False, "searching, 25 s\nsearching, 60 s\n"),
+                        (True, "\rsearching\rsearching, 25 s\rsearching, 30 s\rsearching, 60 s\r               \r")):
+        now[0] = 0.0
+        teller = Teller(False, False)
+        teller.live = live
+        teller("searching")
+        for at in (3.0, 25.0, 30.0, 60.0):
+            now[0] = at
+            teller.still()
+        teller.done()
+        assert capsys.readouterr().err == heard

@@ -230,3 +230,16 @@ def test_a_proof_says_what_it_shows(left: float, said: str) -> None:
     caption = next(proof_figures(1, replace(found("cogging"), proof=proof))).caption
     assert said in caption
     assert "0.5 N m rms without the finding" in caption
+
+
+def test_a_torque_of_any_size_is_told_as_that() -> None:
+    """Friction along the turn that the model can take in whole: neither the sentence nor its section gives its size as measured."""
+    known = found("position_friction")
+    largest = replace(known, parameters=known.parameters | {"amplitude": Value(12.9, np.inf, "N m")})
+    small = replace(known, parameters=known.parameters | {"amplitude_3": Value(0.01, np.inf, "N m")})
+    for one, open_ in ((known, False), (largest, True), (small, False)):
+        page = diagnosis_report(Result(**(NOTHING | {"verdict": "cause", "findings": (one,)})))
+        text = " ".join(next(section for section in page.sections if section.title.startswith("1. ")).text)
+        assert ("of a size that these logs do not tell" in page.verdict) is open_
+        assert ("0.2 N m rms of torque" in page.verdict) is not open_
+        assert ("How large its torque is these logs do not tell" in text) is open_

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Drawing
 
 from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
 from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, TorqueGain
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, TipError, TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
-from pipelines.report.run_ledger import ledger_lines
+from pipelines.report.run_ledger import ledger_lines, ledger_section
 from pipelines.report.run_report import run_report
 from pipelines.report.run_result import Group, Result, Step
 
@@ -63,7 +65,7 @@ def told(*findings: Finding, was: np.ndarray = NOMINAL, now: np.ndarray = CARRYI
     rms = ResidualRms(NOMINAL, NOMINAL, NOMINAL)
     diagnosed = Diagnosis(**(bare | {"findings": findings, "residual_rms": rms}))  # type: ignore[arg-type]
     blank = {field.name: None for field in fields(Extension)}
-    extended = Extension(**(blank | {"findings": findings, "gain": gained(was, now),  # type: ignore[arg-type]
+    extended = Extension(**(blank | {"findings": findings, "gain": gained(was, now), "revolute": (),  # type: ignore[arg-type]
                                      "residual_rms": ResidualRms(was, was, was), "after_rms": ResidualRms(now, now, now)}))
     return Group("", tuple(Step(name, 0, result, Report("", ""), ())
                            for name, result in (("diagnose", diagnosed), ("extend", extended))))
@@ -95,6 +97,27 @@ def test_findings_that_build_on_one_another_stand_in_that_order() -> None:
     """The drag was found beside the cogging, and is the stronger: the cogging comes first all the same."""
     steps = [line.step for line in ledger_lines(told(DRAG, RIPPLE))]
     assert steps[:3] == ["rigid body and friction, as diagnose fits them", "+ cogging at joint 2", "+ quadratic drag at joint 1"]
+
+
+def test_no_line_joins_the_steps_of_two_stages() -> None:
+    """The model of extend without its cause is no step back from what diagnose found."""
+    lines = ledger_lines(told(RIPPLE, was=2.0 * NOMINAL))
+    section = ledger_section([("", lines)])
+    assert section is not None
+    drawing = Drawing()
+    section.figures[0].draw(drawing)
+    for drawn in drawing.axes[0].lines:
+        heights = np.asarray(drawn.get_ydata(), dtype=np.float64)
+        joined = [(int(a), int(b)) for a, b in itertools.pairwise(heights) if np.isfinite(a + b)]
+        assert joined == [(k - 1, k) for k in range(1, len(lines)) if lines[k].stage == lines[k - 1].stage]
+
+
+def test_the_ledger_writes_the_tip_as_the_verdict_does() -> None:
+    """0.125 mm is 0.125 mm in every line, not 0.13 in one and 0.12 in the next."""
+    tips = dataclasses.replace(RIPPLE.gain, tip_error_rms=TipError(1.2509e-4, 1.86e-5))
+    section = ledger_section([("", ledger_lines(told(dataclasses.replace(RIPPLE, gain=tips))))])
+    assert section is not None
+    assert "0.125 → 0.0186" in [row[-1] for row in section.tables[0].rows]
 
 
 def test_of_several_robots_each_has_one_sentence() -> None:

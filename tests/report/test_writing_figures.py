@@ -42,3 +42,14 @@ def test_where_nobody_knows_of_a_pen_all_is_one_line(drawn: np.ndarray | None) -
     assert "strokes" not in caption
     assert [(solid, len(points)) for solid, points in found] == [(True, len(X))] * 2
     assert np.isfinite(found[0][1]).all()
+
+
+@pytest.mark.parametrize(("origins", "words"), [
+    (("measured", "measured"), None), (("simulated", "simulated"), "All of them are simulated."),
+    (("simulated", "measured"), "Simulated: case 1; measured: the others.")])
+def test_letters_that_no_arm_has_written_are_called_simulated(origins: tuple[str, str], words: str | None) -> None:
+    cases = [Case(k, (), TipStd(0.0, 0.0, 0.0), None, origin, ("log",), TipTrack(PATH, PATH, None))
+             for k, origin in enumerate(origins, start=1)]
+    figure = executed_figure(cases)
+    assert figure is not None
+    assert words in figure.caption if words else "imulated" not in figure.caption

@@ -90,5 +90,8 @@ def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value
 
 
 def _written(value: Value) -> str:
-    std = "" if value.std is None else f" ± {value.std:.1g}"
-    return f"{value.value:.3g}{std} {value.unit}"
+    """Both to the place of the deviation's first digit: "0.5305 ± 0.0004 kg m^2"."""
+    if value.std is None or not 0.0 < value.std < math.inf:
+        return f"{value.value:.3g} {value.unit}"
+    place = max(0, -int(f"{value.std:.0e}".split("e")[1]))
+    return f"{round(value.value, place) + 0.0:.{place}f} ± {value.std:.{place}f} {value.unit}"  # no minus before a zero

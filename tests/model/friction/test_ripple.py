@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.misfit import misfits
 from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.result import joint_result
+from pipelines.model.friction.result import Value, joint_result
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.report.friction_ripple import ripple_in_words
@@ -119,6 +119,16 @@ def test_a_hundred_and_twenty_waves_in_words() -> None:
     (check,) = misfits((joint,), "log")
     for words in (ripple_in_words(joint), check.message):
         assert "about 120 waves a turn" in words
+
+
+def test_value_and_deviation_end_at_one_place() -> None:
+    """A deviation of 0.0004 needs the fourth place of its value, be it a zero."""
+    joint = joint_result(fitted(held_back(lambda q, v: 8.0 * cogging(q, v), 4)), "joint", "varpro")
+    assert joint.ripple is not None
+    ripple = replace(joint.ripple, inertia=Value(0.53002, 0.00037, "kg m^2"))
+    (check,) = misfits((replace(joint, inertia=Value(0.5118, 0.0059, "kg m^2"), ripple=ripple),), "log")
+    assert "0.512 ± 0.006 kg m^2" in check.message
+    assert "0.5300 ± 0.0004 kg m^2" in check.message
 
 
 def test_friction_by_position_of_a_joint_that_goes_one_way_is_no_ripple() -> None:

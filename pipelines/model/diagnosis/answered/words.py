@@ -4,6 +4,7 @@
     how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
     beside(findings)               "; and a torque that is logged late (120 ms) at joint 1"
     taken_in(finding, left)        ", most of which the nominal model had taken in"
+    of_any_size(finding)           whether these logs leave open how large its torque is
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from pipelines.model.diagnosis.result import Finding, Value
 from pipelines.model.effects import find_effect
 from pipelines.model.words import plain_number, within
 
-__all__ = ["beside", "how_much", "other_joint", "taken_in", "where"]
+__all__ = ["beside", "how_much", "of_any_size", "other_joint", "taken_in", "where"]
 
 # Units as a technician says them, where others than SI are usual. How far something is tilted is told in degrees.
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 _DEGREE = np.pi / 180.0
+_TORQUES = ("N m", "N")
 _TOLD = 2  # further findings that a sentence names
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
@@ -71,3 +73,10 @@ def taken_in(one: Finding, left: Array) -> str:
     """
     rest = float(np.nanmax(left)) if one.joint is None else float(left[one.joint - 1])
     return ", most of which the nominal model had taken in" if one.torque_rms**2 > 2.0 * rest**2 else ""
+
+
+def of_any_size(one: Finding) -> bool:
+    """Whether the largest torque among its numbers has no finite deviation: the model can take in any amount of it."""
+    told = [value for value in one.parameters.values() if value.unit in _TORQUES and isinstance(value.value, int | float)]
+    largest = max(told, key=lambda value: abs(float(np.nan_to_num(value.value))), default=None)  # type: ignore[arg-type]
+    return largest is not None and isinstance(largest.std, int | float) and bool(np.isinf(largest.std))
