@@ -74,7 +74,12 @@ def _tone(result: Result) -> Tone:
 
 
 def _verdict(result: Result) -> str:
-    """One sentence; what to check stands in the first section."""
+    """One sentence, and by what it was judged where that is no log of its own; what to check stands in the first section."""
+    blocks = " Judged by blocks held out of the fitted logs, for none has role validate." if result.held_out == "blocks" else ""
+    return f"{_said(result)}{blocks}"
+
+
+def _said(result: Result) -> str:
     if result.verdict == "nothing-wrong":
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""

@@ -45,7 +45,8 @@ def _verdict(result: Extension) -> str:
     change = "" if result.gain is None else tip_change(result.gain)
     told = f"; with it {change}" if change else ""
     but = f" Not accepted: {refused}." if refused else ""
-    return f"The model with {found}, all its numbers fitted again, is better on held-out logs{told}.{but}"
+    judge = "held-out logs" if result.held_out == "logs" else "blocks held out of the fitted logs (for none has role validate)"
+    return f"The model with {found}, all its numbers fitted again, is better on {judge}{told}.{but}"
 
 
 def _first_reason(result: Extension) -> str:

@@ -243,3 +243,11 @@ def test_a_torque_of_any_size_is_told_as_that() -> None:
         assert ("of a size that these logs do not tell" in page.verdict) is open_
         assert ("0.2 N m rms of torque" in page.verdict) is not open_
         assert ("How large its torque is these logs do not tell" in text) is open_
+
+
+@pytest.mark.parametrize("verdict", ["cause", "nothing-wrong", "unknown"])
+def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
+    there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
+    for held_out in ("logs", "blocks"):
+        page = diagnosis_report(Result(**(there | {"held_out": held_out})))
+        assert ("Judged by blocks held out of the fitted logs" in page.verdict) is (held_out == "blocks")
