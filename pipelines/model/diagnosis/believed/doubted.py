@@ -176,8 +176,8 @@ def unlike_noise(done: Settled, usual: Callable[[], Array]) -> Settled:
     if not (where := _oscillating(done.found.final if ruling.verdict == "cause" else done.found.nominal, usual)):
         return done
     seen = (f"what is left of {where} oscillates by itself, whatever the motion, as nothing does that these logs can name: look "
-            "at the drive's current loop and at the gains of its controller; a base or a joint that gives way would show in frequency "
-            "responses")
+            "at the drive's current loop and at the gains of its controller; a base or a joint that gives way would show in "
+            "frequency responses")
     if ruling.verdict == "cause":
         return replace(done, ruling=replace(ruling, reason=seen))
     reason = f"{ruling.reason}; and {seen}" if ruling.verdict == "unknown" else seen
