@@ -18,19 +18,8 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects.quadratic_drag import QuadraticDrag
+from tests.model.diagnosis.slides import SLIDE
 
-_ROBOT = """name = "slide"
-gravity = [-9.81, 0.0, 0.0]
-[kinematics]
-convention = "dh"
-[[joint]]
-name = "carriage"
-type = "prismatic"
-a = 0.0
-alpha = 0.0
-d = 0.0
-offset = 0.0
-"""
 _RATE, _SECONDS = 500.0, 20.0
 
 Load = Callable[[Array, Array], Array]  # [N] by position [m] and speed [m/s]
@@ -46,7 +35,7 @@ def slide(seed: int, role: str, load: Load) -> ExperimentLog:
     tau = 95.1 * ddq + 203.5 * dq + 20.4 * np.tanh(dq / 1e-3) + load(q, dq) + rng.standard_normal(len(t))
     signals = {"t": Signal(t, "s", "time"), "q": Signal(np.round(q / 1e-6)[:, None] * 1e-6, "m", "position"),
                "tau": Signal(tau[:, None], "N", "force")}
-    return ExperimentLog(f"slide-{seed}", "free", role, "measured", "slide", 1.0 / _RATE, _ROBOT, signals, torque="measured")
+    return ExperimentLog(f"slide-{seed}", "free", role, "measured", "slide", 1.0 / _RATE, SLIDE, signals, torque="measured")
 
 
 @pytest.mark.parametrize(("cause", "number", "size", "load"), [

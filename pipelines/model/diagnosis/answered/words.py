@@ -77,6 +77,7 @@ def taken_in(one: Finding, left: Array) -> str:
 
 def of_any_size(one: Finding) -> bool:
     """Whether the largest torque among its numbers has no finite deviation: the model can take in any amount of it."""
-    told = [value for value in one.parameters.values() if value.unit in _TORQUES and isinstance(value.value, int | float)]
-    largest = max(told, key=lambda value: abs(float(np.nan_to_num(value.value))), default=None)  # type: ignore[arg-type]
-    return largest is not None and isinstance(largest.std, int | float) and bool(np.isinf(largest.std))
+    told = [(abs(float(np.nan_to_num(value.value))), value.std) for value in one.parameters.values()
+            if value.unit in _TORQUES and isinstance(value.value, int | float)]
+    _, std = max(told, key=lambda each: each[0], default=(0.0, None))
+    return isinstance(std, int | float) and bool(np.isinf(std))

@@ -117,14 +117,25 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
         first += len(part)
     rows = _all_rows(parts, columns, recipe, held)
     motions = (*fitted, *judging, *referring)
-    at_rest = rests(motions, recipe.cutoff_hz, np.max(fastest, axis=0))
-    if not any(log.controlled for log, _ in motions) and any(own.any() for own in at_rest):  # a twin rests as its arm does
-        moving = _all_rows(parts, columns, recipe, [still | own for still, own in zip(held, at_rest, strict=True)])
-        if _enough(moving) and (stuck := sticking([one for one in rows if one], [one for one in moving if one], columns)).any():
-            rows = _all_rows(parts, columns, recipe, [still | (own & stuck) for still, own in zip(held, at_rest, strict=True)])
+    if not any(log.controlled for log, _ in motions):  # a twin rests as its arm does
+        rows = _without_rests(parts, columns, recipe, held, rests(motions, recipe.cutoff_hz, np.max(fastest, axis=0)), rows)
     data, judge, reference = rows
     assert data is not None  # prepare refuses logs without any to fit
     return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
+
+
+def _without_rests(parts: Sequence[Motions], columns: Columns, recipe: Recipe, held: Sequence[Joints], at_rest: Sequence[Joints],
+                   rows: list[Data | None]) -> list[Data | None]:
+    """The same rows, of which those do not count in which dry friction holds a joint, `at_rest` (samples, joints) of each log."""
+    if not any(own.any() for own in at_rest):
+        return rows
+    moving = _all_rows(parts, columns, recipe, [still | own for still, own in zip(held, at_rest, strict=True)])
+    if not _enough(moving):
+        return rows
+    stuck = sticking([one for one in rows if one], [one for one in moving if one], columns)
+    if not stuck.any():
+        return rows
+    return _all_rows(parts, columns, recipe, [still | (own & stuck) for still, own in zip(held, at_rest, strict=True)])
 
 
 def _all_rows(parts: Sequence[Motions], columns: Columns, recipe: Recipe, still: Sequence[Joints]) -> list[Data | None]:

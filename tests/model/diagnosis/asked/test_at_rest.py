@@ -13,19 +13,8 @@ from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
+from tests.model.diagnosis.slides import SLIDE
 
-_ROBOT = """name = "slide"
-gravity = [-9.81, 0.0, 0.0]
-[kinematics]
-convention = "dh"
-[[joint]]
-name = "carriage"
-type = "prismatic"
-a = 0.0
-alpha = 0.0
-d = 0.0
-offset = 0.0
-"""
 _RATE, _MOVE, _REST, _OFFSET = 500.0, 0.6, 0.4, -3.2  # [Hz], [s], [s], [N]
 _PLACES = np.array([0.0, 0.22, 0.02, 0.24, 0.12, 0.18])  # [m]
 
@@ -54,7 +43,7 @@ def slide(seed: int, role: str, held: float, dry: float = 20.0) -> ExperimentLog
     tau += np.where(rest > 0.0, stuck[np.maximum(rest, 1.0).astype(int) - 1], 0.0)
     seen = {"t": (np.arange(len(q)) / _RATE, "s"), "q": (np.round(q / 1e-6)[:, None] * 1e-6, "m"), "tau": (tau[:, None], "N")}
     signals = {name: Signal(values, unit, name) for name, (values, unit) in seen.items()}
-    return ExperimentLog(f"moves-{seed}", "free", role, "measured", "slide", 1.0 / _RATE, _ROBOT, signals, torque="measured")
+    return ExperimentLog(f"moves-{seed}", "free", role, "measured", "slide", 1.0 / _RATE, SLIDE, signals, torque="measured")
 
 
 def _counting(*logs: ExperimentLog) -> float:
