@@ -114,8 +114,9 @@ def _drives(first: Responding, reference: Data, since: Since, seed: int) -> Driv
 
 def _limits(found: Found, case: Case, first: Responding, since: Since) -> tuple[Limits, Gained]:
     """What would have been found of what has changed; and what chance gives each cause, as far as it has been asked by then."""
-    found, case = steadied(found, case)
-    return limits_of(found.steps[-1], case, first, since.probed), dict(since.chance.known)
+    last = found.steps[-1]
+    alone, case = steadied(Found(last.before, (last,), last.before), case)
+    return limits_of(alone.steps[-1], case, first, since.probed), dict(since.chance.known)
 
 
 def _taken(limits: Callable[[], tuple[Limits, Gained]], chance: Chance) -> Limits:

@@ -49,10 +49,22 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.terms import LARGE, ArmModel, Hooks, OwnLoad, Predict, Quantity, SpeedCurve, Values, friction_at
+from pipelines.model.effects.terms import (
+    LARGE,
+    ArmModel,
+    Hooks,
+    OwnLoad,
+    OwnMemory,
+    Predict,
+    Quantity,
+    SpeedCurve,
+    Values,
+    friction_at,
+)
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["LARGE", "ArmModel", "Effect", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
+__all__ = ["LARGE", "ArmModel", "Effect", "Hooks", "OwnLoad", "OwnMemory", "Predict", "Quantity", "SpeedCurve", "Values",
+           "friction_at"]
 
 
 @dataclass(frozen=True)
@@ -222,7 +234,7 @@ class Effect(ABC):
 
     def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
         """Its torque (samples, joints) [N m]."""
-        return np.asarray(self.at(values).columns(motion, arm) @ self.amplitudes(values))
+        return _summed(self.at(values).columns(motion, arm), self.amplitudes(values))
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """Its torque (samples,) [N m] on its own joint against speed alone, at rest otherwise: the friction curve."""
@@ -242,7 +254,7 @@ class Effect(ABC):
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """How it enters the forward simulation; by default as a load."""
         shaped, amplitudes = self.at(values), self.amplitudes(values)
-        return Hooks(load=lambda motion, _: np.asarray(shaped.columns(motion, arm) @ amplitudes))
+        return Hooks(load=lambda motion, _: _summed(shaped.columns(motion, arm), amplitudes))
 
     def speed_curve(self, values: Values) -> SpeedCurve | None:
         """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
@@ -253,6 +265,11 @@ class Effect(ABC):
 
         A simulation of one robot asks it: plain numbers are several times faster there than arrays.
         """
+        return None
+
+    def own_memory(self, values: Values) -> OwnMemory | None:
+        """The same where `simulate` has one state, and its rate follows from it and the speed of its own joint, and the load from
+        both."""
         return None
 
     def predicted(self, motion: Motion, arm: ArmModel) -> Array:
@@ -287,6 +304,14 @@ class Effect(ABC):
         if self.joint is None:
             raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
         return self.joint - 1
+
+
+def _summed(columns: Array, amplitudes: Array) -> Array:
+    """`columns` (samples, joints, k) times `amplitudes` (k,); of samples that lie side by side a matrix product takes twenty times
+    as long."""
+    if not len(amplitudes):
+        return np.zeros(columns.shape[:-1])
+    return np.asarray(sum(amplitude * columns[..., k] for k, amplitude in enumerate(amplitudes.tolist())))
 
 
 _KEPT: list[tuple[ArmModel, Motion, Array]] = []  # the last few, newest first; compared by identity, for a motion is its arrays

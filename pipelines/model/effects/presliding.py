@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, OwnMemory, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Presliding"]
@@ -133,6 +133,14 @@ class Presliding(Effect):
 
         return Hooks(load=load, states=contact.states, rate=rate)
 
+    def own_memory(self, values: Values) -> OwnMemory | None:
+        shaped, amplitude = self.at(values), values["amplitude"]
+        contact, unit, time = shaped._contact, shaped._unit, shaped.damping_time
+        if isinstance(contact, _Slips):
+            return None
+        rate = contact.number_rate()
+        return OwnMemory(lambda u, v: rate(u, v / unit), lambda u, du: amplitude * (u + time * du))
+
     @property
     def _contact(self) -> _Bristles | _Slips | _Breaking:
         if self.breakaway:
@@ -186,6 +194,21 @@ class _Bristles:
         y = np.sign(v) * states[:, 0]
         slides = (np.maximum(1.0 - y, _SLIDES) / (1.0 - self.elastic)) ** self.exponent
         return np.asarray(v * np.where(y < self.elastic, 1.0, np.where(y < 1.0, slides, 1.0 - y)))[:, None]
+
+    def number_rate(self) -> Callable[[float, float], float]:
+        """`rate` of numbers."""
+        e, n, straight = self.elastic, self.exponent, self.exponent == 1.0
+
+        def rate(u: float, v: float) -> float:
+            y = u if v > 0.0 else -u
+            if y < e:
+                return v
+            if y >= 1.0:
+                return v * (1.0 - y)
+            slides = max(1.0 - y, _SLIDES) / (1.0 - e)
+            return v * slides if straight else float(v * slides**n)
+
+        return rate
 
     def bent(self, states: Array) -> Array:
         return np.asarray(states[:, 0])
@@ -255,6 +278,16 @@ class _Breaking:
 
     def rate(self, states: Array, v: Array) -> Array:
         return np.asarray(v * (1.0 - np.sign(v) * states[:, 0] / _level(v, self.breakaway, self.speed)))[:, None]
+
+    def number_rate(self) -> Callable[[float, float], float]:
+        """`rate` of numbers."""
+        more, slow, fast, exp = self.breakaway, self.speed, _FAST * self.speed, math.exp
+
+        def rate(u: float, v: float) -> float:
+            y = u if v > 0.0 else -u
+            return v * (1.0 - y / (1.0 + more * exp(-(min(abs(v), fast) / slow) ** 2)))
+
+        return rate
 
     def bent(self, states: Array) -> Array:
         return np.asarray(states[:, 0])

@@ -19,7 +19,7 @@ import numpy as np
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["LARGE", "ArmModel", "Hooks", "OwnLoad", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
+__all__ = ["LARGE", "ArmModel", "Hooks", "OwnLoad", "OwnMemory", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at"]
 
 Values = Mapping[str, float]
 
@@ -64,6 +64,14 @@ class ArmModel(Protocol):
 
 Predict = Callable[[Motion, ArmModel], Array]
 OwnLoad = Callable[[float, float], float]  # angle [rad], speed [rad/s] -> [N m]
+
+
+@dataclass(frozen=True)
+class OwnMemory:
+    """A load of one joint that remembers one number, in plain numbers: where an `OwnLoad` knows angle and speed alone."""
+
+    rate: Callable[[float, float], float]  # memory, speed [rad/s] -> d(memory)/dt
+    load: Callable[[float, float], float]  # memory and its rate -> [N m]
 
 
 @dataclass(frozen=True)
@@ -140,6 +148,7 @@ class Hooks:
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
     alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based) in plain numbers: `Effect.own_load`
+    remembering: tuple[int, OwnMemory] | None = None  # or where it is one state that begins at zero: `Effect.own_memory`
     actuator: Callable[[Array, Motion, Array], Array] | None = None  # command, motion, states -> applied torque [N m]
     sensor: Callable[[Array, Array], Array] | None = None  # true q, states -> measured q [rad]
     inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)

@@ -31,15 +31,15 @@ _AT_ONCE = 2048  # samples that are Python numbers at once
 
 _LOOP = """
 def loop(now, memory, rows, record, step, round=round, min=min, max=max):
-    q1, q2, q3, v1, v2, v3 = now
+    q1, q2, q3, v1, v2, v3{bent} = now
     {memory} = memory
     for (r1, r2, r3), (f1, f2, f3), (n1, n2, n3, o1, o2, o3) in rows:
 {law}
         record((q1, q2, q3, v1, v2, v3, s1, s2, s3, c1, c2, c3))
 {steps}
-    return (q1, q2, q3, v1, v2, v3), ({memory})
+    return (q1, q2, q3, v1, v2, v3{bent}), ({memory})
 """
-_STEP = "        q1, q2, q3, v1, v2, v3 = step(q1, q2, q3, v1, v2, v3, c1 + n1, c2 + n2, c3 + n3)"
+_STEP = "        q1, q2, q3, v1, v2, v3{bent} = step(q1, q2, q3, v1, v2, v3{bent}, c1 + n1, c2 + n2, c3 + n3)"
 
 # x̂ = E x̂, then x̂ + k (e - c x̂): (16), (20); a, b, d: estimate of the error, its speed and acceleration.
 _OBSERVED = ("p = a{j} + {h} * b{j} + {h2} * d{j}", "b{j} += {h} * d{j}", "x = e{j} - p", "a{j} = p + {k1} * x", "b{j} += {k2} * x",
@@ -57,7 +57,7 @@ class OneLoop:
         self._experiment = experiment
         self._step = OneRRR(plant, experiment.sample_time, steps).step
         scope: dict[str, Any] = {}
-        exec(_code(_text(experiment, steps)), scope)
+        exec(_code(_text(experiment, steps, len(plant.own_memories))), scope)
         self._loop: Callable[..., tuple[_Now, tuple[Any, ...]]] = scope["loop"]
 
     @staticmethod
@@ -68,7 +68,8 @@ class OneLoop:
         return law and each and OneRRR.fits(plant) and not any(hook.sensor for hook in plant.hooks)
 
     def run(self, start: Array, noise: Iterator[Array] | None, watch: Callable[[Array, int], None]) -> tuple[Array, Array, Array]:
-        """What it does from `start` (2 joints,) on: motion (samples, 2 joints), counted angles and commands (samples, joints).
+        """What it does from `start` (2 joints and memories,) on: motion (samples, 2 joints), counted angles and commands
+        (samples, joints).
 
         Args:
             noise: (samples, 2 joints) of drives, then of encoders, in pieces of any length; None: there is none.
@@ -85,8 +86,8 @@ class OneLoop:
             try:
                 now, memory = self._loop(now, memory, islice(rows, _PART), part.append, self._step)
             except (ValueError, OverflowError):  # of an infinite number there is neither a sine nor a count
-                now = (nan,) * 6
-            watch(np.array(now), first + len(part))
+                now = (nan,) * len(now)
+            watch(np.array(now[:6]), first + len(part))
             table[first:first + _PART] = part
         return table[:, :6], table[:, 6:9], table[:, 9:]
 
@@ -107,10 +108,11 @@ def _fed(experiment: Experiment) -> Iterator[Sequence[float]]:
     return _listed(np.sum(parts, axis=0)) if parts else repeat((0.0, 0.0, 0.0))
 
 
-def _text(experiment: Experiment, steps: int) -> str:
+def _text(experiment: Experiment, steps: int, memories: int) -> str:
     memory = ", ".join([*(f"a{j}, b{j}, d{j}" for j in _JOINTS), *(f"i{j}" for j in _JOINTS), *(f"w{j}" for j in _JOINTS)])
     law = "\n".join(f"        {line}" for j in _JOINTS for line in _lines(experiment, j))
-    return _LOOP.format(memory=memory, law=law, steps="\n".join([_STEP] * steps))
+    bent = "".join(f", g{k}" for k in range(memories))  # of loads that remember
+    return _LOOP.format(memory=memory, law=law, bent=bent, steps="\n".join([_STEP.format(bent=bent)] * steps))
 
 
 @lru_cache(maxsize=32)  # experiments of a robot have one controller, mostly

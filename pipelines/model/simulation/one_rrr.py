@@ -7,11 +7,13 @@ would cost as much as the arithmetic.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from math import cos, nan, sin, tanh
 from types import CodeType
 from typing import Any
+
+import numpy as np
 
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.rrr import RRR
@@ -58,10 +60,11 @@ _ACCELERATION = """
     {a3} = (C13 * r1 + C23 * r2 + (D11 * D22 - D12 * D12) * r3) * scale
 """
 
-# Kutta's stages k, l, m, n: the slope of the position is the speed of the stage.
+# Kutta's stages k, l, m, n: the slope of the position is the speed of the stage. Memories begin a stage with their rates.
 _STEP = """
-def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads):
+def step(q1, q2, q3, v1, v2, v3, {memories}u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads, rates=rates, bends=bends):
 {unpacked}
+{begin}
 {first}
     w1 = v1 + {half} * k1
     w2 = v2 + {half} * k2
@@ -69,6 +72,7 @@ def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=
     y1 = q1 + {half} * v1
     y2 = q2 + {half} * v2
     y3 = q3 + {half} * v3
+{after_first}
 {second}
     z1 = v1 + {half} * l1
     z2 = v2 + {half} * l2
@@ -76,6 +80,7 @@ def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=
     y1 = q1 + {half} * w1
     y2 = q2 + {half} * w2
     y3 = q3 + {half} * w3
+{after_second}
 {third}
     o1 = v1 + {h} * m1
     o2 = v2 + {h} * m2
@@ -83,30 +88,32 @@ def step(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=
     y1 = q1 + {h} * z1
     y2 = q2 + {h} * z2
     y3 = q3 + {h} * z3
+{after_third}
 {fourth}
     return (q1 + {sixth} * (v1 + 2.0 * (w1 + z1) + o1), q2 + {sixth} * (v2 + 2.0 * (w2 + z2) + o2),
             q3 + {sixth} * (v3 + 2.0 * (w3 + z3) + o3), v1 + {sixth} * (k1 + 2.0 * (l1 + m1) + n1),
-            v2 + {sixth} * (k2 + 2.0 * (l2 + m2) + n2), v3 + {sixth} * (k3 + 2.0 * (l3 + m3) + n3))
+            v2 + {sixth} * (k2 + 2.0 * (l2 + m2) + n2), v3 + {sixth} * (k3 + 2.0 * (l3 + m3) + n3){remembered})
 """
 # The slope of the speed alone.
 _SLOPE = """
-def acceleration(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads):
+def acceleration(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads, rates=rates, bends=bends):
 {unpacked}
 {first}
     return k1, k2, k3
 """
 _STAGES = {"first": ("q", "v", "k"), "second": ("y", "w", "l"), "third": ("y", "z", "m"), "fourth": ("y", "o", "n")}
 
-_Step = Callable[..., tuple[float, float, float, float, float, float]]
+_Step = Callable[..., tuple[float, ...]]
 _Acceleration = Callable[..., tuple[float, float, float]]
 
 
 class OneRRR:
-    """The integrator of one arm that nothing moves but rigid body, friction and loads of single joints; used as `RungeKutta` is."""
+    """The integrator of one arm that nothing moves but rigid body, friction and loads of single joints, some of which remember one
+    number; used as `RungeKutta` is."""
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
         """`plant` as `fits` it; `steps` of equal size make one control sample."""
-        self.step = _compiled(plant, sample_time / steps)  # of (q1, q2, q3, v1, v2, v3, u1, u2, u3): the first six after it
+        self.step = _compiled(plant, sample_time / steps)  # of (q1, q2, q3, v1, v2, v3, memories, u1, u2, u3): all but u after it
         self._steps = steps
 
     @staticmethod
@@ -114,22 +121,39 @@ class OneRRR:
         return plant.plain and isinstance(plant.body, RRR) and plant.p.size == 15
 
     def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:
-        """Move `state` (6, 1) on by one sample, in place; there are no memories, and nothing depends on time."""
+        """Move `state` (6, 1) on by one sample, in place, and return the memories' new states; nothing depends on time."""
         del t
-        step, now, torque = self.step, state[:, 0].tolist(), command[:, 0].tolist()
+        step, torque = self.step, command[:, 0].tolist()
+        now: tuple[float, ...] = (*state[:, 0].tolist(), *states[0].tolist())
         try:
             for _ in range(self._steps):
                 now = step(*now, *torque)
         except (ValueError, OverflowError):  # of an infinite number there is no sine
-            now = [nan] * len(now)
-        state[:, 0] = now
-        return states
+            now = (nan,) * len(now)
+        state[:, 0] = now[:6]
+        return np.array([now[6:]])
 
 
 def _compiled(plant: Plant, h: float) -> _Step:
-    """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, u1, u2, u3) -> the first six after it."""
-    step: _Step = _written(_STEP, plant, h=repr(h), half=repr(0.5 * h), sixth=repr(h / 6.0))["step"]
+    """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, memories, u1, u2, u3) -> all but u after it."""
+    lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
+    joints = [joint for joint, _ in plant.own_memories]
+    step: _Step = _written(_STEP, plant, joints, **lengths, **_memories(joints, **lengths))["step"]
     return step
+
+
+def _memories(joints: Sequence[int], h: str, half: str, sixth: str) -> dict[str, str]:
+    """What becomes of the memory b of each load at `joints` (0-based), and its rate r, from stage to stage."""
+    numbered = list(enumerate(joints))
+
+    def stage(letter: str, speed: str, length: str = "", before: str = "") -> str:
+        moved = [f"    b{k}{letter} = b{k}k + {length} * r{k}{before}" for k, _ in numbered] if before else []
+        return "\n".join([*moved, *(f"    r{k}{letter} = rate{k}(b{k}{letter}, {speed}{joint + 1})" for k, joint in numbered)])
+
+    return {"memories": "".join(f"b{k}k, " for k, _ in numbered), "begin": stage("k", "v"),
+            "after_first": stage("l", "w", half, "k"), "after_second": stage("m", "z", half, "l"),
+            "after_third": stage("n", "o", h, "m"),
+            "remembered": "".join(f", b{k}k + {sixth} * (r{k}k + 2.0 * (r{k}l + r{k}m) + r{k}n)" for k, _ in numbered)}
 
 
 def acceleration_of(plant: Plant) -> _Acceleration:
@@ -138,13 +162,16 @@ def acceleration_of(plant: Plant) -> _Acceleration:
     return found
 
 
-def _written(text: str, plant: Plant, **more: str) -> dict[str, Any]:
-    """What `text` defines, compiled with the arm's numbers in it."""
+def _written(text: str, plant: Plant, remembering: Sequence[int] = (), **more: str) -> dict[str, Any]:
+    """What `text` defines, compiled with the arm's numbers in it; `remembering`: joints (0-based) of its memories."""
     numbers = _numbers(plant)
-    stages = {name: _ACCELERATION.format(**numbers, **_names(plant, *letters)) for name, letters in _STAGES.items()}
-    loads = tuple(load for _, load in plant.own_loads)
-    unpacked = f"    {', '.join(f'load{k}' for k in range(len(loads)))}, = loads" if loads else ""
-    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, "loads": loads}
+    stages = {name: _ACCELERATION.format(**numbers, **_names(plant, remembering, *letters)) for name, letters in _STAGES.items()}
+    memories = [memory for _, memory in plant.own_memories]
+    called = {"load": tuple(load for _, load in plant.own_loads), "rate": tuple(one.rate for one in memories),
+              "bend": tuple(one.load for one in memories)}
+    lines = (f"    {', '.join(f'{name}{k}' for k in range(len(own)))}, = {name}s" for name, own in called.items() if own)
+    unpacked = "\n".join(lines)
+    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh} | {f"{name}s": own for name, own in called.items()}
     exec(_code(text.format(**stages, unpacked=unpacked, **more)), scope)
     return scope
 
@@ -167,7 +194,7 @@ def _numbers(plant: Plant) -> dict[str, str]:
     return {name: f"({value!r})" for name, value in values.items()} | offsets
 
 
-def _names(plant: Plant, position: str, speed: str, slope: str) -> dict[str, str]:
+def _names(plant: Plant, remembering: Sequence[int], position: str, speed: str, slope: str) -> dict[str, str]:
     """The variables of one stage, and friction with the loads of single joints as text over them."""
     loads = [joint for joint, _ in plant.own_loads]
     names = {f"{kind}{k}": f"{letter}{k}" for kind, letter in (("q", position), ("v", speed), ("a", slope)) for k in (1, 2, 3)}
@@ -177,5 +204,6 @@ def _names(plant: Plant, position: str, speed: str, slope: str) -> dict[str, str
         sigmoids = zip(curves.heights[:, j].tolist(), curves.sharpnesses[:, j].tolist(), strict=True)
         terms = [f"({curves.viscous[j].item()!r}) * {v}", *(f"({f!r}) * tanh({w!r} * {v})" for f, w in sigmoids if f)]
         terms += [f"load{k}({position}{j + 1}, {v})" for k, joint in enumerate(loads) if joint == j]
+        terms += [f"bend{k}(b{k}{slope}, r{k}{slope})" for k, joint in enumerate(remembering) if joint == j]
         names[f"friction{j + 1}"] = " + ".join([*terms, repr(curves.constant[j].item())] if curves.constant[j] else terms)
     return names

@@ -16,8 +16,8 @@ from typing import cast
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.model.arm import Arm
-from pipelines.model.effects.base import ArmModel, Hooks, OwnLoad
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects.base import ArmModel, Hooks, OwnLoad, OwnMemory
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.rrr import RRR
@@ -66,7 +66,7 @@ class Plant:
             if any((own.load, own.actuator, own.sensor, own.settled, own.states)):
                 load = None if own.actuator or own.states else acting.effect.own_load(acting.values)
                 alone = None if load is None or acting.effect.joint is None else (acting.effect.joint - 1, load)
-                hooks.append(replace(own, alone=alone))
+                hooks.append(replace(own, alone=alone, remembering=_remembering(acting, own)))
         parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
         return cls(acting_on.body, parameters, added, stacked(curves, arm.n_joints), tuple(hooks), arm.nominal.torque,
                    tuple(records))
@@ -84,12 +84,17 @@ class Plant:
     @property
     def plain(self) -> bool:
         """Whether nothing moves it but rigid body, friction, and loads of single joints: no hook has to be asked on the way."""
-        return all(hook.alone is not None or not any((hook.load, hook.actuator, hook.states)) for hook in self.hooks)
+        return all(hook.alone or hook.remembering or not any((hook.load, hook.actuator, hook.states)) for hook in self.hooks)
 
     @property
     def own_loads(self) -> tuple[tuple[int, OwnLoad], ...]:
         """Loads that follow from angle and speed of one joint (0-based) alone."""
         return tuple(hook.alone for hook in self.hooks if hook.alone is not None)
+
+    @property
+    def own_memories(self) -> tuple[tuple[int, OwnMemory], ...]:
+        """The same of loads that remember one number, in the order of the states."""
+        return tuple(hook.remembering for hook in self.hooks if hook.remembering is not None)
 
     def refuse_unphysical(self, q: Array) -> None:
         """Look at the inertia matrix in the postures q (postures, joints).
@@ -108,6 +113,14 @@ class Plant:
 
     def prepared(self, replicas: int) -> MovingPlant:
         return MovingPlant(self, replicas)
+
+
+def _remembering(acting: Acting, own: Hooks) -> tuple[int, OwnMemory] | None:
+    """What `acting` remembers in plain numbers, if its hooks are a load and the rate of one state."""
+    if own.states != 1 or any((own.actuator, own.sensor, own.settled, own.start, own.update)) or acting.effect.joint is None:
+        return None
+    memory = acting.effect.own_memory(acting.values)
+    return None if memory is None else (acting.effect.joint - 1, memory)
 
 
 def _changed(p: Array, nominal: Array, true: Array) -> Array:

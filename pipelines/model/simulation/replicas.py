@@ -153,7 +153,8 @@ class _Lane:
         for r, seed in enumerate(seeds):
             pieces = _pieces(self._noise, (seed,), experiment.n_samples)
             own = None if pieces is None else (piece[..., 0] for piece in pieces)
-            ran = loop.run(self.state[:, r], own, lambda now, k: _refuse_runaway(now[:, None], k, experiment.sample_time))
+            start = np.concatenate([self.state[:, r], self.states[r]])
+            ran = loop.run(start, own, lambda now, k: _refuse_runaway(now[:, None], k, experiment.sample_time))
             self._motion[..., r], self._counted[..., r], self._commanded[..., r] = ran
 
     def simulated(self, steps: int) -> Simulated:

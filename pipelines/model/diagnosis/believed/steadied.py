@@ -10,9 +10,12 @@ the extended model is, hangs on numbers that held-out motion does not stray from
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from pipelines.log.shared_work import shared_out
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
+from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.search import Found, Step
 
@@ -25,22 +28,31 @@ def steadied(found: Found, case: Case) -> tuple[Found, Case]:
     if case.data.cleared is not None:
         return found, case
     there = replace(case, data=replace(case.data, steady=True), judge=case.judge and replace(case.judge, steady=True))
-    done: dict[int, Refined] = {}
-
-    def again(one: Refined) -> Refined:
-        if id(one) not in done:
-            done[id(one)] = refine(one.model, there.data, one.weight)
-        return done[id(one)]
+    again = _refitted(_models(found), there.data)
 
     def step(one: Step) -> Step:
         if one.best is None:
-            return replace(one, before=again(one.before))
-        best = replace(one.best, done=again(one.best.done))
-        rivals = tuple(best if rival is one.best else replace(rival, done=again(rival.done)) for rival in one.rivals)
-        return replace(one, before=again(one.before), best=best, rivals=rivals)
+            return replace(one, before=again[id(one.before)])
+        best = replace(one.best, done=again[id(one.best.done)])
+        rivals = tuple(best if rival is one.best else replace(rival, done=again[id(rival.done)]) for rival in one.rivals)
+        return replace(one, before=again[id(one.before)], best=best, rivals=rivals)
 
-    nominal, final = again(found.nominal), again(found.final)
+    nominal, final = again[id(found.nominal)], again[id(found.final)]
     return replace(found, nominal=nominal, final=final, steps=tuple(map(step, found.steps))), there
+
+
+def _models(found: Found) -> list[Refined]:
+    """Every one that was accepted, or is a rival of such."""
+    tried = (one.done for step in found.steps if step.best is not None for one in (step.best, *step.rivals))
+    every = (found.nominal, *(step.before for step in found.steps), found.final, *tried)
+    return list({id(one): one for one in every}.values())
+
+
+def _refitted(models: Sequence[Refined], data: Data) -> dict[int, Refined]:
+    """Each, by its id, refitted to `data`, by two processes."""
+    _ = data.ripple, data.y  # once, before there are two
+    found = shared_out(lambda one: refine(one.model, data, one.weight).lean, models)
+    return {id(one): lean.with_rows(data, one.model) for one, lean in zip(models, found, strict=True)}
 
 
 def steady(done: Refined) -> Refined:

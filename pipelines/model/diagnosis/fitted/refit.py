@@ -70,6 +70,16 @@ class Refined:
         return self.data.rms(self.left)
 
     @property
+    def lean(self) -> Refined:
+        """Without its rows and what was worked out of them: what another process need not send."""
+        return replace(self, data=Data(()), model=replace(self.model))
+
+    def with_rows(self, data: Data, like: Exact) -> Refined:
+        """A `lean` one with its rows, and with the rigid body and what stands beside every model, those of `like`."""
+        columns = replace(self.model.columns, body=like.columns.body, arm=like.columns.arm)
+        return replace(self, data=data, model=replace(self.model, columns=columns, standing=like.standing))
+
+    @property
     def of_effects(self) -> Array:
         """(rows,) [N m] what all effects together do to the torque."""
         return np.asarray(self.model.torque(self.data) - replace(self.model, effects=()).torque(self.data))

@@ -20,7 +20,7 @@ from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.screened.screen import Screened
 from pipelines.model.diagnosis.searched.case import Case, HeldOut
 from pipelines.model.diagnosis.searched.gate import Gate
-from pipelines.model.diagnosis.searched.hypotheses import best_form, fitted
+from pipelines.model.diagnosis.searched.hypotheses import best_form, each_fitted
 from pipelines.model.diagnosis.searched.ledger import Tried
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 
@@ -46,7 +46,7 @@ def better_than(best: Tried, case: Case, now: Refined, screened: Sequence[Screen
     if not more:
         return None
     error = HeldOut.of(now, case)
-    tried = [fitted(case, now, one, error) for one in sorted(more, key=lambda one: -gains[id(one)])[:_ASKED]]
+    tried = each_fitted(case, now, sorted(more, key=lambda one: -gains[id(one)])[:_ASKED], error)
     better = [one for one in tried if one.possible and _decidedly(one, best, case, now, error.weight)]
     return best_form(case, now, min(better, key=lambda one: one.rank), error) if better else None
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.fitted.linear import solved
 from pipelines.model.diagnosis.fitted.nominal import Fit
@@ -21,13 +22,19 @@ from pipelines.model.diagnosis.searched.ledger import Tried
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.effects.base import Effect
 
-__all__ = ["apart_from", "best_form", "fitted", "laid_whole", "plainer"]
+__all__ = ["apart_from", "best_form", "each_fitted", "fitted", "laid_whole", "plainer"]
 
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less, and a cause in a shape that is not the best
 _NEARLY = 0.95  # of what the best shape explains
 _MOST, _OTHERS = 0.5, 3  # of what a joint leaves, that a cause has to take to be asked in other shapes; how many these are
 _TELLS = 3.0  # standard deviations of a further number
 _ROUNDING = 1e-12  # of the largest variance, each number in its own deviations
+
+
+def each_fitted(case: Case, now: Refined, several: Sequence[Screened], error: HeldOut) -> list[Tried]:
+    """Each of several causes, by two processes."""
+    found = shared_out(lambda one: fitted(case, now, one, error).lean, several)
+    return [tried.whole(one, now) for one, tried in zip(several, found, strict=True)]
 
 
 def fitted(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried:
@@ -166,8 +173,10 @@ def best_form(case: Case, now: Refined, best: Tried, error: HeldOut) -> Tried:
     if best.log is not None:
         return best
     chosen, least = best, _left_at(case, best)
-    for form in best.effect.forms():
-        other = replace(_refitted(case, now, best.screened, form, error), sure=best.sure)
+    forms = best.effect.forms()
+    tried = shared_out(lambda form: _refitted(case, now, best.screened, form, error).lean, forms)
+    for form, lean in zip(forms, tried, strict=True):
+        other = replace(lean.whole(best.screened, now), sure=best.sure)
         further = chosen is best or _count(other) > _count(chosen)
         if other.error < 1.0 and other.possible and (left := _left_at(case, other)) < (form.decided if further else 1.0) * least:
             chosen, least = other, left

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +46,15 @@ class Tried:
     def possible(self) -> bool:
         """Whether the cause's numbers lie in their ranges, and the logs could be of an arm with them."""
         return self.believable and self.of_size and self.done.model.effects[-1].possible
+
+    @property
+    def lean(self) -> Tried:
+        """Without what is there anyway: what another process need not send."""
+        return replace(self, screened=self.screened.lean, done=self.done.lean)
+
+    def whole(self, screened: Screened, before: Refined) -> Tried:
+        """A `lean` one with what it was fitted to, and beside."""
+        return replace(self, screened=screened, done=self.done.with_rows(before.data, before.model))
 
 
 def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],

@@ -28,7 +28,7 @@ from pipelines.model.diagnosis.searched.case import Case, HeldOut, held_out
 from pipelines.model.diagnosis.searched.curves import with_curves_anew
 from pipelines.model.diagnosis.searched.elsewhere import at_its_joint
 from pipelines.model.diagnosis.searched.gate import CLOSE, Gate, gate_of, once_more
-from pipelines.model.diagnosis.searched.hypotheses import best_form, fitted, laid_whole, plainer
+from pipelines.model.diagnosis.searched.hypotheses import best_form, each_fitted, laid_whole, plainer
 from pipelines.model.diagnosis.searched.ledger import Tried, ledger
 from pipelines.model.diagnosis.searched.parsimony import PARSIMONY, different, fewest
 from pipelines.model.diagnosis.searched.unnameable import unnameable
@@ -225,7 +225,9 @@ def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Se
     great = _great(case, now, screened, wanted)
     error = HeldOut.of(now, case) if great else HeldOut(np.nan, now.weight)
     done = {id(one.screened): one for one in there}
-    tried = [done.get(id(one)) or fitted(case, now, one, error) for one in great]
+    asked = [one for one in great if id(one) not in done]
+    done |= {id(one.screened): one for one in each_fitted(case, now, asked, error)}
+    tried = [done[id(one)] for one in great]
     best = fewest(sorted(tried, key=lambda one: one.rank))
     plain = None if best is None else plainer(case, now, tried, best, error)
     if plain is not None:

@@ -1,0 +1,120 @@
+"""Friction that remembers one number, on one arm without arrays: it moves as among many replicas, which take arrays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Controller
+from pipelines.model.arm import Acting
+from pipelines.model.effects.presliding import Presliding
+from pipelines.model.effects.spring import Spring
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.simulation import Noise, Plant, run
+from pipelines.model.simulation.integrate import RungeKutta
+from pipelines.model.simulation.one_hooked import OneHooked
+from pipelines.model.simulation.one_loop import OneLoop
+from pipelines.model.simulation.one_rrr import OneRRR
+from tests.model.simulation.arms import KD, KP, TS, experiment, rrr
+
+SAMPLES, MANY = 400, 9  # more replicas than are run one after the other
+LAWS = {
+    "Dahl": Presliding(joint=2, distance=0.01),
+    "LuGre": Presliding(joint=2, distance=0.01, damping_time=0.004),
+    "bends first": Presliding(joint=3, distance=0.02, elastic=0.5),
+    "Dahl's exponent": Presliding(joint=1, distance=0.01, elastic=-0.4, exponent=0.7),
+    "breakaway": Presliding(joint=2, distance=0.005, breakaway=0.6, breakaway_speed=0.2, damping_time=0.001),
+}
+SLIPS = Presliding(joint=2, distance=0.01, elastic=0.2, exponent=0.8, inner_loops=1.0)
+
+
+def acting(law: Presliding, amplitude: float = 2.0) -> Acting:
+    return Acting.of(law, law.values([amplitude]))
+
+
+def plant(*more: Acting) -> Plant:
+    return Plant.of(rrr().arm.extended(*more))
+
+
+def both(arm: Plant) -> tuple[Array, Array]:
+    """(samples, joints) [rad] of one replica by itself, and of the same among many."""
+    asked = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
+    noise = Noise(np.array([0.3, 0.2, 0.1]), np.array([1e-6, 2e-6, 3e-6]))
+    return run(arm, asked, 4, noise, (7,)).true_q[0], run(arm, asked, 4, noise, (7, *range(MANY))).true_q[0]
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_alone_and_among_many(name: str) -> None:
+    """In a loop in plain numbers, to rounding; and it does move otherwise than an arm without it."""
+    arm = plant(acting(LAWS[name]))
+    assert [joint for joint, _ in arm.own_memories] == [(LAWS[name].joint or 0) - 1]
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+    assert np.abs(alone - both(plant())[0]).max() > 1e-4
+
+
+def test_several_memories_beside_a_load_without() -> None:
+    """Each at its own joint, two at one, in the order of their states."""
+    spring = Spring(joint=3)
+    values = {q.name: 3.0 if q.name == "stiffness" else 0.0 for q in spring.parameters if q.unsaid is None}
+    arm = plant(acting(LAWS["breakaway"]), Acting.of(spring, values), acting(LAWS["bends first"], 0.7), acting(LAWS["LuGre"], 1.1))
+    assert len(arm.own_memories) == 3
+    assert OneRRR.fits(arm)
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+
+
+def test_the_integrator_moves_memories_as_runge_kutta_does() -> None:
+    """One sample after the other, outside a loop: angles, speeds and memories."""
+    arm = plant(acting(LAWS["LuGre"]), acting(LAWS["breakaway"]))
+    ours, theirs = OneRRR(arm, TS, 3), RungeKutta(arm.prepared(2), TS, 3)
+    state, states = np.array([[0.1], [-1.0], [0.4], [0.0], [0.2], [-0.1]]), np.zeros((1, 2))
+    other, others, seen = np.repeat(state, 2, axis=1), np.zeros((2, 2)), []
+    for k in range(300):
+        torque = np.array([[3.0], [8.0], [2.0]]) * np.sin(0.03 * k + np.arange(3.0)[:, None])
+        states = ours.advance(np.array([TS * k]), state, states, torque)
+        others = theirs.advance(np.full(2, TS * k), other, others, np.repeat(torque, 2, axis=1))
+        seen.append(states[0])
+    np.testing.assert_allclose(state[:, 0], other[:, 1], rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(states[0], others[1], rtol=0.0, atol=1e-10)
+    assert np.ptp(seen, axis=0).min() > 1.0  # they bent to one side, and to the other
+
+
+def test_what_remembers_more_numbers_takes_arrays() -> None:
+    """Elements that slip one after the other are no single number; the arm moves all the same, and beside what is one."""
+    arm = plant(acting(SLIPS), acting(LAWS["Dahl"]))
+    assert len(arm.own_memories) == 1
+    assert not OneRRR.fits(arm)
+    assert OneHooked.fits(arm)
+    asked = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
+    assert not OneLoop.fits(arm, asked)
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_rate_of_a_number_is_that_of_an_array(name: str) -> None:
+    """Also beyond where it slides, where a step went too far, and at rest."""
+    law = LAWS[name]
+    hooks, memory = law.simulate(rrr().arm, law.values([2.0])), law.own_memory(law.values([2.0]))
+    assert memory is not None
+    assert hooks.rate is not None
+    assert hooks.load is not None
+    rng = np.random.default_rng(3)
+    for v in (0.0, 1e-3, -1e-3, *rng.uniform(-2.0, 2.0, 20).tolist()):
+        for u in (0.0, 1.0, -1.0, 1.0 + 1e-9, -1.2, *rng.uniform(-1.1, 1.1, 10).tolist()):
+            still = rrr_motion(v, law.joint or 0)
+            rate = hooks.rate(still, np.zeros((1, 3)), np.array([[u]]))[0, 0]
+            assert memory.rate(u, v) == pytest.approx(rate, rel=1e-12, abs=1e-15)
+            load = hooks.load(still, np.array([[u]]))[0, (law.joint or 0) - 1]
+            assert memory.load(u, memory.rate(u, v)) == pytest.approx(load, rel=1e-12, abs=1e-15)
+
+
+def rrr_motion(speed: float, joint: int) -> Motion:
+    """One sample, in which joint number `joint` moves alone."""
+    moving = plant().prepared(1).motion(np.zeros(1), np.zeros((3, 1)), np.zeros((3, 1)))
+    dq = np.zeros((1, 3))
+    dq[0, joint - 1] = speed
+    return replace(moving, dq=dq)
