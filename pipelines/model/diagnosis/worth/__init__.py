@@ -5,5 +5,6 @@
     held_out        what a model leaves of rows that it was not fitted to
     extrapolated    what it may leave of other motion because its numbers are not known better
     gains           what a finding is worth: torque, simulated position, tip
+    closed_loop     arms moved by the controllers of logs
     simulated       measured over simulated, in closed loop
 """

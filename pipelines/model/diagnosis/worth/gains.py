@@ -24,13 +24,14 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.result import BeforeAfter, Gain, SimulatedSpan, TipError, TorqueGain
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.worth.closed_loop import Positions, in_loop, in_loops
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Plant, Windows, choose_step, simulate_together, simulate_windows
+from pipelines.model.simulation import Plant, Windows, simulate_windows
 
-__all__ = ["Simulation", "Strayed", "farther", "gain_of", "in_loop", "nearer", "simulation_errors", "surely_less", "torque_gain",
+__all__ = ["Simulation", "Strayed", "farther", "gain_of", "nearer", "simulation_errors", "surely_less", "torque_gain",
            "torque_gain_of", "worse_log"]
 
 Mask = npt.NDArray[np.bool_]
@@ -193,28 +194,14 @@ def _open(first: Simulation, last: Simulation) -> bool:
 
 def _each(arms: Sequence[Arm], motions: Motions, soft: bool, longest: float, *, closed: bool = True) -> list[Simulation]:
     """`soft`: something moves beside the joints of one of them; `longest` [s] of a log in a loop."""
-    return shared_out(partial(_if_possible, motions=motions, closed=closed, soft=soft, longest=longest), arms)
+    every = (in_loops(arms, motions, longest) if closed else
+             shared_out(partial(_in_windows, motions=motions, exact=_ROUGH if soft else _EXACT), arms))
+    return [Simulation.none(arm.n_joints) if pairs is None else _all(arm, motions, pairs, closed, longest)
+            for arm, pairs in zip(arms, every, strict=True)]
 
 
-def in_loop(arm: Arm, log: ExperimentLog) -> bool:
-    """Whether the log's controller is known, and the arm, where the log begins, has an inertia that can be moved."""
-    try:
-        Plant.of(arm).refuse_unphysical(Experiment.of_log(log).q_ref[:1])
-    except InputRejected:
-        return False
-    return True
-
-
-def _if_possible(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -> Simulation:
-    try:
-        return _all(arm, motions, closed, soft, longest)
-    except InputRejected:
-        return Simulation.none(arm.n_joints)
-
-
-def _all(arm: Arm, motions: Motions, closed: bool, soft: bool, longest: float) -> Simulation:
+def _all(arm: Arm, motions: Motions, pairs: Sequence[Positions], closed: bool, longest: float) -> Simulation:
     square, away, span = [], [], []
-    pairs = _closed(arm, motions, longest) if closed else _in_windows(arm, motions, _ROUGH if soft else _EXACT)
     for (q, seen, between), (log, _) in zip(pairs, motions, strict=True):
         known = np.isfinite(q + seen).all(axis=1)
         square.append(np.square(q[known] - seen[known]))
@@ -242,25 +229,16 @@ def _units(arm: Arm, q: Array) -> Array:
     return np.asarray(np.where(spread > _HELD, spread, np.inf))
 
 
-def _closed(arm: Arm, motions: Motions, seconds: float) -> list[tuple[Array, Array, float]]:
-    """Simulated and measured positions of each log (samples, joints) [rad], and the time between samples [s]."""
-    first = [_first(log, seconds) for log, _ in motions]
-    step = choose_step(Plant.of(arm), first[0])  # one controller and arm: what suffices for a log suffices for the next
-    done = simulate_together(arm, first, steps={one.sample_time: step for one in first})
-    return [(one.q[0], log.q[:one.q.shape[1]], log.sample_time) for one, (log, _) in zip(done, motions, strict=True)]
-
-
-def _first(log: ExperimentLog, seconds: float) -> Experiment:
-    experiment = Experiment.of_log(log)
-    return experiment.part(0, min(experiment.n_samples, round(seconds / log.sample_time)))
-
-
-def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[tuple[Array, Array, float]]:
-    """The same, driven by the logged torque; the steps that suffice for a log suffice for the next."""
+def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[Positions] | None:
+    """Positions of an arm that is driven by the logged torque, None where it runs away; the steps that suffice for a log suffice
+    for the next."""
     pairs, steps = [], dict[float, int]()
-    for log, found in motions:
-        q, seen, between, steps[log.sample_time] = _windowed(arm, log, found, exact, steps.get(log.sample_time))
-        pairs.append((q, seen, between))
+    try:
+        for log, found in motions:
+            q, seen, between, steps[log.sample_time] = _windowed(arm, log, found, exact, steps.get(log.sample_time))
+            pairs.append((q, seen, between))
+    except InputRejected:  # D15, D17
+        return None
     return pairs
 
 

@@ -20,7 +20,8 @@ from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.worth.gains import Simulation, in_loop
+from pipelines.model.diagnosis.worth.closed_loop import in_loop
+from pipelines.model.diagnosis.worth.gains import Simulation
 from pipelines.model.simulation import Experiment, simulate
 
 __all__ = ["Followed", "arms_of", "as_simulated", "followed_by", "with_simulation"]

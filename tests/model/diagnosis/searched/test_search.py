@@ -210,6 +210,17 @@ def test_what_does_not_pass_is_no_rival_of_what_does(waving: Case) -> None:
     assert [one.screened for one in first.rivals] == [small]
 
 
+class Alone(Tried):
+    """Fitted to nothing that another process could leave out."""
+
+    @property
+    def lean(self) -> Tried:
+        return self
+
+    def whole(self, *_: object) -> Tried:
+        return self
+
+
 @pytest.mark.parametrize("sure", [True, False])
 def test_another_law_of_a_cause_is_as_sure_of_it(sure: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A spring that was worth its number beside an offset is not given up for the offset when it turns out to harden."""
@@ -217,7 +228,7 @@ def test_another_law_of_a_cause_is_as_sure_of_it(sure: bool, monkeypatch: pytest
 
     def fit(effect: Any, certain: bool) -> Any:
         done: Any = SimpleNamespace(model=SimpleNamespace(effects=(SimpleNamespace(possible=True),)))
-        return Tried(cast(Any, None), effect, None, done, 0.5, 0.5, 0.1, certain)
+        return Alone(cast(Any, None), effect, None, done, 0.5, 0.5, 0.1, certain)
 
     straight = replace(line, degree=1, highest=5)
     monkeypatch.setattr(hypotheses, "_refitted", lambda case, now, one, effect, error: fit(effect, False))

@@ -204,7 +204,7 @@ def test_rows_of_a_joint_that_is_held_do_not_count() -> None:
     assert counted == {(0, 0): True, (0, 1): True, (0, 2): True, (1, 0): True, (1, 1): False, (1, 2): False}
 
 
-def test_a_slide_counts_by_its_own_travel_beside_a_joint_that_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slide_counts_by_its_own_travel_beside_a_joint_that_turns() -> None:
     """A slide that moves over five centimetres is 5 mm off, then half a millimetre; a wrist that turns over two radians is 20 mrad
     off, then 25: metres beside radians would tell of the wrist alone."""
     t = np.linspace(0.0, 10.0, 2000)
@@ -216,13 +216,11 @@ def test_a_slide_counts_by_its_own_travel_beside_a_joint_that_turns(monkeypatch:
         body = SimpleNamespace(tip=lambda q: q)
         for when, error in off.items():
             arm: Any = SimpleNamespace(n_joints=2, robot=SimpleNamespace(revolute=revolute), body=body)
-            monkeypatch.setattr(gains, "_closed", lambda *_, error=error: [(measured + error, measured, 5e-3)])
-            found[revolute, when] = gains._all(arm, [(log, Any)], True, False, 10.0)
+            found[revolute, when] = gains._all(arm, [(log, Any)], [(measured + error, measured, 5e-3)], True, 10.0)
     held = measured * np.array([1e-5, 1.0])  # a slide that is held is 20 um off, then 40: nobody asks it
     for when, error in (("held before", np.array([2e-5, 0.025])), ("held after", np.array([4e-5, 0.020]))):
-        monkeypatch.setattr(gains, "_closed", lambda *_, error=error: [(held + error, held, 5e-3)])
         arm = SimpleNamespace(n_joints=2, robot=SimpleNamespace(revolute=(False, True)), body=SimpleNamespace(tip=lambda q: q))
-        found[False, when] = gains._all(arm, [(log, Any)], True, False, 10.0)
+        found[False, when] = gains._all(arm, [(log, Any)], [(held + error, held, 5e-3)], True, 10.0)
     assert gains.nearer(found[False, "held before"], found[False, "held after"])
     slides, turns = (gains.nearer(found[kind, "before"], found[kind, "after"]) for kind in ((False, True), (True, True)))
     assert slides
