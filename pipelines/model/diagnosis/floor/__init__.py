@@ -3,6 +3,7 @@
     twin                the fitted model run through the same experiments, and analysed alike
     replay              what a log asks of an arm that is run in its place
     drive_noise         the noise of its drives
+    repeated            what repeats with the motion is none
     waves               waves along an angle are none
     motion_floor        what the arm in order would leave of other motion
     by_speed            and at speeds that the reference logs only pass

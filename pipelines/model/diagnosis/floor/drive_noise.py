@@ -5,7 +5,8 @@
 
 White noise is told by what is quick: as much as makes a replica as rough as the log in its quietest windows, where neither
 reversals nor any fault are. A replica without noise says what of it is counting of the encoders. A narrow low-pass leaves little
-that is quick; where a replica's noise is far from enough, the next has more.
+that is quick; where a replica's noise is far from enough, the next has more. Where a motion comes again, noise is what differs from
+one period to the next (`repeated`): the quick part of what repeats is none.
 
 Amplifiers wander too, below a few hertz, which is what a narrow low-pass leaves most of: as much as the log has more than the
 replica, and three quarters of the white noise at most, for slow is also what a fault without a name does. Of drives that wander
@@ -22,6 +23,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.shared_work import shared_out
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns, rows_of
+from pipelines.model.diagnosis.floor.repeated import unrepeated
 from pipelines.model.diagnosis.floor.replay import experiment_of
 from pipelines.model.diagnosis.floor.twin import imperfect, replica
 from pipelines.model.diagnosis.floor.waves import without_waves
@@ -39,6 +41,7 @@ _LEAST = 0.25  # of the guess's power: counting of the encoders hides what is le
 # to be short by a factor of 26.
 _REACH, _FARTHEST, _ROUNDS = 2.0, 10.0, 3
 _WANDER = 0.75  # of the white noise, at most
+_TOO_MUCH = 2.0  # times the power that differs from one period to the next: noise that has more is none
 _FEWEST = 4  # rows of a window
 _SMOOTH = 5  # rows of the moving average whose remainder is noise
 
@@ -84,7 +87,11 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     times = np.square(level / np.maximum(shaken.simulated, 1e-300))
     quick, most = still.power + times * (shaken.power - still.power), times * (shaken.wandering - shaken.power)
     power = _power(Data((own,)), mine.ravel())
-    return DriveNoise(level, _WANDER * level * np.sqrt(np.clip((power - quick) / np.maximum(most, 1e-300), 0.0, 1.0)))
+    slow = np.clip((power - quick) / np.maximum(most, 1e-300), 0.0, 1.0)
+    wander = _WANDER * level * np.sqrt(slow)
+    differs = unrepeated(data, left) / np.maximum(quick - still.power + slow * most, 1e-300)
+    share = np.sqrt(np.where(differs < 1.0 / _TOO_MUCH, differs, 1.0))
+    return DriveNoise(share * level, share * wander)
 
 
 def _share(rough: Array, still: _Replica, shaken: _Replica) -> Array:
