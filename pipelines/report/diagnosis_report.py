@@ -74,9 +74,11 @@ def _tone(result: Result) -> Tone:
 
 
 def _verdict(result: Result) -> str:
-    """One sentence, and by what it was judged where that is no log of its own; what to check stands in the first section."""
+    """One sentence; by what it was judged where that is no log of its own; what was not looked for. What to check stands in the
+    first section."""
     blocks = " Judged by blocks held out of the fitted logs, for none has role validate." if result.held_out == "blocks" else ""
-    return f"{_said(result)}{blocks}"
+    causes = ", ".join(within(title_of(cause)) for cause in result.without)
+    return f"{_said(result)}{blocks}{f' Not looked for, because you said so: {causes}.' if causes else ''}"
 
 
 def _said(result: Result) -> str:

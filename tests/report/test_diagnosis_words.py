@@ -251,3 +251,12 @@ def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
     for held_out in ("logs", "blocks"):
         page = diagnosis_report(Result(**(there | {"held_out": held_out})))
         assert ("Judged by blocks held out of the fitted logs" in page.verdict) is (held_out == "blocks")
+
+
+@pytest.mark.parametrize("verdict", ["cause", "nothing-wrong", "unknown"])
+def test_the_verdict_says_what_was_not_looked_for(verdict: str) -> None:
+    """Nothing wrong, but for what nobody looked for, is another answer."""
+    there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
+    page = diagnosis_report(Result(**(there | {"without": ("presliding", "stribeck")})))
+    assert page.verdict.endswith("Not looked for, because you said so: presliding, Stribeck friction.")
+    assert "looked for" not in diagnosis_report(Result(**there)).verdict
