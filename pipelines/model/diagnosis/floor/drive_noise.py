@@ -5,8 +5,8 @@
 
 White noise is told by what is quick: as much as makes a replica as rough as the log in its quietest windows, where neither
 reversals nor any fault are. A replica without noise says what of it is counting of the encoders. A narrow low-pass leaves little
-that is quick; where a replica's noise is far from enough, the next has more. Where a motion comes again, noise is what differs from
-one period to the next (`repeated`): the quick part of what repeats is none.
+that is quick; where a replica's noise is far from enough, the next has more. Where a motion comes again, noise has not many times
+the power of what differs from one period to the next (`repeated`): what repeats is none, however quick it is.
 
 Amplifiers wander too, below a few hertz, which is what a narrow low-pass leaves most of: as much as the log has more than the
 replica, and three quarters of the white noise at most, for slow is also what a fault without a name does. Of drives that wander
@@ -41,7 +41,9 @@ _LEAST = 0.25  # of the guess's power: counting of the encoders hides what is le
 # to be short by a factor of 26.
 _REACH, _FARTHEST, _ROUNDS = 2.0, 10.0, 3
 _WANDER = 0.75  # of the white noise, at most
-_TOO_MUCH = 2.0  # times the power that differs from one period to the next: noise that has more is none
+# Times the power that differs from one period to the next, that noise has at most: so much its wander may take of what repeats in
+# an arm in order too, a law of friction that is not its own say.
+_MOST = 6.0
 _FEWEST = 4  # rows of a window
 _SMOOTH = 5  # rows of the moving average whose remainder is noise
 
@@ -90,7 +92,7 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     slow = np.clip((power - quick) / np.maximum(most, 1e-300), 0.0, 1.0)
     wander = _WANDER * level * np.sqrt(slow)
     differs = unrepeated(data, left) / np.maximum(quick - still.power + slow * most, 1e-300)
-    share = np.sqrt(np.where(differs < 1.0 / _TOO_MUCH, differs, 1.0))
+    share = np.sqrt(np.fmin(_MOST * differs, 1.0))  # one where nothing is known of periods
     return DriveNoise(share * level, share * wander)
 
 
