@@ -239,8 +239,6 @@ def _basis(result: Result) -> Section:
     if result.replicas:
         text.append(f"The twin is the fitted model run {result.replicas} times through the same controllers, references, encoders "
                     f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")
-    if result.without:
-        text.append(f"Left out, because you said so: {', '.join(map(title_of, result.without))}.")
     best: dict[tuple[str, int | None], float] = {(one.cause, one.joint): one.gain for one in result.thresholds
                                                     if math.isfinite(one.gain)}
     rows = tuple((title_of(cause), joint, _reachable(gain)) for (cause, joint), gain in sorted(

@@ -60,6 +60,8 @@ from pipelines.model.effects.terms import (
     SpeedCurve,
     Values,
     friction_at,
+    predicted,
+    summed,
 )
 from pipelines.model.rigid.body import Array, Motion
 
@@ -234,7 +236,7 @@ class Effect(ABC):
 
     def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
         """Its torque (samples, joints) [N m]."""
-        return _summed(self.at(values).columns(motion, arm), self.amplitudes(values))
+        return summed(self.at(values).columns(motion, arm), self.amplitudes(values))
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """Its torque (samples,) [N m] on its own joint against speed alone, at rest otherwise: the friction curve."""
@@ -254,7 +256,7 @@ class Effect(ABC):
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """How it enters the forward simulation; by default as a load."""
         shaped, amplitudes = self.at(values), self.amplitudes(values)
-        return Hooks(load=lambda motion, _: _summed(shaped.columns(motion, arm), amplitudes))
+        return Hooks(load=lambda motion, _: summed(shaped.columns(motion, arm), amplitudes))
 
     def speed_curve(self, values: Values) -> SpeedCurve | None:
         """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
@@ -274,7 +276,7 @@ class Effect(ABC):
 
     def predicted(self, motion: Motion, arm: ArmModel) -> Array:
         """`arm.torque(motion)`, kept from one effect and shape to the next; not to be written to."""
-        return _predicted(arm, motion)
+        return predicted(arm, motion)
 
     def sharpnesses(self, motion: Motion, count: int) -> list[float]:
         """[s/rad] largest first: a geometric grid between the slowest and the fastest speeds that this motion holds."""
@@ -304,27 +306,3 @@ class Effect(ABC):
         if self.joint is None:
             raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
         return self.joint - 1
-
-
-def _summed(columns: Array, amplitudes: Array) -> Array:
-    """`columns` (samples, joints, k) times `amplitudes` (k,); of samples that lie side by side a matrix product takes twenty times
-    as long."""
-    if not len(amplitudes):
-        return np.zeros(columns.shape[:-1])
-    return np.asarray(sum(amplitude * columns[..., k] for k, amplitude in enumerate(amplitudes.tolist())))
-
-
-_KEPT: list[tuple[ArmModel, Motion, Array]] = []  # the last few, newest first; compared by identity, for a motion is its arrays
-_KEEP = 6
-
-
-def _predicted(arm: ArmModel, motion: Motion) -> Array:
-    for place, (other, same, torque) in enumerate(_KEPT):
-        if other is arm and same is motion:
-            _KEPT.insert(0, _KEPT.pop(place))
-            return torque
-    torque = arm.torque(motion)
-    torque.flags.writeable = False
-    _KEPT.insert(0, (arm, motion, torque))
-    del _KEPT[_KEEP:]
-    return torque

@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, OwnMemory, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.bristles import ONE, Breaking, Bristles, Slips, sliding_level
 
 __all__ = ["Presliding"]
 
 _HALFWAY = 0.0  # elastic share from which a refit finds Dahl's -1 as well as Dupont's 0.5
 _OTHER = 0.8  # exponent from which a refit finds others than 1
-_ONE = 1e-6  # from an exponent of 1, within which it is 1
-_SLIDES = 1e-12  # of the largest bending
-_LEAST = 0.05  # exponent of elements: below, all slip as one
-_SLIPS = 12  # elements that slip one after the other
 _BREAKAWAY = 0.3  # from which a refit finds others, and none
 _STRIBECK = 0.1  # of the fastest speed: where it looks for the speed over which friction falls
-_FAST = 20.0  # times that speed: nothing of a breakaway is left
-_SIDE_BY_SIDE = 256  # stretches of a motion
 
 
 @dataclass(frozen=True)
@@ -116,7 +110,7 @@ class Presliding(Effect):
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """What is left of it at constant speed: Coulomb friction, and its breakaway."""
         shaped = self.at(values)
-        return np.asarray(values["amplitude"] * np.sign(dq) * _level(dq, shaped.breakaway, shaped.breakaway_speed))
+        return np.asarray(values["amplitude"] * np.sign(dq) * sliding_level(dq, shaped.breakaway, shaped.breakaway_speed))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         shaped, amplitude = self.at(values), values["amplitude"]
@@ -136,16 +130,16 @@ class Presliding(Effect):
     def own_memory(self, values: Values) -> OwnMemory | None:
         shaped, amplitude = self.at(values), values["amplitude"]
         contact, unit, time = shaped._contact, shaped._unit, shaped.damping_time
-        if isinstance(contact, _Slips):
+        if isinstance(contact, Slips):
             return None
         rate = contact.number_rate()
         return OwnMemory(lambda u, v: rate(u, v / unit), lambda u, du: amplitude * (u + time * du))
 
     @property
-    def _contact(self) -> _Bristles | _Slips | _Breaking:
+    def _contact(self) -> Bristles | Slips | Breaking:
         if self.breakaway:
-            return _Breaking(self.breakaway, self.breakaway_speed / self._unit)
-        return _Slips(self.elastic, self.exponent) if self.inner_loops else _Bristles(self.elastic, self.exponent)
+            return Breaking(self.breakaway, self.breakaway_speed / self._unit)
+        return Slips(self.elastic, self.exponent) if self.inner_loops else Bristles(self.elastic, self.exponent)
 
     @property
     def _unit(self) -> float:
@@ -153,174 +147,5 @@ class Presliding(Effect):
         if self.breakaway:
             return self.distance
         e, n = self.elastic, self.exponent
-        one = (1.0 - e) * math.log(1.0 - e) if abs(n - 1.0) < _ONE else ((1.0 - e) - (1.0 - e) ** n) / (1.0 - n)
+        one = (1.0 - e) * math.log(1.0 - e) if abs(n - 1.0) < ONE else ((1.0 - e) - (1.0 - e) ** n) / (1.0 - n)
         return self.distance * math.log(2.0) / (1.0 if e >= 0.0 else 1.0 + e + one)
-
-
-@dataclass(frozen=True)
-class _Bristles:
-    """One state u. Positions and speeds are in units of d."""
-
-    elastic: float
-    exponent: float
-    states = 1
-
-    def along(self, q: Array, v: Array) -> Array:
-        """(samples, states), relaxed at the start; exact between the samples where they keep direction."""
-        begin, side, which, travel = _strokes(q)
-        at, first = 0.0, np.empty(len(begin))
-        for k, (s, x) in enumerate(zip(side.tolist(), travel.tolist(), strict=True)):
-            first[k] = s * at
-            at = s * self._after(s * at, x)
-        room, rest = np.maximum(self.elastic - first, 0.0), np.maximum(1.0 - np.maximum(self.elastic, first), _SLIDES)
-        x = np.abs(q - q[begin[which]])
-        rest = self._rest(rest[which], np.maximum(x - room[which], 0.0))
-        bends = x < room[which]
-        return np.asarray(side[which] * np.where(bends, first[which] + x, 1.0 - rest))[:, None]
-
-    def _after(self, y: float, x: float) -> float:
-        room = max(self.elastic - y, 0.0)
-        return y + x if x < room else float(1.0 - self._rest(max(1.0 - max(y, self.elastic), _SLIDES), x - room))
-
-    def _rest(self, rest: Any, x: Any) -> Any:
-        """1 - y after sliding by `x`, a number or an array, from where it was `rest`."""
-        n, e = self.exponent, self.elastic
-        if abs(n - 1.0) < _ONE:
-            return rest * (math.exp(-x / (1.0 - e)) if isinstance(x, float) else np.exp(-x / (1.0 - e)))
-        power = rest ** (1.0 - n) - (1.0 - n) * x / (1.0 - e) ** n
-        return (max(power, 0.0) if isinstance(x, float) else np.maximum(power, 0.0)) ** (1.0 / (1.0 - n))
-
-    def rate(self, states: Array, v: Array) -> Array:
-        y = np.sign(v) * states[:, 0]
-        slides = (np.maximum(1.0 - y, _SLIDES) / (1.0 - self.elastic)) ** self.exponent
-        return np.asarray(v * np.where(y < self.elastic, 1.0, np.where(y < 1.0, slides, 1.0 - y)))[:, None]
-
-    def number_rate(self) -> Callable[[float, float], float]:
-        """`rate` of numbers."""
-        e, n, straight = self.elastic, self.exponent, self.exponent == 1.0
-
-        def rate(u: float, v: float) -> float:
-            y = u if v > 0.0 else -u
-            if y < e:
-                return v
-            if y >= 1.0:
-                return v * (1.0 - y)
-            slides = max(1.0 - y, _SLIDES) / (1.0 - e)
-            return v * slides if straight else float(v * slides**n)
-
-        return rate
-
-    def bent(self, states: Array) -> Array:
-        return np.asarray(states[:, 0])
-
-
-@dataclass(frozen=True)
-class _Slips:
-    """u = Σ w_i z_i, one state z_i an element.
-
-    y(x) = -1 + 2 Σ w_i min(x/X_i, 1) has the curvature of the bristles' y(x) if w(X) dX = -½ X y″(X) dX = ½ X dg, where the slope
-    g = y' falls from 1 to 0 along X = 1 + e + (1 - e)(1 - g^(1/n - 1))/(1 - n): one element for each of equal parts of g, at
-    their means of X.
-    """
-
-    elastic: float
-    exponent: float
-    states = _SLIPS
-
-    @property
-    def _travels(self) -> Array:
-        """X: from a reversal while sliding until it slides again."""
-        g, n = np.linspace(1.0, 0.0, _SLIPS + 1), max(self.exponent, _LEAST)
-        if abs(n - 1.0) < _ONE:
-            mean = -_SLIPS * np.diff(g * (1.0 - np.log(np.maximum(g, _SLIDES))))
-        else:
-            mean = (1.0 + _SLIPS * n * np.diff(g ** (1.0 / n))) / (1.0 - n)
-        return np.asarray(1.0 + self.elastic + (1.0 - self.elastic) * mean)
-
-    def along(self, q: Array, v: Array) -> Array:
-        """(samples, states), relaxed at the start; exact between the samples where they keep direction."""
-        begin, side, which, travel = _strokes(q)
-        half = 0.5 * self._travels
-        at, first = np.zeros(_SLIPS), np.empty((len(begin), _SLIPS))
-        steps = (side * travel)[:, None] / half
-        for k, step in enumerate(steps):
-            first[k] = at
-            at = np.minimum(np.maximum(at + step, -1.0), 1.0)
-        return np.asarray(np.clip(first[which] + (q - q[begin[which]])[:, None] / half, -1.0, 1.0))
-
-    @property
-    def _weights(self) -> Array:
-        return 0.5 * self._travels / _SLIPS
-
-    def rate(self, states: Array, v: Array) -> Array:
-        """What a step went too far comes back with travel."""
-        s = np.sign(v)[:, None]
-        return np.asarray(np.abs(v)[:, None] * np.where(s * states < 1.0, s, s - states) * 2.0 / self._travels)
-
-    def bent(self, states: Array) -> Array:
-        return np.asarray(states @ self._weights)
-
-
-@dataclass(frozen=True)
-class _Breaking:
-    """One state u. It slides at the less the faster it goes, and forgets over a travel that hangs on the speed."""
-
-    breakaway: float
-    speed: float
-    states = 1
-
-    def along(self, q: Array, v: Array) -> Array:
-        """(samples, states), relaxed at the start; exact between the samples where they keep speed and direction."""
-        step = np.diff(q)
-        level = _level(0.5 * (v[1:] + v[:-1]), self.breakaway, self.speed)
-        kept = np.exp(-np.abs(step) / level)
-        return _recursion(kept, np.sign(step) * level * (1.0 - kept))[:, None]
-
-    def rate(self, states: Array, v: Array) -> Array:
-        return np.asarray(v * (1.0 - np.sign(v) * states[:, 0] / _level(v, self.breakaway, self.speed)))[:, None]
-
-    def number_rate(self) -> Callable[[float, float], float]:
-        """`rate` of numbers."""
-        more, slow, fast, exp = self.breakaway, self.speed, _FAST * self.speed, math.exp
-
-        def rate(u: float, v: float) -> float:
-            y = u if v > 0.0 else -u
-            return v * (1.0 - y / (1.0 + more * exp(-(min(abs(v), fast) / slow) ** 2)))
-
-        return rate
-
-    def bent(self, states: Array) -> Array:
-        return np.asarray(states[:, 0])
-
-
-def _level(v: Array, breakaway: float, speed: float) -> Array:
-    """h(v)"""
-    return np.asarray(1.0 + breakaway * np.exp(-np.square(np.minimum(np.abs(v), _FAST * speed) / speed)))
-
-
-def _recursion(kept: Array, added: Array) -> Array:
-    """(steps + 1,) x_(k+1) = kept_k x_k + added_k from 0, worked out in many stretches side by side that are then joined."""
-    long = max(1, -(-len(kept) // _SIDE_BY_SIDE))
-    a, b = np.ones(_SIDE_BY_SIDE * long), np.zeros(_SIDE_BY_SIDE * long)
-    a[:len(kept)], b[:len(kept)] = kept, added
-    a, b = (np.ascontiguousarray(x.reshape(_SIDE_BY_SIDE, long).T) for x in (a, b))
-    for k in range(1, long):
-        b[k] += a[k] * b[k - 1]
-        a[k] *= a[k - 1]
-    first = [0.0]
-    for factor, more in zip(a[-1, :-1].tolist(), b[-1, :-1].tolist(), strict=True):
-        first.append(factor * first[-1] + more)
-    return np.append(0.0, (a * np.array(first) + b).T.ravel()[:len(kept)])
-
-
-def _strokes(q: Array) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.intp], Array]:
-    """Of every stroke its first sample, direction and length; of every sample its stroke. One of length 0 where nothing moves."""
-    step = np.diff(q)
-    moved = np.flatnonzero(step)
-    if not moved.size:
-        return np.zeros(1, dtype=np.intp), np.ones(1), np.zeros(len(q), dtype=np.intp), np.zeros(1)
-    side = np.sign(step[moved])
-    turns = np.concatenate(([0], np.flatnonzero(np.diff(side)) + 1))  # where in `moved` a direction begins
-    begin = moved[turns]
-    which = np.maximum(np.searchsorted(begin, np.arange(len(q)), side="right") - 1, 0)
-    return begin, side[turns], which, np.abs(np.diff(q[np.append(begin, len(q) - 1)]))

@@ -166,7 +166,7 @@ def _written(text: str, plant: Plant, remembering: Sequence[int] = (), **more: s
     """What `text` defines, compiled with the arm's numbers in it; `remembering`: joints (0-based) of its memories."""
     numbers = _numbers(plant)
     stages = {name: _ACCELERATION.format(**numbers, **_names(plant, remembering, *letters)) for name, letters in _STAGES.items()}
-    memories = [memory for _, memory in plant.own_memories]
+    memories = [memory for _, memory in plant.own_memories] if remembering else []
     called = {"load": tuple(load for _, load in plant.own_loads), "rate": tuple(one.rate for one in memories),
               "bend": tuple(one.load for one in memories)}
     lines = (f"    {', '.join(f'{name}{k}' for k in range(len(own)))}, = {name}s" for name, own in called.items() if own)

@@ -15,6 +15,7 @@ from pipelines.errors import UsageError
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects, effect_names, find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.terms import summed
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 
@@ -309,6 +310,39 @@ def test_a_load_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) -
     plain = [load(angle, speed) for angle, speed in zip(motion.q[some, 1].tolist(), motion.dq[some, 1].tolist(), strict=True)]
     np.testing.assert_allclose(plain, torque[:, 1], rtol=1e-9, atol=1e-12 * np.abs(torque).max())
     assert not np.delete(torque, 1, axis=1).any()
+
+
+@every_effect
+def test_a_memory_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """Where its load remembers one number alone, that moves, and loads, as by arrays."""
+    values = drawn(placed(kind), 8)
+    memory, hooks = placed(kind).own_memory(values), placed(kind).simulate(arm, values)
+    if memory is None:
+        return
+    assert hooks.states == 1
+    assert hooks.rate is not None
+    assert hooks.load is not None
+    some = Motion(*(x[::50] for x in (motion.t, motion.q, motion.dq, motion.ddq)))
+    bent = np.linspace(-1.1, 1.1, len(some.t))[:, None]
+    rate, load = hooks.rate(some, np.zeros_like(some.q), bent)[:, 0], hooks.load(some, bent)[:, 1]
+    plain = [memory.rate(u, v) for u, v in zip(bent[:, 0].tolist(), some.dq[:, 1].tolist(), strict=True)]
+    np.testing.assert_allclose(plain, rate, rtol=1e-9, atol=1e-12 * np.abs(rate).max())
+    np.testing.assert_allclose([memory.load(u, du) for u, du in zip(bent[:, 0].tolist(), plain, strict=True)], load, rtol=1e-9,
+                               atol=1e-12 * np.abs(load).max())
+
+
+def test_some_effect_remembers_one_number() -> None:
+    """Or the claim above would be about none."""
+    assert any(kind.own_memory is not Effect.own_memory for kind in all_effects())
+
+
+@pytest.mark.parametrize("samples", [1, 400])
+def test_as_many_amplitudes_as_columns(samples: int) -> None:
+    """Of few samples and of many the same sum; amplitudes that do not fit are refused by both."""
+    columns, amplitudes = np.random.default_rng(1).normal(size=(samples, 3, 4)), np.array([1.0, -2.0, 0.5, 3.0])
+    np.testing.assert_allclose(summed(columns, amplitudes), np.einsum("ijk,k->ij", columns, amplitudes), rtol=1e-12, atol=1e-14)
+    with pytest.raises(ValueError, match=r"shorter|longer|mismatch"):
+        summed(columns, amplitudes[:3])
 
 
 def first_order(effect: Effect, motion: Motion, arm: Arm, values: dict[str, float]) -> Array:

@@ -71,12 +71,14 @@ class Refined:
 
     @property
     def lean(self) -> Refined:
-        """Without its rows and what was worked out of them: what another process need not send."""
+        """Without its rows, and what is kept of them beside residual and slopes: what another process need not send."""
         return replace(self, data=Data(()), model=replace(self.model))
 
     def with_rows(self, data: Data, like: Exact) -> Refined:
-        """A `lean` one with its rows, and with the rigid body and what stands beside every model, those of `like`."""
-        columns = replace(self.model.columns, body=like.columns.body, arm=like.columns.arm)
+        """A `lean` one with its rows, and with what it shares with the model `like` that it was fitted from: the very rigid body,
+        laws that have not moved, and what stands beside every model."""
+        laws = tuple(own if own == law else law for law, own in zip(self.model.columns.laws, like.columns.laws, strict=True))
+        columns = replace(self.model.columns, body=like.columns.body, arm=like.columns.arm, laws=laws)
         return replace(self, data=data, model=replace(self.model, columns=columns, standing=like.standing))
 
     @property

@@ -91,9 +91,9 @@ def drive_noise(model: Exact, data: Data, left: Array, motions: Motions, recipe:
     power = _power(Data((own,)), mine.ravel())
     slow = np.clip((power - quick) / np.maximum(most, 1e-300), 0.0, 1.0)
     wander = _WANDER * level * np.sqrt(slow)
-    differs = unrepeated(data, left) / np.maximum(quick - still.power + slow * most, 1e-300)
-    share = np.sqrt(np.fmin(_MOST * differs, 1.0))  # one where nothing is known of periods
-    return DriveNoise(share * level, share * wander)
+    differs = unrepeated(Data((own,)), mine.ravel()) / np.maximum(quick - still.power + slow * most, 1e-300)
+    less = np.sqrt(np.fmin(_MOST * differs, 1.0))  # one where nothing is known of periods
+    return DriveNoise(less * level, less * wander)
 
 
 def _share(rough: Array, still: _Replica, shaken: _Replica) -> Array:

@@ -20,14 +20,15 @@ from pipelines.model.diagnosis.rows.data import Data, LogData
 __all__ = ["unrepeated"]
 
 _FEWEST = 100  # pairs of rows of a joint: fewer say little
-_OFF = 0.01  # of the spacing of rows, by which four of them may be unevenly apart
+_OFF = 0.1  # of the spacing of rows, by which four of them may be unevenly apart
+_SHORTEST = 1.0  # [s] of a period: after less, what wanders is still where it was
 
 
 def unrepeated(data: Data, left: Array) -> Array:
     """Of a residual `left` (rows,) [N m]."""
     square, count = np.zeros(data.n_joints), np.zeros(data.n_joints)
     for one, x in zip(data.logs, data.split(left), strict=True):
-        if one.log.period is None:
+        if one.log.period is None or one.log.period < _SHORTEST:
             continue
         here, there = _a_period_later(one, x, one.log.period)
         square += 0.5 * np.square(here - there).sum(axis=1, where=np.isfinite(here - there))

@@ -33,19 +33,23 @@ def in_loop(arm: Arm, log: ExperimentLog) -> bool:
 
 
 def in_loops(arms: Sequence[Arm], motions: Motions, seconds: float) -> list[list[Positions] | None]:
-    """Of each arm those in each log, over its first `seconds`; None of one that runs away, or is none that can be simulated."""
+    """Of each arm those in each log, over its first `seconds`; None of one that runs away, or is none that can be simulated.
+
+    Raises:
+        InputRejected: a log does not describe its controller.
+    """
     first = [_first(log, seconds) for log, _ in motions]
     # One controller and arm: what suffices for a log suffices for the next.
     steps = shared_out(lambda arm: _if_possible(lambda: choose_step(Plant.of(arm), first[0])), arms)
-    pieces = [(k, places) for k, arm in enumerate(arms) if steps[k] is not None for places in _apart(arm, first)]
-    pieces.sort(key=lambda piece: -len(piece[1]))  # what takes arrays takes longest
+    pieces = [(k, step, places) for k, step in enumerate(steps) if step is not None for places in _apart(arms[k], first)]
+    pieces.sort(key=lambda piece: -len(piece[2]))  # what takes arrays takes longest
 
-    def moved(piece: tuple[int, tuple[int, ...]]) -> list[Array] | None:
-        k, places = piece
-        return _if_possible(lambda: _moved(arms[k], [first[place] for place in places], steps[k]))
+    def moved(piece: tuple[int, Step, tuple[int, ...]]) -> list[Array] | None:
+        k, step, places = piece
+        return _if_possible(lambda: _moved(arms[k], [first[place] for place in places], step))
 
     found: list[dict[int, Array] | None] = [{} if step is not None else None for step in steps]
-    for (k, places), done in zip(pieces, shared_out(moved, pieces), strict=True):
+    for (k, _, places), done in zip(pieces, shared_out(moved, pieces), strict=True):
         before = found[k]
         found[k] = None if before is None or done is None else before | dict(zip(places, done, strict=True))
     return [None if one is None else [(one[place], log.q[:len(one[place])], log.sample_time)
@@ -58,9 +62,8 @@ def _apart(arm: Arm, experiments: Sequence[Experiment]) -> list[tuple[int, ...]]
     return [(place,) for place in every] if all(runs_alone(arm, one) for one in experiments) else [every]
 
 
-def _moved(arm: Arm, experiments: Sequence[Experiment], step: Step | None) -> list[Array]:
-    steps = None if step is None else {one.sample_time: step for one in experiments}
-    return [done.q[0] for done in simulate_together(arm, experiments, steps=steps)]
+def _moved(arm: Arm, experiments: Sequence[Experiment], step: Step) -> list[Array]:
+    return [done.q[0] for done in simulate_together(arm, experiments, steps={one.sample_time: step for one in experiments})]
 
 
 def _first(log: ExperimentLog, seconds: float) -> Experiment:

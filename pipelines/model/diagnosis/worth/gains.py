@@ -237,7 +237,7 @@ def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[Positions] | N
         for log, found in motions:
             q, seen, between, steps[log.sample_time] = _windowed(arm, log, found, exact, steps.get(log.sample_time))
             pairs.append((q, seen, between))
-    except InputRejected:  # D15, D17
+    except InputRejected:  # D15, D17, T08
         return None
     return pairs
 
