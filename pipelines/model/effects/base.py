@@ -55,6 +55,7 @@ from pipelines.model.effects.terms import (
     Hooks,
     OwnLoad,
     OwnMemory,
+    PlainDrive,
     Predict,
     Quantity,
     SpeedCurve,
@@ -65,8 +66,8 @@ from pipelines.model.effects.terms import (
 )
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["LARGE", "ArmModel", "Effect", "Hooks", "OwnLoad", "OwnMemory", "Predict", "Quantity", "SpeedCurve", "Values",
-           "friction_at"]
+__all__ = ["LARGE", "ArmModel", "Effect", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity", "SpeedCurve",
+           "Values", "friction_at"]
 
 
 @dataclass(frozen=True)
@@ -288,6 +289,10 @@ class Effect(ABC):
     def own(self, signal: Array) -> Array:
         """Column of its own joint, (samples,)."""
         return np.asarray(signal[..., self._index])
+
+    def with_own(self, numbers: tuple[float, ...], own: float) -> tuple[float, ...]:
+        """`numbers` of all joints, with `own` in its own place."""
+        return (*numbers[:self._index], own, *numbers[self._index + 1:])
 
     def goes_round(self, motion: Motion, but: float = 0.02) -> bool:
         """Whether its own joint travels all of a circle but for a fiftieth, or such a part of it: what it does there comes back to

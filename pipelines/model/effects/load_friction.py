@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, PlainDrive, Predict, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LoadFriction"]
@@ -95,7 +96,23 @@ class LoadFriction(Effect):
             left[..., self._index] = friction + passed * (1.0 - into * lost) / (1.0 + (1.0 - into) * lost)
             return left
 
-        return Hooks(actuator=applied)
+        return Hooks(actuator=applied, drive=self._plain(arm, values))
+
+    def _plain(self, arm: ArmModel, values: Values) -> PlainDrive | None:
+        """The same of numbers, where the joint's other friction follows from its speed."""
+        curves, index, behind = arm.friction_curves(self._index + 1), self._index, values.get("behind", 0.0)
+        if curves is None:
+            return None
+        mu, into, w = values["mu"], values.get("input_side", 0.0), values["sharpness"]
+
+        def plain(command: tuple[float, ...], speed: tuple[float, ...]) -> tuple[float, ...]:
+            v = speed[index]
+            friction = (1.0 - behind) * sum(curve.at(v) for curve in curves) if behind != 1.0 else 0.0
+            passed = command[index] - friction
+            lost = math.copysign(mu, passed) * math.tanh(w * v)
+            return self.with_own(command, friction + passed * (1.0 - into * lost) / (1.0 + (1.0 - into) * lost))
+
+        return plain
 
 
 def _lost(load: Array, side: Array, values: Values) -> Array:

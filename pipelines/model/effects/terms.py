@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -19,8 +20,8 @@ import numpy as np
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["LARGE", "ArmModel", "Hooks", "OwnLoad", "OwnMemory", "Predict", "Quantity", "SpeedCurve", "Values", "friction_at",
-           "predicted", "summed"]
+__all__ = ["LARGE", "ArmModel", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values",
+           "friction_at", "predicted", "summed"]
 
 Values = Mapping[str, float]
 
@@ -68,6 +69,7 @@ class ArmModel(Protocol):
 
 Predict = Callable[[Motion, ArmModel], Array]
 OwnLoad = Callable[[float, float], float]  # angle [rad], speed [rad/s] -> [N m]
+PlainDrive = Callable[[tuple[float, ...], tuple[float, ...]], tuple[float, ...]]  # command [N m], speeds [rad/s] -> [N m], by joint
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,11 @@ class SpeedCurve:
             tau += height * np.tanh(sharpness * speed)
         return tau
 
+    def at(self, speed: float) -> float:
+        """The same of one number."""
+        sigmoids = zip(self.heights, self.sharpnesses, strict=True)
+        return self.constant + self.viscous * speed + sum(height * math.tanh(w * speed) for height, w in sigmoids)
+
 
 @dataclass(frozen=True)
 class Hooks:
@@ -154,6 +161,7 @@ class Hooks:
     alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based) in plain numbers: `Effect.own_load`
     remembering: tuple[int, OwnMemory] | None = None  # or where it is one state that begins at zero: `Effect.own_memory`
     actuator: Callable[[Array, Motion, Array], Array] | None = None  # command, motion, states -> applied torque [N m]
+    drive: PlainDrive | None = None  # the same of one robot in plain numbers, where speeds tell it
     sensor: Callable[[Array, Array], Array] | None = None  # true q, states -> measured q [rad]
     inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)
     arm: ArmModel | None = None  # the arm as it truly is

@@ -63,4 +63,7 @@ class TorqueCrosstalk(Effect):
             mixed[..., self._index] -= values["coefficient"] * command[..., int(values["from_joint"]) - 1]
             return mixed
 
-        return Hooks(actuator=applied)
+        def plain(command: tuple[float, ...], _: tuple[float, ...]) -> tuple[float, ...]:
+            return self.with_own(command, command[self._index] - values["coefficient"] * command[int(values["from_joint"]) - 1])
+
+        return Hooks(actuator=applied, drive=plain)

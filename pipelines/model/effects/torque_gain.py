@@ -57,4 +57,7 @@ class TorqueGain(Effect):
             scaled[..., self._index] *= 1.0 + values["gain_error"]
             return scaled
 
-        return Hooks(actuator=applied)
+        def plain(command: tuple[float, ...], _: tuple[float, ...]) -> tuple[float, ...]:
+            return self.with_own(command, command[self._index] * (1.0 + values["gain_error"]))
+
+        return Hooks(actuator=applied, drive=plain)

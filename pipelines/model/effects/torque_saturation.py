@@ -75,7 +75,11 @@ class TorqueSaturation(Effect):
             left[..., self._index] -= values["coefficient"] * _above(self.own(command), values["limit"])
             return left
 
-        return Hooks(actuator=applied)
+        def plain(command: tuple[float, ...], _: tuple[float, ...]) -> tuple[float, ...]:
+            own, limit = command[self._index], values["limit"]
+            return self.with_own(command, own - values["coefficient"] * (own - min(max(own, -limit), limit)))
+
+        return Hooks(actuator=applied, drive=plain)
 
     def _asked(self, motion: Motion, arm: ArmModel) -> Array:
         return self.predicted(motion, arm) if motion.tau is None else motion.tau

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.model.effects.base import PlainDrive
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.rrr import RRR
 from pipelines.model.simulation.plant import Plant
@@ -23,6 +24,7 @@ __all__ = ["OneRRR", "acceleration_of"]
 
 # dq = D⁻¹ (u - τ_f(v) - c - h) at angles {q2}, {q3} and speeds {v1} {v2} {v3}, into {a1} {a2} {a3}; S = q2 + q3.
 _ACCELERATION = """
+{driven}
     x2 = {q2}{offset2}
     x3 = {q3}{offset3}
     c2 = cos(x2)
@@ -46,10 +48,10 @@ _ACCELERATION = """
     v = {v2} + {v3}
     half = 0.5 * {v1} * {v1}
     h3 = {g} * lever
-    r1 = u1 - ({friction1}) + {v1} * ({v2} * upper + {v3} * outer) - v * v * ({p9} * cS - {p8} * sS) \\
+    r1 = {u1} - ({friction1}) + {v1} * ({v2} * upper + {v3} * outer) - v * v * ({p9} * cS - {p8} * sS) \\
         - {v2} * {v2} * ({p11} * c2 - {p10} * s2)
-    r2 = u2 - ({friction2}) - half * upper + (v + {v2}) * {v3} * bent - h3 - {g_p14} * c2 + {g_p15} * s2
-    r3 = u3 - ({friction3}) - half * outer - {v2} * {v2} * bent - h3
+    r2 = {u2} - ({friction2}) - half * upper + (v + {v2}) * {v3} * bent - h3 - {g_p14} * c2 + {g_p15} * s2
+    r3 = {u3} - ({friction3}) - half * outer - {v2} * {v2} * bent - h3
     C11 = D22 * {e33} - D23 * D23
     C12 = D13 * D23 - D12 * {e33}
     C13 = D12 * D23 - D13 * D22
@@ -62,8 +64,7 @@ _ACCELERATION = """
 
 # Kutta's stages k, l, m, n: the slope of the position is the speed of the stage. Memories begin a stage with their rates.
 _STEP = """
-def step(q1, q2, q3, v1, v2, v3, {memories}u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads, rates=rates, bends=bends):
-{unpacked}
+def step(q1, q2, q3, v1, v2, v3, {memories}u1, u2, u3, cos=cos, sin=sin, tanh=tanh{called}):
 {begin}
 {first}
     w1 = v1 + {half} * k1
@@ -96,8 +97,7 @@ def step(q1, q2, q3, v1, v2, v3, {memories}u1, u2, u3, cos=cos, sin=sin, tanh=ta
 """
 # The slope of the speed alone.
 _SLOPE = """
-def acceleration(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh, loads=loads, rates=rates, bends=bends):
-{unpacked}
+def acceleration(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh{called}):
 {first}
     return k1, k2, k3
 """
@@ -108,8 +108,8 @@ _Acceleration = Callable[..., tuple[float, float, float]]
 
 
 class OneRRR:
-    """The integrator of one arm that nothing moves but rigid body, friction and loads of single joints, some of which remember one
-    number; used as `RungeKutta` is."""
+    """The integrator of one arm that nothing moves but rigid body, friction, loads of single joints, some of which remember one
+    number, and drives that change a command in plain numbers; used as `RungeKutta` is."""
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
         """`plant` as `fits` it; `steps` of equal size make one control sample."""
@@ -138,7 +138,7 @@ def _compiled(plant: Plant, h: float) -> _Step:
     """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, memories, u1, u2, u3) -> all but u after it."""
     lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
     joints = [joint for joint, _ in plant.own_memories]
-    step: _Step = _written(_STEP, plant, joints, **lengths, **_memories(joints, **lengths))["step"]
+    step: _Step = _written(_STEP, plant, joints, plant.drives, **lengths, **_memories(joints, **lengths))["step"]
     return step
 
 
@@ -162,18 +162,27 @@ def acceleration_of(plant: Plant) -> _Acceleration:
     return found
 
 
-def _written(text: str, plant: Plant, remembering: Sequence[int] = (), **more: str) -> dict[str, Any]:
-    """What `text` defines, compiled with the arm's numbers in it; `remembering`: joints (0-based) of its memories."""
+def _written(text: str, plant: Plant, remembering: Sequence[int] = (), drives: Sequence[PlainDrive] = (),
+             **more: str) -> dict[str, Any]:
+    """What `text` defines, compiled with the arm's numbers in it; `remembering`: joints (0-based) of its memories; `drives` that
+    commands pass."""
     numbers = _numbers(plant)
-    stages = {name: _ACCELERATION.format(**numbers, **_names(plant, remembering, *letters)) for name, letters in _STAGES.items()}
+    stages = {name: _ACCELERATION.format(**numbers, **_names(plant, remembering, *letters), **_driven(len(drives), letters[1]))
+              for name, letters in _STAGES.items()}
     memories = [memory for _, memory in plant.own_memories] if remembering else []
-    called = {"load": tuple(load for _, load in plant.own_loads), "rate": tuple(one.rate for one in memories),
-              "bend": tuple(one.load for one in memories)}
-    lines = (f"    {', '.join(f'{name}{k}' for k in range(len(own)))}, = {name}s" for name, own in called.items() if own)
-    unpacked = "\n".join(lines)
-    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh} | {f"{name}s": own for name, own in called.items()}
-    exec(_code(text.format(**stages, unpacked=unpacked, **more)), scope)
+    several = {"load": [load for _, load in plant.own_loads], "rate": [one.rate for one in memories],
+               "bend": [one.load for one in memories], "drive": drives}
+    called = {f"{name}{k}": one for name, own in several.items() for k, one in enumerate(own)}
+    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, **called}
+    exec(_code(text.format(**stages, called="".join(f", {name}={name}" for name in called), **more)), scope)
     return scope
+
+
+def _driven(drives: int, speed: str) -> dict[str, str]:
+    """What comes of the command in one stage, as text, and the names of what reaches the joints."""
+    speeds = ", ".join(f"{speed}{j}" for j in (1, 2, 3))
+    lines = [f"    t1, t2, t3 = drive{k}(({'t1, t2, t3' if k else 'u1, u2, u3'}), ({speeds}))" for k in range(drives)]
+    return {"driven": "\n".join(lines), **{f"u{j}": f"{'t' if drives else 'u'}{j}" for j in (1, 2, 3)}}
 
 
 @lru_cache(maxsize=32)  # an arm is run again and again: in each experiment, with each noise, with halved steps

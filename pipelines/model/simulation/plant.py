@@ -17,7 +17,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import ArmModel, Hooks, OwnLoad, OwnMemory
+from pipelines.model.effects.base import ArmModel, Hooks, OwnLoad, OwnMemory, PlainDrive
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.rrr import RRR
@@ -83,13 +83,18 @@ class Plant:
 
     @property
     def plain(self) -> bool:
-        """Whether nothing moves it but rigid body, friction, and loads of single joints: no hook has to be asked on the way."""
-        return all(hook.alone or hook.remembering or not any((hook.load, hook.actuator, hook.states)) for hook in self.hooks)
+        """Whether nothing moves it but rigid body, friction, loads and drives in plain numbers: no array is needed on the way."""
+        return all(_in_numbers(hook) for hook in self.hooks)
 
     @property
     def own_loads(self) -> tuple[tuple[int, OwnLoad], ...]:
         """Loads that follow from angle and speed of one joint (0-based) alone."""
         return tuple(hook.alone for hook in self.hooks if hook.alone is not None)
+
+    @property
+    def drives(self) -> tuple[PlainDrive, ...]:
+        """What a command passes on its way to the joints, one after the other."""
+        return tuple(hook.drive for hook in reversed(self.hooks) if hook.drive is not None)
 
     @property
     def own_memories(self) -> tuple[tuple[int, OwnMemory], ...]:
@@ -113,6 +118,12 @@ class Plant:
 
     def prepared(self, replicas: int) -> MovingPlant:
         return MovingPlant(self, replicas)
+
+
+def _in_numbers(hook: Hooks) -> bool:
+    """Whether all that it does to torque is known in plain numbers."""
+    driven = hook.actuator is None or (hook.drive is not None and not hook.states)
+    return driven and bool(hook.alone or hook.remembering or not (hook.load or hook.states))
 
 
 def _remembering(acting: Acting, own: Hooks) -> tuple[int, OwnMemory] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -329,6 +330,27 @@ def test_a_memory_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion)
     np.testing.assert_allclose(plain, rate, rtol=1e-9, atol=1e-12 * np.abs(rate).max())
     np.testing.assert_allclose([memory.load(u, du) for u, du in zip(bent[:, 0].tolist(), plain, strict=True)], load, rtol=1e-9,
                                atol=1e-12 * np.abs(load).max())
+
+
+@every_effect
+def test_a_drive_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """Where speeds tell what comes of a command, it is what comes of it by arrays."""
+    hooks = placed(kind).simulate(arm, drawn(placed(kind), 9))
+    if hooks.drive is None:
+        return
+    assert hooks.actuator is not None
+    some = Motion(*(x[::50] for x in (motion.t, motion.q, motion.dq, motion.ddq)))
+    command = np.random.default_rng(2).uniform(-3e5, 3e5, some.q.shape)  # beyond any limit that is drawn
+    arrays = hooks.actuator(command, some, np.zeros((len(command), 0)))
+    plain = [hooks.drive(tuple(u), tuple(v)) for u, v in zip(command.tolist(), some.dq.tolist(), strict=True)]
+    np.testing.assert_allclose(plain, arrays, rtol=1e-12, atol=1e-9)
+    assert np.abs(arrays - command).max() > 1e-6
+
+
+def test_some_drive_is_known_in_plain_numbers() -> None:
+    """Of the effects whose actuators have no memory all but one that knows no speeds of its own have one."""
+    assert {kind.name for kind in all_effects() if "drive=" in inspect.getsource(kind)} >= {
+        "torque_gain", "torque_crosstalk", "torque_saturation", "load_friction"}
 
 
 def test_some_effect_remembers_one_number() -> None:

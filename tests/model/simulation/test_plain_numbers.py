@@ -1,4 +1,5 @@
-"""Friction that remembers one number, on one arm without arrays: it moves as among many replicas, which take arrays."""
+"""One arm without arrays, whose friction remembers one number, or whose drives change a command: it moves as among many replicas,
+which take arrays."""
 
 from __future__ import annotations
 
@@ -9,8 +10,12 @@ import pytest
 
 from pipelines.log.experiment import Controller
 from pipelines.model.arm import Acting
+from pipelines.model.effects.load_friction import LoadFriction
 from pipelines.model.effects.presliding import Presliding
 from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
+from pipelines.model.effects.torque_gain import TorqueGain
+from pipelines.model.effects.torque_saturation import TorqueSaturation
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.simulation import Noise, Plant, run
 from pipelines.model.simulation.integrate import RungeKutta
@@ -92,6 +97,35 @@ def test_what_remembers_more_numbers_takes_arrays() -> None:
     assert not OneLoop.fits(arm, asked)
     alone, among = both(arm)
     np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+
+
+DRIVES = {
+    "gain": Acting.of(TorqueGain(joint=2), {"gain_error": -0.1}),
+    "crosstalk": Acting.of(TorqueCrosstalk(joint=1, from_joint=2.0), {"coefficient": 0.1, "from_joint": 2.0}),
+    "limit": Acting.of(TorqueSaturation(joint=2), {"limit": 6.0, "coefficient": 1.0}),
+    "load": Acting.of(LoadFriction(joint=3), {"mu": 0.2, "sharpness": 80.0, "behind": 0.4, "input_side": 0.7}),
+}
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in DRIVES), tuple(DRIVES), tuple(reversed(DRIVES))])
+def test_a_command_on_its_way_to_the_joints(names: tuple[str, ...]) -> None:
+    """Through one drive, or through all of them in their order, beside friction that remembers; by Runge-Kutta's arrays as well."""
+    acting_on = [DRIVES[name] for name in names]
+    arm = plant(*acting_on, acting(LAWS["LuGre"]))
+    assert OneRRR.fits(arm)
+    assert len(arm.drives) == len(names)
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+    assert np.abs(alone - both(plant(acting(LAWS["LuGre"])))[0]).max() > 1e-5
+
+
+def test_the_order_of_drives_is_that_in_which_they_act() -> None:
+    """A limit before the gain is another than one behind it."""
+    gain, limit = Acting.of(TorqueGain(joint=2), {"gain_error": -0.6}), DRIVES["limit"]
+    arms = [Plant.of(replace(rrr().arm, effects=order)) for order in ((gain, limit), (limit, gain))]
+    (one, among), (other, _) = map(both, arms)
+    np.testing.assert_allclose(one, among, rtol=0.0, atol=1e-10)
+    assert np.abs(one - other).max() > 1e-4
 
 
 @pytest.mark.parametrize("name", LAWS)
