@@ -138,7 +138,8 @@ def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
         fits, converted = _as_kind(option, value)
         if fits:
             return converted
-    raise UsageError("C02", f"{value!r} is not a {getattr(options[0], '__name__', options[0])}", where=where,
+    listed = typing.get_origin(options[0]) is tuple
+    raise UsageError("C02", f"{value!r} is not a {'list' if listed else getattr(options[0], '__name__', options[0])}", where=where,
                      remedy="correct the value")
 
 
@@ -153,6 +154,8 @@ def _as_kind(kind: Any, value: Any) -> tuple[bool, Any]:
         return isinstance(value, kind), value
     if kind is Path:
         return isinstance(value, str), Path(str(value))
+    if typing.get_origin(kind) is tuple and isinstance(value, str):
+        value = [value]  # one stands for a list of one, as it does on the command line
     if typing.get_origin(kind) is tuple and isinstance(value, list):
         inner = [_as_kind(typing.get_args(kind)[0], item) for item in value]
         return all(fits for fits, _ in inner), tuple(item for _, item in inner)

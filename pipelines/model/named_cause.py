@@ -68,7 +68,7 @@ def refuse_unknown(text: str, where: str) -> None:
     if name not in effect_names():
         near = did_you_mean(name, effect_names(), 3) or did_you_mean(name, effect_names(), 3, 0.5)
         raise UsageError("C01", f"'{name}' is not a cause{near}", where=where,
-                         remedy="'rrrid extend --help' lists all causes")
+                         remedy=f"'rrrid {'diagnose' if where == '--without' else 'extend'} --help' lists all causes")
 
 
 def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bool], where: str) -> tuple[int | None, str]:

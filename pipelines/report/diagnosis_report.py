@@ -24,6 +24,7 @@ from pipelines.report.diagnosis_words import (
     held_out_floor,
     held_out_words,
     in_order,
+    is_cause,
     named,
     per_joint,
     three_digits,
@@ -77,7 +78,7 @@ def _verdict(result: Result) -> str:
     """One sentence; by what it was judged where that is no log of its own; what was not looked for. What to check stands in the
     first section."""
     blocks = " Judged by blocks held out of the fitted logs, for none has role validate." if result.held_out == "blocks" else ""
-    causes = ", ".join(within(title_of(cause)) for cause in result.without)
+    causes = ", ".join(dict.fromkeys(within(title_of(cause)) for cause in result.without if is_cause(cause)))
     return f"{_said(result)}{blocks}{f' Not looked for, because you said so: {causes}.' if causes else ''}"
 
 
@@ -85,9 +86,12 @@ def _said(result: Result) -> str:
     if result.verdict == "nothing-wrong":
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
-        return f"Nothing{since}, as far as these logs can tell: what they could have shown stands below.{caveat}"
+        return f"Nothing{since}, as far as these logs can tell: what they could have shown, the report lists.{caveat}"
     if result.verdict == "unknown":
-        return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
+        reason = without_keys(result.reason)
+        if result.without:
+            reason = reason.replace("no cause explains it", "no cause that was looked for explains it")
+        return f"Something is wrong, and no cause is named: {reason}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(_beside(more))}" if more else ""

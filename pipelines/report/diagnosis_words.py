@@ -19,7 +19,7 @@ from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
 __all__ = ["as_sentence", "at_places", "cause_at", "floor_name", "floor_words", "held_out_floor", "held_out_words",
-           "in_order", "meaning_of", "named", "per_joint", "spoken", "three_digits", "title_of", "together",
+           "in_order", "is_cause", "meaning_of", "named", "per_joint", "spoken", "three_digits", "title_of", "together",
            "told_value", "told_values", "torque_errors", "torque_of", "unit_or_dash", "what_stays",
            "without_keys"]
 
@@ -50,6 +50,11 @@ _AND_BEFORE = ", and what the model left of the reference logs beyond that"
 def cause_at(cause: str, joint: int | None) -> str:
     """As causes are written on the command line."""
     return cause if joint is None else f"{cause}:{joint}"
+
+
+def is_cause(name: str) -> bool:
+    """Whether it is something that may be wrong, and no law of friction that every nominal model may have."""
+    return name in effect_names() and find_effect(name).evidence != "none"
 
 
 def title_of(cause: str) -> str:

@@ -112,7 +112,7 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     (("fit-friction", "logs", "--window", "many"), "RRID-C02 --window: 'many' is no number. Give a number, such as 0.5."),
     (("diagnose", "logs", "--twins", "3"), "RRID-C01 rrrid diagnose: no such option '--twins'. See "),
     (("diagnose", "logs", "--without", "coging"),
-     "RRID-C01 --without: 'coging' is not a cause, did you mean 'cogging'? 'rrrid extend --help' lists all causes."),
+     "RRID-C01 --without: 'coging' is not a cause, did you mean 'cogging'? 'rrrid diagnose --help' lists all causes."),
     (("diagnose", "logs", "--without", "cogging:2"),
      "RRID-C02 --without: 'cogging:2': a cause is left out as a whole, at every joint. Write cogging."),
     (("extend", "logs", "--with", "quadratic:2"),

@@ -257,6 +257,8 @@ def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
 def test_the_verdict_says_what_was_not_looked_for(verdict: str) -> None:
     """Nothing wrong, but for what nobody looked for, is another answer."""
     there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
-    page = diagnosis_report(Result(**(there | {"without": ("presliding", "stribeck")})))
-    assert page.verdict.endswith("Not looked for, because you said so: presliding, Stribeck friction.")
+    for without in (("presliding", "stribeck"), ("presliding", "coulomb", "stribeck", "presliding")):  # a law is no cause
+        page = diagnosis_report(Result(**(there | {"without": without})))
+        assert page.verdict.endswith("Not looked for, because you said so: presliding, Stribeck friction.")
+    assert "looked for" not in diagnosis_report(Result(**(there | {"without": ("coulomb",)}))).verdict
     assert "looked for" not in diagnosis_report(Result(**there)).verdict

@@ -1,0 +1,27 @@
+"""Settings that are written as text: a list of one, and what is no list."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipelines.diagnose import Settings
+from pipelines.errors import UsageError
+from rrrid_cli.settings import make_settings
+
+
+def made(*sets: str) -> Settings:
+    return make_settings(Settings, "diagnose", ("diagnose",), None, sets, {})
+
+
+@pytest.mark.parametrize(("text", "without"), [
+    ("diagnose.without=cogging", ("cogging",)), ('diagnose.without="cogging"', ("cogging",)),
+    ('diagnose.without=["cogging", "spring"]', ("cogging", "spring")), ("diagnose.without=[]", ())])
+def test_one_stands_for_a_list_of_one(text: str, without: tuple[str, ...]) -> None:
+    assert made(text).without == without
+
+
+@pytest.mark.parametrize("value", ["3", "[3]", "true"])
+def test_what_is_no_list_of_texts_is_refused(value: str) -> None:
+    with pytest.raises(UsageError, match="is not a list") as refused:
+        made(f"diagnose.without={value}")
+    assert refused.value.code.endswith("C02")
