@@ -125,7 +125,8 @@ def _explained(e: Evidence) -> list[Check]:
                           f"joint {j + 1}'s torque is not explained by its motion: relative residual {e.residual[j]:.2g}, "
                           f"others {others}",
                           signal="tau", joint=j,
-                          remedy="look whether this column is the torque of this joint, and which joint it repeats")
+                          remedy="unless a diagnosis names a cause there, look whether this column is that joint's torque, or "
+                                 "repeats another's")
             for j in lost.tolist()]
 
 
