@@ -88,10 +88,7 @@ def _said(result: Result) -> str:
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         return f"Nothing{since}, as far as these logs can tell: what they could have shown, the report lists.{caveat}"
     if result.verdict == "unknown":
-        reason = without_keys(result.reason)
-        if result.without:
-            reason = reason.replace("no cause explains it", "no cause that was looked for explains it")
-        return f"Something is wrong, and no cause is named: {reason}."
+        return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(_beside(more))}" if more else ""

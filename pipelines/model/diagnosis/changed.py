@@ -114,7 +114,7 @@ def _drives(first: Responding, reference: Data, since: Since, seed: int) -> Driv
 
 def _limits(found: Found, case: Case, first: Responding, since: Since) -> tuple[Limits, Gained]:
     """What would have been found of what has changed; and what chance gives each cause, as far as it has been asked by then."""
-    last = found.steps[-1]
+    last = found.steps[-1]  # nothing else of the search has a part in them
     alone, case = steadied(Found(last.before, (last,), last.before), case)
     return limits_of(alone.steps[-1], case, first, since.probed), dict(since.chance.known)
 

@@ -107,7 +107,7 @@ class LoadFriction(Effect):
 
         def plain(command: tuple[float, ...], speed: tuple[float, ...]) -> tuple[float, ...]:
             v = speed[index]
-            friction = (1.0 - behind) * sum(curve.at(v) for curve in curves) if behind != 1.0 else 0.0
+            friction = (1.0 - behind) * sum(curve.at(v) for curve in curves)
             passed = command[index] - friction
             lost = math.copysign(mu, passed) * math.tanh(w * v)
             return self.with_own(command, friction + passed * (1.0 - into * lost) / (1.0 + (1.0 - into) * lost))
