@@ -57,6 +57,7 @@ class Backlash(Effect):
     experiment = "Move the joint to and fro over small angles, once where gravity loads it and once where it does not."
     size = "gap"
     evidence = "reversals"
+    from_body = True
     twins = ("joint_elasticity", "presliding")
     needs = ("reversals of torque, or frequency responses at two amplitudes",)
     fixed_amplitudes = (1.0,)

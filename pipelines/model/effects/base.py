@@ -94,6 +94,7 @@ class Effect(ABC):
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
     shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
     from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
+    from_body: ClassVar[bool] = False  # from motion and rigid body alone, whatever else acts
     last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
     in_drive: ClassVar[bool] = False  # all torque of its joint comes through it, whatever was found after it
     misread: ClassVar[bool] = False  # it changes what an encoder says: all but the record is felt where the joint truly is
@@ -253,6 +254,10 @@ class Effect(ABC):
         """
         without = predict(motion, arm) if predict is not None else arm.torque(motion)
         return np.asarray(without + self.torque(motion, arm, values))
+
+    def mixing(self, values: Values, n_joints: int) -> Array | None:
+        """(joints, joints) M, where `apply` gives M times the torque of the moment without it, whatever the motion."""
+        return None
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """How it enters the forward simulation; by default as a load."""

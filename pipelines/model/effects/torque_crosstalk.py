@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
@@ -50,6 +52,11 @@ class TorqueCrosstalk(Effect):
         for other in range(1, arm.n_joints + 1):
             if other != self.joint:
                 yield replace(self, from_joint=float(other))
+
+    def mixing(self, values: Values, n_joints: int) -> Array:
+        matrix = np.eye(n_joints)
+        matrix[self._index, int(values["from_joint"]) - 1] += values["coefficient"]
+        return matrix
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """Other effects on both joints included."""

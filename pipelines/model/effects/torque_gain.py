@@ -45,6 +45,11 @@ class TorqueGain(Effect):
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         return {"gain_error": 1.0 / max(1.0 + float(amplitudes[0]), _LEAST) - 1.0}
 
+    def mixing(self, values: Values, n_joints: int) -> Array:
+        matrix = np.eye(n_joints)
+        matrix[self._index, self._index] = 1.0 / (1.0 + values["gain_error"])
+        return matrix
+
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque is scaled, other effects included."""
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)

@@ -25,7 +25,7 @@ Rows = npt.NDArray[Any]
 P = TypeVar("P")
 A = TypeVar("A")
 
-_ROOM = 128 << 20  # [bytes]
+_ROOM = 192 << 20  # [bytes]
 
 
 class Kept:
@@ -36,6 +36,7 @@ class Kept:
         self._rows: OrderedDict[Hashable, Rows] = OrderedDict()
         self._numbered: list[tuple[weakref.ref[object], Hashable]] = []
         self._count = 0
+        self.rigid: list[tuple[Any, Rows]] = []  # arms that columns of the rigid body were laid for, and their rigid torque
 
     def of(self, key: Hashable, lay: Callable[[], Rows]) -> Rows:
         found = self._rows.pop(key, None)

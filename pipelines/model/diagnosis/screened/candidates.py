@@ -21,6 +21,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.fitted.record import changing, recorded, recorded_of
 from pipelines.model.diagnosis.rows.data import Data, LogData
+from pipelines.model.diagnosis.screened.rigid_alike import RigidArm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -55,9 +56,13 @@ class Arms:
 
     now: Arm  # with all that was found
     start: Arm  # for what just adds its torque, whatever else acts
+    rigid: tuple[RigidArm, ...] = ()  # of each joint, then of all: for what of that follows from the rigid body; none: `start`
 
     def of(self, family: Family) -> Arm:
-        return self.start if family.shapes[0].adds else self.now
+        effect, whole = family.shapes[0], len(self.rigid)
+        if whole and effect.adds and effect.from_body:
+            return self.rigid[(family.joint or whole) - 1][0]
+        return self.start if effect.adds else self.now
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.fitted.nominal import fit_columns
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
 from pipelines.model.diagnosis.result import Trial
+from pipelines.model.diagnosis.screened.rigid_alike import remember
 from pipelines.model.diagnosis.screened.screen import Screened, screen
 from pipelines.model.diagnosis.searched.barred import better_than
 from pipelines.model.diagnosis.searched.borne_out import borne_out
@@ -212,7 +213,10 @@ def _share(one: Screened, now: Refined) -> float:
 
 
 def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
-    return tuple(screen(case.data, now.fit, case.families, case.arms(now.model)))
+    arms = case.arms(now.model)
+    found = tuple(screen(case.data, now.fit, case.families, arms))
+    remember(case.data, arms.rigid)
+    return found
 
 
 def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened],
