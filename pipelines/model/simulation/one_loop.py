@@ -1,9 +1,10 @@
 """One RRR arm under one of the laws (23), (24) of Kostić et al. 2004, sample by sample, without arrays.
 
-    if OneLoop.fits(plant, experiment): motion, counted, commanded = OneLoop(plant, experiment, steps).run(start, noise, watch)
+    if OneLoop.fits(plant, experiment):
+        motion, counted, commanded = OneLoop(plant, experiment, steps, exact).run(start, noise, watch)
 
-What `Controlling` and `OneRRR` do, in one loop that is written out as Python text and compiled for each experiment: for a single
-robot, small arrays cost more than the arithmetic of its controller and half as much as that of its dynamics.
+What `Controlling` and `OneRRR`, or `OneHeld`, do, in one loop that is written out as Python text and compiled for each experiment:
+for a single robot, small arrays cost more than the arithmetic of its controller and half as much as that of its dynamics.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.control import feedforward_of
 from pipelines.model.simulation.experiment import Experiment
+from pipelines.model.simulation.one_held import HELD, OneHeld
 from pipelines.model.simulation.one_rrr import OneRRR
 from pipelines.model.simulation.plant import Plant
 
@@ -52,12 +54,13 @@ _Now = tuple[float, ...]
 class OneLoop:
     """One arm and its controller."""
 
-    def __init__(self, plant: Plant, experiment: Experiment, steps: int) -> None:
-        """`plant` and `experiment` as they fit it; `steps` of equal size make one control sample."""
+    def __init__(self, plant: Plant, experiment: Experiment, steps: int, exact: bool) -> None:
+        """`plant` and `experiment` as they fit it; `steps` of equal size make one control sample; `exact`: with a rigid body that
+        is nowhere held."""
         self._experiment = experiment
-        self._step = OneRRR(plant, experiment.sample_time, steps).step
+        self._integrator = (OneRRR if exact else OneHeld)(plant, experiment.sample_time, steps)
         scope: dict[str, Any] = {}
-        exec(_code(_text(experiment, steps, len(plant.own_memories))), scope)
+        exec(_code(_text(experiment, steps, len(plant.own_memories) + (0 if exact else len(HELD)))), scope)
         self._loop: Callable[..., tuple[_Now, tuple[Any, ...]]] = scope["loop"]
 
     @staticmethod
@@ -79,12 +82,14 @@ class OneLoop:
         experiment = self._experiment
         table = np.empty((experiment.n_samples, 12))
         now, memory = tuple(start.tolist()), self._memory()
+        if isinstance(self._integrator, OneHeld):
+            now = (*now, *self._integrator.held(now))
         drawn = repeat((0.0,) * 6) if noise is None else chain.from_iterable(map(np.ndarray.tolist, noise))
         rows = zip(_listed(experiment.q_ref), _fed(experiment), drawn, strict=False)
         for first in range(0, len(table), _PART):
             part: list[_Now] = []
             try:
-                now, memory = self._loop(now, memory, islice(rows, _PART), part.append, self._step)
+                now, memory = self._loop(now, memory, islice(rows, _PART), part.append, self._integrator.step)
             except (ValueError, OverflowError):  # of an infinite number there is neither a sine nor a count
                 now = (nan,) * len(now)
             watch(np.array(now[:6]), first + len(part))
@@ -108,10 +113,10 @@ def _fed(experiment: Experiment) -> Iterator[Sequence[float]]:
     return _listed(np.sum(parts, axis=0)) if parts else repeat((0.0, 0.0, 0.0))
 
 
-def _text(experiment: Experiment, steps: int, memories: int) -> str:
+def _text(experiment: Experiment, steps: int, handed_on: int) -> str:
     memory = ", ".join([*(f"a{j}, b{j}, d{j}" for j in _JOINTS), *(f"i{j}" for j in _JOINTS), *(f"w{j}" for j in _JOINTS)])
     law = "\n".join(f"        {line}" for j in _JOINTS for line in _lines(experiment, j))
-    bent = "".join(f", g{k}" for k in range(memories))  # of loads that remember
+    bent = "".join(f", g{k}" for k in range(handed_on))  # memories of loads, and what is held of the rigid body
     return _LOOP.format(memory=memory, law=law, bent=bent, steps="\n".join([_STEP.format(bent=bent)] * steps))
 
 

@@ -20,11 +20,11 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.rrr import RRR
 from pipelines.model.simulation.plant import Plant
 
-__all__ = ["OneRRR", "acceleration_of"]
+__all__ = ["KUTTA", "POSED", "OneRRR", "Step", "acceleration_of", "memories", "numbers_of", "written"]
 
-# dq = D⁻¹ (u - τ_f(v) - c - h) at angles {q2}, {q3} and speeds {v1} {v2} {v3}, into {a1} {a2} {a3}; S = q2 + q3.
-_ACCELERATION = """
-{driven}
+# u - τ_f(v) - c - h at angles {q2}, {q3} and speeds {v1} {v2} {v3}, into r; cofactors of D, all but two, into C, and 1 / det D into
+# scale; S = q2 + q3.
+POSED = """
     x2 = {q2}{offset2}
     x3 = {q3}{offset3}
     c2 = cos(x2)
@@ -57,16 +57,17 @@ _ACCELERATION = """
     C13 = D12 * D23 - D13 * D22
     C23 = D12 * D13 - D11 * D23
     scale = 1.0 / (D11 * C11 + D12 * C12 + D13 * C13)
+"""
+# dq = D⁻¹ (u - τ_f(v) - c - h), into {a1} {a2} {a3}.
+_ACCELERATION = "{driven}" + POSED + """
     {a1} = (C11 * r1 + C12 * r2 + C13 * r3) * scale
     {a2} = (C12 * r1 + (D11 * {e33} - D13 * D13) * r2 + C23 * r3) * scale
     {a3} = (C13 * r1 + C23 * r2 + (D11 * D22 - D12 * D12) * r3) * scale
 """
 
-# Kutta's stages k, l, m, n: the slope of the position is the speed of the stage. Memories begin a stage with their rates.
-_STEP = """
-def step(q1, q2, q3, v1, v2, v3, {memories}u1, u2, u3, cos=cos, sin=sin, tanh=tanh{called}):
-{begin}
-{first}
+# Kutta's stages k, l, m, n, after the first: the slope of the position is the speed of the stage. Memories begin a stage with their
+# rates.
+KUTTA = """
     w1 = v1 + {half} * k1
     w2 = v2 + {half} * k2
     w3 = v3 + {half} * k3
@@ -95,6 +96,11 @@ def step(q1, q2, q3, v1, v2, v3, {memories}u1, u2, u3, cos=cos, sin=sin, tanh=ta
             q3 + {sixth} * (v3 + 2.0 * (w3 + z3) + o3), v1 + {sixth} * (k1 + 2.0 * (l1 + m1) + n1),
             v2 + {sixth} * (k2 + 2.0 * (l2 + m2) + n2), v3 + {sixth} * (k3 + 2.0 * (l3 + m3) + n3){remembered})
 """
+_STEP = """
+def step(q1, q2, q3, v1, v2, v3, {memories}u1, u2, u3, cos=cos, sin=sin, tanh=tanh{called}):
+{begin}
+{first}
+""" + KUTTA
 # The slope of the speed alone.
 _SLOPE = """
 def acceleration(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh{called}):
@@ -103,7 +109,7 @@ def acceleration(q1, q2, q3, v1, v2, v3, u1, u2, u3, cos=cos, sin=sin, tanh=tanh
 """
 _STAGES = {"first": ("q", "v", "k"), "second": ("y", "w", "l"), "third": ("y", "z", "m"), "fourth": ("y", "o", "n")}
 
-_Step = Callable[..., tuple[float, ...]]
+Step = Callable[..., tuple[float, ...]]
 _Acceleration = Callable[..., tuple[float, float, float]]
 
 
@@ -113,7 +119,7 @@ class OneRRR:
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
         """`plant` as `fits` it; `steps` of equal size make one control sample."""
-        self.step = _compiled(plant, sample_time / steps)  # of (q1, q2, q3, v1, v2, v3, memories, u1, u2, u3): all but u after it
+        self.step = self._compiled(plant, sample_time / steps)
         self._steps = steps
 
     @staticmethod
@@ -123,26 +129,29 @@ class OneRRR:
     def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:
         """Move `state` (6, 1) on by one sample, in place, and return the memories' new states; nothing depends on time."""
         del t
-        step, torque = self.step, command[:, 0].tolist()
-        now: tuple[float, ...] = (*state[:, 0].tolist(), *states[0].tolist())
+        now = self._moved((*state[:, 0].tolist(), *states[0].tolist()), command[:, 0].tolist())
+        state[:, 0] = now[:6]
+        return np.array([now[6:]])
+
+    def _moved(self, now: tuple[float, ...], torque: Sequence[float]) -> tuple[float, ...]:
+        step = self.step
         try:
             for _ in range(self._steps):
                 now = step(*now, *torque)
         except (ValueError, OverflowError):  # of an infinite number there is no sine
             now = (nan,) * len(now)
-        state[:, 0] = now[:6]
-        return np.array([now[6:]])
+        return now
+
+    @staticmethod
+    def _compiled(plant: Plant, h: float) -> Step:
+        """(q1, q2, q3, v1, v2, v3, memories, u1, u2, u3) -> all but u after a step of length h [s]."""
+        lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
+        joints = [joint for joint, _ in plant.own_memories]
+        step: Step = written(_STEP, plant, joints, plant.drives, **lengths, **memories(joints, **lengths))["step"]
+        return step
 
 
-def _compiled(plant: Plant, h: float) -> _Step:
-    """One Runge-Kutta step of length h [s]: (q1, q2, q3, v1, v2, v3, memories, u1, u2, u3) -> all but u after it."""
-    lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
-    joints = [joint for joint, _ in plant.own_memories]
-    step: _Step = _written(_STEP, plant, joints, plant.drives, **lengths, **_memories(joints, **lengths))["step"]
-    return step
-
-
-def _memories(joints: Sequence[int], h: str, half: str, sixth: str) -> dict[str, str]:
+def memories(joints: Sequence[int], h: str, half: str, sixth: str) -> dict[str, str]:
     """What becomes of the memory b of each load at `joints` (0-based), and its rate r, from stage to stage."""
     numbered = list(enumerate(joints))
 
@@ -158,21 +167,21 @@ def _memories(joints: Sequence[int], h: str, half: str, sixth: str) -> dict[str,
 
 def acceleration_of(plant: Plant) -> _Acceleration:
     """(q1, q2, q3, v1, v2, v3, u1, u2, u3) -> accelerations, of the rigid body, friction and the loads of single joints."""
-    found: _Acceleration = _written(_SLOPE, plant)["acceleration"]
+    found: _Acceleration = written(_SLOPE, plant)["acceleration"]
     return found
 
 
-def _written(text: str, plant: Plant, remembering: Sequence[int] = (), drives: Sequence[PlainDrive] = (),
-             **more: str) -> dict[str, Any]:
+def written(text: str, plant: Plant, remembering: Sequence[int] = (), drives: Sequence[PlainDrive] = (),
+            stage: str = _ACCELERATION, **more: str) -> dict[str, Any]:
     """What `text` defines, compiled with the arm's numbers in it; `remembering`: joints (0-based) of its memories; `drives` that
-    commands pass."""
-    numbers = _numbers(plant)
-    stages = {name: _ACCELERATION.format(**numbers, **_names(plant, remembering, *letters), **_driven(len(drives), letters[1]))
+    commands pass; `stage`: what stands for {first} to {fourth}."""
+    numbers = numbers_of(plant)
+    stages = {name: stage.format(**numbers, **_names(plant, remembering, *letters), **_driven(len(drives), letters[1]))
               for name, letters in _STAGES.items()}
-    memories = [memory for _, memory in plant.own_memories] if remembering else []
-    several = {"load": [load for _, load in plant.own_loads], "rate": [one.rate for one in memories],
-               "bend": [one.load for one in memories], "drive": drives}
-    called = {f"{name}{k}": one for name, own in several.items() for k, one in enumerate(own)}
+    own = [memory for _, memory in plant.own_memories] if remembering else []
+    several = {"load": [load for _, load in plant.own_loads], "rate": [one.rate for one in own], "bend": [one.load for one in own],
+               "drive": drives}
+    called = {f"{name}{k}": one for name, some in several.items() for k, one in enumerate(some)}
     scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, **called}
     exec(_code(text.format(**stages, called="".join(f", {name}={name}" for name in called), **more)), scope)
     return scope
@@ -190,7 +199,7 @@ def _code(text: str) -> CodeType:
     return compile(text, "<one RRR arm>", "exec")
 
 
-def _numbers(plant: Plant) -> dict[str, str]:
+def numbers_of(plant: Plant) -> dict[str, str]:
     """Every constant of `_ACCELERATION` as the text of a number, a negative one in brackets."""
     p = dict(zip([f"p{k}" for k in range(1, 16)], plant.p.reshape(15).tolist(), strict=True))
     joints, g = plant.body.robot.joints, -plant.body.robot.gravity[2]

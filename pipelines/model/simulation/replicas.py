@@ -19,6 +19,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.control import Controlling
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.integrate import HeldBody, RungeKutta
+from pipelines.model.simulation.one_held import OneHeld
 from pipelines.model.simulation.one_hooked import OneHooked
 from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.one_rrr import OneRRR
@@ -59,7 +60,7 @@ class Simulated:
 
 
 def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = None, seeds: Iterable[int] = (0,),
-        exact: bool = False) -> Simulated:
+        exact: bool = True) -> Simulated:
     """One replica for each seed, with `steps` steps of the integrator a sample; `exact` as in `run_together`.
 
     Raises:
@@ -69,7 +70,7 @@ def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = 
 
 
 def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, noise: Noise | None = None,
-                 seeds: Iterable[int] = (0,), exact: bool = False) -> list[Simulated]:
+                 seeds: Iterable[int] = (0,), exact: bool = True) -> list[Simulated]:
     """`run` of several experiments at once, which costs hardly more than the longest alone. They have one sample time.
 
     Args:
@@ -82,7 +83,7 @@ def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int, no
     every = [_Lane(plant, experiment, noise or Noise.none(experiment.n_joints), drawn) for experiment in experiments]
     alone = [lane for lane in every if len(every) * len(drawn) <= _FEW and OneLoop.fits(plant, lane.experiment)]
     for lane in alone:
-        lane.run_alone(steps, drawn)
+        lane.run_alone(steps, drawn, exact)
     active, k = sorted((lane for lane in every if lane not in alone), key=lambda lane: -lane.experiment.n_samples), 0
     before: Integrator | None = None
     while active:
@@ -147,9 +148,9 @@ class _Lane:
         self._commanded[k] = command = self._control.command(k, self._counted[k])
         return command + extra_torque
 
-    def run_alone(self, steps: int, seeds: tuple[int, ...]) -> None:
+    def run_alone(self, steps: int, seeds: tuple[int, ...], exact: bool) -> None:
         """One replica after the other, each from the first to the last sample."""
-        experiment, loop = self.experiment, OneLoop(self.plant, self.experiment, steps)
+        experiment, loop = self.experiment, OneLoop(self.plant, self.experiment, steps, exact)
         for r, seed in enumerate(seeds):
             pieces = _pieces(self._noise, (seed,), experiment.n_samples)
             own = None if pieces is None else (piece[..., 0] for piece in pieces)
@@ -169,7 +170,7 @@ class _Lane:
 
 def _integrator(moving: MovingPlant, sample_time: float, steps: int, exact: bool) -> Integrator:
     if moving.replicas == 1 and OneRRR.fits(moving.plant):
-        return OneRRR(moving.plant, sample_time, steps)
+        return (OneRRR if exact else OneHeld)(moving.plant, sample_time, steps)
     if moving.replicas == 1 and OneHooked.fits(moving.plant):
         return OneHooked(moving, sample_time, steps)
     if not exact and HeldBody.fits(moving):

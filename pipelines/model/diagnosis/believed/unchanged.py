@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pipelines.log.experiment import Array
+from pipelines.log.shared_work import shared_out
 from pipelines.model.diagnosis.named.verdict import Ruling, at_floor, takes_most
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.search import Found
@@ -25,7 +26,8 @@ def stood_before(found: Found, case: Case) -> list[Effect]:
     """What was found of which the reference logs have as much, and which the standing set may have."""
     every = () if case.before is None else tuple(enumerate(found.final.model.effects))
     able = [(k, one.effect) for k, one in every if one.log is None and one.possible and not one.effect.needs]
-    return [effect for k, effect in able if case.before is not None and case.before(found.final, k).stood]
+    stood = shared_out(lambda one: case.before is not None and case.before(found.final, one[0]).stood, able)
+    return [effect for (_, effect), before in zip(able, stood, strict=True) if before]
 
 
 def no_change(found: Found, k: int, case: Case, floor: Array) -> str:

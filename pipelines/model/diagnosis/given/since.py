@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
@@ -113,7 +113,6 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
         fit = fit_changed(data, later, nominal, common, _slopes(found, later), found.weight)
         return Probe.of(found, judge, seen, (data, fit, later)), bounds(every, [True] * len(every), fit, later, chance)
 
-    @lru_cache(maxsize=4)  # it is asked whether it stood, then whether it has changed
     def share(found: Refined, place: int) -> Share:
         effects = found.model.effects
         if _farther(effects[place].effect, standing, prepared.data, reference):

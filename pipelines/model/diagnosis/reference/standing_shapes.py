@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.log.shared_work import shared_out
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import Fit
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
@@ -56,10 +57,14 @@ def _in_its_form(done: Refined, place: int) -> Refined:
     width, arm = len(own.amplitudes), done.model.nominal
     forms: list[Effect] = [form for form in own.effect.forms() if len(lay_one(done.data, form, arm)) == width]
     best, joint = done, own.effect.joint - 1
-    for form in forms:
+
+    def fitted(form: Effect) -> Refined:
         effects = list(done.model.effects)
         effects[place] = replace(own, effect=form)
-        other = refine(replace(done.model, effects=tuple(effects)), done.data, done.weight)
+        return refine(replace(done.model, effects=tuple(effects)), done.data, done.weight).lean
+
+    for lean in shared_out(fitted, forms):
+        other = lean.with_rows(done.data, done.model)
         if all(one.possible for one in other.model.effects) and other.rms[joint] ** 2 < _DECIDED * best.rms[joint] ** 2:
             best = other
     return best

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.fitted.linear import covariance
-from pipelines.model.diagnosis.fitted.nominal import fit_columns
+from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns
 from pipelines.model.diagnosis.rows.data import Data
 
 __all__ = ["ANYTHING", "Share", "share_before"]
@@ -71,14 +71,18 @@ def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], other
     count = len(columns)
     before, after = np.where(later, 0.0, columns), np.where(later, columns, 0.0)
     whole = np.concatenate([others, standing])
-    shows, left = (np.linalg.norm(fit_columns(data, np.concatenate([table, after]), weight=weight).project(before))
-                   for table in (others, whole))
+
+    def beside(table: Array) -> Fit:
+        """Nothing is fitted: what these columns leave of others is asked."""
+        return Fit(data, table, data.y, weight, np.zeros(len(table)))
+
+    shows, left = (np.linalg.norm(beside(np.concatenate([table, after])).project(before)) for table in (others, whole))
     if left <= _REST * shows:
         return Share(0.0, 0.0, 0.0 if before.any() else np.inf)
     fit = fit_columns(data, np.concatenate([whole, before, after]), weight=weight)
     own = slice(len(whole), len(whole) + count)
     was, now = fit.beta[own], fit.beta[own.stop:]
-    seen = fit_columns(data, whole, weight=weight).project(after)
+    seen = beside(whole).project(after)
     gram = seen @ seen.T
     there = max(float(now @ gram @ now), 1e-300)
     spread = float(np.trace(gram @ covariance(fit.table * fit.weights, fit.residual)[own, own]))
