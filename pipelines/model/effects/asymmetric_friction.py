@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["AsymmetricFriction"]
@@ -59,11 +58,7 @@ class AsymmetricFriction(Effect):
 
     def own_load(self, values: Values) -> OwnLoad:
         (coulomb, viscous), sharpness = map(float, 0.5 * self.amplitudes(values)), values["sharpness"]
+        turned = f"tanh({sharpness!r} * {{v}})"
         if not values["gradual"]:
-            return lambda angle, speed: coulomb * abs(math.tanh(sharpness * speed)) + viscous * abs(speed)
-
-        def load(angle: float, speed: float) -> float:
-            turned = math.tanh(sharpness * speed)
-            return turned * (coulomb * turned + viscous * speed)
-
-        return load
+            return Formula(f"({coulomb!r}) * abs({turned}) + ({viscous!r}) * abs({{v}})")
+        return Formula(f"{turned} * (({coulomb!r}) * {turned} + ({viscous!r}) * {{v}})")

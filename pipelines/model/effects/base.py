@@ -52,6 +52,7 @@ import numpy.typing as npt
 from pipelines.model.effects.terms import (
     LARGE,
     ArmModel,
+    Formula,
     Hooks,
     OwnLoad,
     OwnMemory,
@@ -66,8 +67,8 @@ from pipelines.model.effects.terms import (
 )
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["LARGE", "ArmModel", "Effect", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity", "SpeedCurve",
-           "Values", "friction_at"]
+__all__ = ["LARGE", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
+           "SpeedCurve", "Values", "friction_at"]
 
 
 @dataclass(frozen=True)

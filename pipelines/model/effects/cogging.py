@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import NEARLY, orders_along
 
@@ -121,11 +121,7 @@ class Cogging(Effect):
         shaped = self.at(values)
         parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
         waves = [(m * shaped.order, in_phase, across) for m, (in_phase, across) in enumerate(parts, start=1)]
-
-        def load(angle: float, speed: float) -> float:
-            return sum(a * math.sin(k * angle) + b * math.cos(k * angle) for k, a, b in waves)
-
-        return load
+        return Formula(" + ".join(f"({a!r}) * sin({k!r} * {{q}}) + ({b!r}) * cos({k!r} * {{q}})" for k, a, b in waves))
 
     def amplitudes(self, values: Values) -> Array:
         waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in ("", "_2", "_3")[:self.harmonics]]

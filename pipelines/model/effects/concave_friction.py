@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ConcaveFriction"]
@@ -73,7 +72,7 @@ class ConcaveFriction(Effect):
         if knee < _NONE:
             return None
         power = -1.0 / knee
-        return lambda angle, speed: amplitude * slow * speed * math.pow(1.0 + abs(slow * speed) ** knee, power)
+        return Formula(f"({amplitude!r}) * {slow!r} * {{v}} * (1.0 + abs({slow!r} * {{v}}) ** {knee!r}) ** ({power!r})")
 
     def speed_curve(self, values: Values) -> SpeedCurve | None:
         if values["knee"] >= _NONE:

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["PositionFriction"]
@@ -92,11 +92,8 @@ class PositionFriction(Effect):
     def own_load(self, values: Values) -> OwnLoad:
         shaped, sharpness = self.at(values), values["sharpness"]
         waves = [(m * shaped.order, *pair) for m, pair in enumerate(np.reshape(shaped.amplitudes(values), (-1, 2)).tolist(), 1)]
-
-        def load(angle: float, speed: float) -> float:
-            return math.tanh(sharpness * speed) * sum(a * math.sin(k * angle) + b * math.cos(k * angle) for k, a, b in waves)
-
-        return load
+        sums = " + ".join(f"({a!r}) * sin({k!r} * {{q}}) + ({b!r}) * cos({k!r} * {{q}})" for k, a, b in waves)
+        return Formula(f"tanh({sharpness!r} * {{v}}) * ({sums})")
 
     def amplitudes(self, values: Values) -> Array:
         waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in _TAILS[:self.harmonics]]

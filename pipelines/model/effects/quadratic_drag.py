@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["QuadraticDrag"]
@@ -33,4 +33,4 @@ class QuadraticDrag(Effect):
 
     def own_load(self, values: Values) -> OwnLoad:
         coefficient = self.amplitudes(values).item()
-        return lambda angle, speed: coefficient * speed * abs(speed)
+        return Formula(f"({coefficient!r}) * {{v}} * abs({{v}})")

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Stribeck"]
@@ -79,15 +79,9 @@ class Stribeck(Effect):
     def own_load(self, values: Values) -> OwnLoad:
         amplitude, sharpness, slow = self.amplitudes(values).item(), values["sharpness"], 1.0 / values["speed"]
         p, n = values["tail"], values["exponent"]
-        if p < _NONE and n == _HELD["exponent"]:
-            exp, tanh = math.exp, math.tanh  # four times a step: a power costs as much as all else
-
-            def gaussian(angle: float, speed: float) -> float:
-                x = slow * speed
-                return amplitude * exp(-x * x) * tanh(sharpness * speed)
-
-            return gaussian
+        turned = f"tanh({sharpness!r} * {{v}})"
+        if p < _NONE and n == _HELD["exponent"]:  # four times a step: a power costs as much as all else
+            return Formula(f"({amplitude!r}) * exp(-({slow!r} * {{v}}) * ({slow!r} * {{v}})) * {turned}")
         if p < _NONE:
-            return lambda angle, speed: amplitude * math.exp(-abs(slow * speed) ** n) * math.tanh(sharpness * speed)
-        wide, power = math.expm1(p), -1.0 / p
-        return lambda angle, speed: amplitude * (1.0 + wide * abs(slow * speed) ** n) ** power * math.tanh(sharpness * speed)
+            return Formula(f"({amplitude!r}) * exp(-abs({slow!r} * {{v}}) ** {n!r}) * {turned}")
+        return Formula(f"({amplitude!r}) * (1.0 + {math.expm1(p)!r} * abs({slow!r} * {{v}}) ** {n!r}) ** ({-1.0 / p!r}) * {turned}")

@@ -3,6 +3,7 @@
     ArmModel      what an effect may ask of the arm
     Quantity      one parameter: unit, range, meaning
     SpeedCurve    a torque that follows from speed alone, which a simulation takes by itself
+    Formula       one that follows from angle and speed, which it writes out
     Hooks         how an effect enters the forward simulation
 
 `pipelines.model.effects.base`, the contract of an effect, hands these on: an effect imports from there alone.
@@ -13,15 +14,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["LARGE", "ArmModel", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values",
-           "friction_at", "predicted", "summed"]
+__all__ = ["LARGE", "WRITTEN", "ArmModel", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
+           "SpeedCurve", "Values", "friction_at", "predicted", "summed"]
 
 Values = Mapping[str, float]
 
@@ -69,7 +71,23 @@ class ArmModel(Protocol):
 
 Predict = Callable[[Motion, ArmModel], Array]
 OwnLoad = Callable[[float, float], float]  # angle [rad], speed [rad/s] -> [N m]
+WRITTEN: Mapping[str, Any] = {name: getattr(math, name) for name in ("cos", "exp", "sin", "tanh", "inf", "nan")}  # in formulas
 PlainDrive = Callable[[tuple[float, ...], tuple[float, ...]], tuple[float, ...]]  # command [N m], speeds [rad/s] -> [N m], by joint
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An `OwnLoad` that a simulation can write out among its own sums: there a call costs more than the arithmetic."""
+
+    text: str  # Python over {q} [rad] and {v} [rad/s], with the names of `WRITTEN`
+
+    def __call__(self, angle: float, speed: float) -> float:
+        return self._called(angle, speed)
+
+    @cached_property
+    def _called(self) -> OwnLoad:
+        load: OwnLoad = eval(f"lambda q, v: {self.text.format(q='q', v='v')}", dict(WRITTEN))
+        return load
 
 
 @dataclass(frozen=True)

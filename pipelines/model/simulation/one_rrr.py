@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from math import cos, nan, sin, tanh
+from math import nan
 from types import CodeType
 from typing import Any
 
 import numpy as np
 
-from pipelines.model.effects.base import PlainDrive
+from pipelines.model.effects.terms import WRITTEN, Formula, OwnLoad, PlainDrive
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.rrr import RRR
 from pipelines.model.simulation.plant import Plant
@@ -182,7 +182,7 @@ def written(text: str, plant: Plant, remembering: Sequence[int] = (), drives: Se
     several = {"load": [load for _, load in plant.own_loads], "rate": [one.rate for one in own], "bend": [one.load for one in own],
                "drive": drives}
     called = {f"{name}{k}": one for name, some in several.items() for k, one in enumerate(some)}
-    scope: dict[str, Any] = {"cos": cos, "sin": sin, "tanh": tanh, **called}
+    scope: dict[str, Any] = {**WRITTEN, **called}
     exec(_code(text.format(**stages, called="".join(f", {name}={name}" for name in called), **more)), scope)
     return scope
 
@@ -214,14 +214,18 @@ def numbers_of(plant: Plant) -> dict[str, str]:
 
 def _names(plant: Plant, remembering: Sequence[int], position: str, speed: str, slope: str) -> dict[str, str]:
     """The variables of one stage, and friction with the loads of single joints as text over them."""
-    loads = [joint for joint, _ in plant.own_loads]
     names = {f"{kind}{k}": f"{letter}{k}" for kind, letter in (("q", position), ("v", speed), ("a", slope)) for k in (1, 2, 3)}
     curves = plant.curves
     for j in range(3):
         v = f"{speed}{j + 1}"
         sigmoids = zip(curves.heights[:, j].tolist(), curves.sharpnesses[:, j].tolist(), strict=True)
         terms = [f"({curves.viscous[j].item()!r}) * {v}", *(f"({f!r}) * tanh({w!r} * {v})" for f, w in sigmoids if f)]
-        terms += [f"load{k}({position}{j + 1}, {v})" for k, joint in enumerate(loads) if joint == j]
+        terms += [_load(load, k, f"{position}{j + 1}", v) for k, (joint, load) in enumerate(plant.own_loads) if joint == j]
         terms += [f"bend{k}(b{k}{slope}, r{k}{slope})" for k, joint in enumerate(remembering) if joint == j]
         names[f"friction{j + 1}"] = " + ".join([*terms, repr(curves.constant[j].item())] if curves.constant[j] else terms)
     return names
+
+
+def _load(load: OwnLoad, number: int, q: str, v: str) -> str:
+    """What a load of one joint is at angle and speed, as text."""
+    return f"({load.text.format(q=q, v=v)})" if isinstance(load, Formula) else f"load{number}({q}, {v})"
