@@ -7,8 +7,8 @@ import pytest
 
 from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
-from pipelines.model.effects.base import Effect
-from pipelines.model.effects.terms import summed
+from pipelines.model.effects.base import Effect, Formula
+from pipelines.model.effects.terms import WRITTEN, summed
 from pipelines.model.rigid.body import Motion
 from tests.model.effects.test_every_effect import arm, drawn, every_effect, motion, placed
 
@@ -63,6 +63,28 @@ def test_a_drive_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) 
     assert np.abs(arrays - command).max() > 1e-6
 
 
+@every_effect
+def test_torques_of_a_moment_mixed(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """Where it is one matrix at all times, that is what it makes of any torque."""
+    values, some = drawn(placed(kind), 10), Motion(*(x[::50] for x in (motion.t, motion.q, motion.dq, motion.ddq)))
+    matrix = placed(kind).mixing(values, arm.n_joints)
+    if matrix is None:
+        return
+    torque = np.random.default_rng(3).uniform(-50.0, 50.0, some.q.shape)
+    np.testing.assert_allclose(placed(kind).apply(some, arm, values, lambda m, a: torque.copy()), torque @ matrix.T, rtol=1e-12)
+    assert np.abs(matrix - np.eye(arm.n_joints)).max() > 1e-3
+
+
+@every_effect
+def test_what_is_written_out_is_what_is_called(kind: type[Effect]) -> None:
+    """With any sign of its numbers, and within a product."""
+    load = placed(kind).own_load(drawn(placed(kind), 11))
+    if not isinstance(load, Formula):
+        return
+    for angle, speed in ((0.3, -0.7), (-1.1, 0.02), (2.0, 0.0)):
+        assert eval(f"2.0 * ({load.text.format(q='a', v='b')})", {**WRITTEN, "a": angle, "b": speed}) == 2.0 * load(angle, speed)
+
+
 def test_some_effects_have_them(arm: Arm) -> None:
     """Or the claims above would be about none; every drive without a memory has them."""
     hooks = {kind.name: placed(kind).simulate(arm, drawn(placed(kind), 9)) for kind in all_effects()}
@@ -70,6 +92,7 @@ def test_some_effects_have_them(arm: Arm) -> None:
         name for name, one in hooks.items() if one.actuator and not one.states} != set()
     assert any(kind.own_memory is not Effect.own_memory for kind in all_effects())
     assert any(kind.own_load is not Effect.own_load for kind in all_effects())
+    assert any(kind.mixing is not Effect.mixing for kind in all_effects())
 
 
 @pytest.mark.parametrize("samples", [1, 400])

@@ -7,9 +7,11 @@ import pytest
 
 from pipelines.log.experiment import Controller
 from pipelines.model.arm import Acting
+from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.load_friction import LoadFriction
 from pipelines.model.effects.presliding import Presliding
 from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.rigid.body import Array
@@ -25,6 +27,9 @@ _SPRING = Spring(joint=3, degree=1, highest=1)
 ARMS = {
     "nothing more": (),
     "a spring": (Acting.of(_SPRING, _SPRING.values([3.0, 0.5])),),
+    "waves and humps, written out": (
+        Acting.of(Cogging(2, order=9.0, harmonics=1), Cogging(2, order=9.0, harmonics=1).values([0.5, -0.2])),
+        Acting.of(Stribeck(1, speed=0.2, sharpness=20.0), Stribeck(1, speed=0.2, sharpness=20.0).values([0.8]))),
     "friction that remembers": (Acting.of(_SLIDES, _SLIDES.values([2.0])),),
     "drives": (Acting.of(TorqueGain(2), {"gain_error": 0.1}),
                Acting.of(TorqueCrosstalk(1, from_joint=2.0), {"coefficient": 0.2, "from_joint": 2.0}),

@@ -58,6 +58,10 @@ class Arms:
     start: Arm  # for what just adds its torque, whatever else acts
     rigid: tuple[RigidArm, ...] = ()  # of each joint, then of all: for what of that follows from the rigid body; none: `start`
 
+    @property
+    def every(self) -> tuple[Arm, ...]:
+        return (self.now, self.start, *(arm for arm, _ in self.rigid))
+
     def of(self, family: Family) -> Arm:
         effect, whole = family.shapes[0], len(self.rigid)
         if whole and effect.adds and effect.from_body:

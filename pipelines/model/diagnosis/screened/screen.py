@@ -82,7 +82,7 @@ def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm | Arms, 
     def one(family: Family) -> Screened:
         return (screen_event if family.event else screen_family)(data, fit, family, arms.of(family), residuals).lean
 
-    found = for_each(data, one, candidates, (fit,), arms.now, arms.start, *(arm for arm, _ in arms.rigid))
+    found = for_each(data, one, candidates, (fit,), *arms.every)
     return [replace(seen, family=family) for seen, family in zip(found, candidates, strict=True)]
 
 

@@ -90,7 +90,7 @@ def _smallest(bounds: Mapping[Family, float], probe: Probe) -> dict[Family, Hidd
     def hidden(family: Family) -> Hidden | None:
         return (smallest_hidden if family.shapes[0].fixed_amplitudes is None else weakest)(family, bounds[family], probe)
 
-    found = for_each(probe.data, hidden, tuple(bounds), (probe.fit, probe.final.fit), probe.arms.now, probe.arms.start)
+    found = for_each(probe.data, hidden, tuple(bounds), (probe.fit, probe.final.fit), *probe.arms.every)
     return dict(zip(bounds, found, strict=True))
 
 
