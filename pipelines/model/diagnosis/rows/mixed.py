@@ -1,8 +1,9 @@
-"""Rows of torques that drives mix at every moment, M τ(t): what is done to a signal is linear and the same for every joint, so that
-the rows of the mixed torque are the rows mixed.
+"""Rows of torques that drives mix at every moment.
 
-    mixable(data)             whether it is so in these rows
+    mixable(data)             whether the rows of M τ(t) are the rows mixed
     mixed(data, M, rows)      rows of M τ, of the rows of τ
+
+What is done to a signal is linear, and the same for every joint: so it is the same before and after.
 """
 
 from __future__ import annotations
