@@ -34,6 +34,8 @@ What a search over effects asks, so that it need not know any of them:
     beyond               whether logs go where those that it was fitted to say nothing of it
     acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
     reported             the parameters as causes.md names them
+    from_motion          whether its columns hang on the motion alone; from_body: on the rigid body as well, and nothing else
+    mixing               the matrix by which it mixes the torques of a moment, where that is all it does
 
 The columns of an effect need not be independent of each other, nor all seen, on every arm: solve with a rank threshold. Each
 motion handed in is one log from its first sample (time in a log counts from motion.t[0]), complete but for gaps.
@@ -49,6 +51,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.model.effects.placed import Placed
 from pipelines.model.effects.terms import (
     LARGE,
     ArmModel,
@@ -72,7 +75,7 @@ __all__ = ["LARGE", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMem
 
 
 @dataclass(frozen=True)
-class Effect(ABC):
+class Effect(Placed, ABC):
     """A physical cause at one joint, or of the whole arm."""
 
     joint: int | None = None  # 1-based; None where scope is "arm"
@@ -284,36 +287,3 @@ class Effect(ABC):
     def predicted(self, motion: Motion, arm: ArmModel) -> Array:
         """`arm.torque(motion)`, kept from one effect and shape to the next; not to be written to."""
         return predicted(arm, motion)
-
-    def sharpnesses(self, motion: Motion, count: int) -> list[float]:
-        """[s/rad] largest first: a geometric grid between the slowest and the fastest speeds that this motion holds."""
-        speed = np.abs(self.own(motion.dq))
-        moving = speed[speed > 0]
-        fast, slow = (moving.max(), np.quantile(moving, 0.02)) if moving.size else (1.0, 0.01)
-        return [float(w) for w in np.geomspace(1 / fast, 2 / max(slow, 1e-3 * fast), count)[::-1]]
-
-    def own(self, signal: Array) -> Array:
-        """Column of its own joint, (samples,)."""
-        return np.asarray(signal[..., self._index])
-
-    def with_own(self, numbers: tuple[float, ...], own: float) -> tuple[float, ...]:
-        """`numbers` of all joints, with `own` in its own place."""
-        return (*numbers[:self._index], own, *numbers[self._index + 1:])
-
-    def goes_round(self, motion: Motion, but: float = 0.02) -> bool:
-        """Whether its own joint travels all of a circle but for a fiftieth, or such a part of it: what it does there comes back to
-        where it began."""
-        return float(np.ptp(self.own(motion.q))) > (1.0 - but) * 2.0 * np.pi
-
-    def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
-        """`columns`, each (samples,), as (samples, joints, columns): they act on its own joint only. Samples lie side by side."""
-        rows = np.zeros((arm.n_joints, len(columns), len(columns[0])))
-        for k, column in enumerate(columns):
-            rows[self._index, k] = column
-        return rows.transpose(2, 0, 1)
-
-    @property
-    def _index(self) -> int:
-        if self.joint is None:
-            raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
-        return self.joint - 1

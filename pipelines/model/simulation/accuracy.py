@@ -21,7 +21,7 @@ from pipelines.errors import InputRejected
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.integrate import HeldBody
-from pipelines.model.simulation.one_rrr import OneRRR
+from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.plant import Plant
 from pipelines.model.simulation.replicas import Noise, run_together
 
@@ -31,7 +31,7 @@ _STRETCH = 0.25  # [s] length of a stretch that is tried
 _SHARE = 0.1  # of the noise difference that the step may cause
 _CANDIDATES = (1, 2, 4, 8, 16, 32, 64)  # steps a sample
 _AMPLE = 8  # steps a sample, where noise is what matters
-_GAIN = 4.0  # what halving the step takes off the error at least: of order 2 is a body held over each, of order 4 what holds none
+_GAIN = 4.0  # what halving the step divides the error by, about: of order 2 is a body held over each, of order 4 what holds none
 _UNHEARD = 1e-9  # [rad] tolerance where nothing is random and nothing counts steps
 
 
@@ -43,7 +43,7 @@ class Step:
     error: Array  # [rad] rms, largest of the stretches, measured by halving: an upper bound
     noise: Array  # [rad] rms difference of two runs with different noise
     allowed: Array  # [rad]
-    exact: bool  # of a serial arm: the rigid body is nowhere held
+    exact: bool  # the rigid body is nowhere held
 
 
 def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None) -> Step:
@@ -74,13 +74,15 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
 
 def _tried(plant: Plant, calm: list[Experiment], steps: int, fine: list[Array],
            known: list[Array] | None) -> Iterator[tuple[int, Array, bool]]:
-    """Steps a sample, their error (joints,) [rad] and whether they hold nothing, the cheapest first: `steps`, and twice as many by
-    what that takes off at least.
+    """Steps a sample, their error (joints,) [rad] and whether they hold nothing, as they are to be preferred: `steps`, and twice as
+    many by what that takes off. Of an arm in plain numbers two steps that hold cost little more than one that does not, which would
+    have to be tried.
 
     Args:
         fine: what twice as many that hold nothing come to; `known`: what `steps` of them do, where somebody knows.
     """
-    finer, arrays, numbers = 2 * steps, HeldBody.fits(plant.prepared(1)), OneRRR.fits(plant)
+    finer, arrays = 2 * steps, HeldBody.fits(plant.prepared(1))
+    numbers = all(OneLoop.fits(plant, one) for one in calm)
     held = _rms(_positions(plant, calm, steps, exact=False), fine) if arrays or numbers else None
     shared = arrays and HeldBody.together(calm[0].sample_time, finer) > 1  # it is held for as long as before
     if held is not None:
@@ -89,7 +91,7 @@ def _tried(plant: Plant, calm: list[Experiment], steps: int, fine: list[Array],
             yield finer, held / _GAIN, False
     error = _rms(_positions(plant, calm, steps, exact=True) if known is None else known, fine)
     yield steps, error, True
-    if held is not None and numbers and steps > 1:  # in plain numbers one step that holds nothing costs less than two
+    if held is not None and numbers and steps > 1:
         yield finer, held / _GAIN, False
     yield finer, error / _GAIN, True
 

@@ -12,10 +12,7 @@ that the last step's D and b give now.
 
 from __future__ import annotations
 
-import numpy as np
-
-from pipelines.model.rigid.body import Array
-from pipelines.model.simulation.one_rrr import KUTTA, POSED, OneRRR, Step, memories, numbers_of, written
+from pipelines.model.simulation.one_rrr import KUTTA, POSED, Step, memories, numbers_of, written
 from pipelines.model.simulation.plant import Plant
 
 __all__ = ["HELD", "OneHeld"]
@@ -71,36 +68,28 @@ def first(y2, y3, w1, w2, w3, cos=cos, sin=sin{called}):
 """
 
 
-class OneHeld(OneRRR):
-    """The integrator of one arm as `OneRRR` fits it."""
+class OneHeld:
+    """One arm as `OneRRR` fits it."""
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
-        """`plant` as `fits` it; `steps` of equal size make one control sample."""
-        super().__init__(plant, sample_time, steps)
+        """`plant` as `OneRRR` fits it; `steps` of equal size make one control sample."""
+        self.step = _compiled(plant, sample_time / steps)
         self._first: Step = written(_FIRST, plant, middle=_middle(plant), held=", ".join(HELD))["first"]
-        self._held: tuple[float, ...] | None = None
 
     def held(self, now: tuple[float, ...]) -> tuple[float, ...]:
         """D⁻¹ and -b in the state `now` (q1, q2, q3, v1, v2, v3, ...), which a step takes behind the memories."""
         return self._first(*now[1:6])
 
-    def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:
-        del t
-        now = (*state[:, 0].tolist(), *states[0].tolist())
-        now = self._moved((*now, *(self._held or self.held(now))), command[:, 0].tolist())
-        state[:, 0], self._held = now[:6], now[-len(HELD):]
-        return np.array([now[6:-len(HELD)]])
 
-    @staticmethod
-    def _compiled(plant: Plant, h: float) -> Step:
-        """(q1, q2, q3, v1, v2, v3, memories, D⁻¹ and -b, u1, u2, u3) -> all but u after a step of length h [s]."""
-        lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
-        joints = [joint for joint, _ in plant.own_memories]
-        named, more = ", ".join(HELD), memories(joints, **lengths)
-        more["remembered"] += f", {named}"
-        step: Step = written(_STEP, plant, joints, plant.drives, _STAGE, **lengths, **more, held=named, eighth=repr(0.125 * h * h),
-                             middle=_middle(plant))["step"]
-        return step
+def _compiled(plant: Plant, h: float) -> Step:
+    """(q1, q2, q3, v1, v2, v3, memories, D⁻¹ and -b, u1, u2, u3) -> all but u after a step of length h [s]."""
+    lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
+    joints = [joint for joint, _ in plant.own_memories]
+    named, more = ", ".join(HELD), memories(joints, **lengths)
+    more["remembered"] += f", {named}"
+    step: Step = written(_STEP, plant, joints, plant.drives, _STAGE, **lengths, **more, held=named, eighth=repr(0.125 * h * h),
+                         middle=_middle(plant))["step"]
+    return step
 
 
 def _middle(plant: Plant) -> str:

@@ -64,7 +64,8 @@ class Plant:
             added = added if own.inertia is None else added + own.inertia
             records += [own.record] if own.record else []
             if any((own.load, own.actuator, own.sensor, own.settled, own.states)):
-                load = None if own.actuator or own.states else acting.effect.own_load(acting.values)
+                values = {name: float(value) for name, value in acting.values.items()}  # which are written as numbers of Python
+                load = None if own.actuator or own.states else acting.effect.own_load(values)
                 alone = None if load is None or acting.effect.joint is None else (acting.effect.joint - 1, load)
                 hooks.append(replace(own, alone=alone, remembering=_remembering(acting, own)))
         parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)

@@ -19,7 +19,6 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.simulation.control import Controlling
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.integrate import HeldBody, RungeKutta
-from pipelines.model.simulation.one_held import OneHeld
 from pipelines.model.simulation.one_hooked import OneHooked
 from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.one_rrr import OneRRR
@@ -170,7 +169,7 @@ class _Lane:
 
 def _integrator(moving: MovingPlant, sample_time: float, steps: int, exact: bool) -> Integrator:
     if moving.replicas == 1 and OneRRR.fits(moving.plant):
-        return (OneRRR if exact else OneHeld)(moving.plant, sample_time, steps)
+        return OneRRR(moving.plant, sample_time, steps)
     if moving.replicas == 1 and OneHooked.fits(moving.plant):
         return OneHooked(moving, sample_time, steps)
     if not exact and HeldBody.fits(moving):

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects.cogging import Cogging
+from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.load_friction import LoadFriction
 from pipelines.model.effects.presliding import Presliding
 from pipelines.model.effects.spring import Spring
@@ -16,12 +20,11 @@ from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation import Noise, Plant, choose_step, run
-from pipelines.model.simulation.integrate import RungeKutta
-from pipelines.model.simulation.one_held import OneHeld
 from pipelines.model.simulation.replicas import Simulated
-from tests.model.simulation.arms import KD, KP, TS, experiment, rrr
+from tests.model.simulation.arms import KD, KP, experiment, rrr
 
 SAMPLES, FINE = 400, 32
+PD = Controller("pd", KP, KD, velocity="backward-difference")
 _SLIDES = Presliding(joint=2, distance=0.01, damping_time=0.004)
 _SPRING = Spring(joint=3, degree=1, highest=1)
 ARMS = {
@@ -43,7 +46,7 @@ def plant(name: str) -> Plant:
 
 def moved(arm: Plant, steps: int, exact: bool, replicas: int = 1) -> Array:
     """(samples, joints) [rad] of the last replica."""
-    asked = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
+    asked = experiment(PD, SAMPLES)
     done: Simulated = run(arm, asked, steps, seeds=range(replicas), exact=exact)
     return np.asarray(done.true_q[-1])
 
@@ -58,26 +61,9 @@ def test_the_shorter_the_step_the_nearer_to_arrays_that_hold_nothing(name: str) 
     assert far < 1e-6
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_sample_by_sample_as_in_a_loop_of_its_own(name: str) -> None:
-    """Outside a loop it remembers from one sample to the next what it holds."""
-    arm = plant(name)
-    ours, theirs = OneHeld(arm, TS, 8), RungeKutta(arm.prepared(2), TS, FINE)
-    count = len(arm.own_memories)
-    state, states = np.array([[0.1], [-1.0], [0.4], [0.0], [0.2], [-0.1]]), np.zeros((1, count))
-    other, others = np.repeat(state, 2, axis=1), np.zeros((2, count))
-    for k in range(200):
-        command = np.array([[4.0 * np.sin(0.05 * k)], [30.0 * np.cos(0.03 * k)], [3.0]])
-        states = ours.advance(np.zeros(1), state, states, command)
-        others = theirs.advance(np.zeros(2), other, others, np.repeat(command, 2, axis=1))
-    np.testing.assert_allclose(state, other[:, :1], rtol=0.0, atol=2e-5)
-    np.testing.assert_allclose(states, others[:1], rtol=0.0, atol=1e-6)
-    assert np.ptp(state) > 0.1
-
-
 def test_it_is_held_where_noise_hides_it_and_nowhere_else() -> None:
     """1e-9 rad where nothing is random, as arms of other kinds."""
-    asked = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
+    asked = experiment(PD, SAMPLES)
     loud = choose_step(plant("nothing more"), asked, Noise(np.full(3, 0.3), np.zeros(3)))
     calm = choose_step(plant("nothing more"), asked)
     assert not loud.exact
@@ -85,8 +71,31 @@ def test_it_is_held_where_noise_hides_it_and_nowhere_else() -> None:
     assert (loud.error <= loud.allowed).all()
 
 
-def test_an_arm_that_runs_away_ends_in_no_number() -> None:
-    ours = OneHeld(plant("nothing more"), TS, 1)
-    state = np.full((6, 1), 1e200)
-    ours.advance(np.zeros(1), state, np.zeros((1, 0)), np.zeros((3, 1)))
-    assert np.isnan(state).all()
+def test_an_arm_that_runs_away_is_refused() -> None:
+    with pytest.raises(InputRejected, match="D17"):
+        run(plant("nothing more"), experiment(replace(PD, kp=-20 * KP, kd=-KD), 3000), 1, exact=False)
+
+
+LAWS = {
+    "in a loop of its own": (PD, ()),
+    "an encoder that misreads": (PD, (Acting.of(EncoderEccentricity(1), {"amplitude": 0.002, "phase": 0.3}),)),
+    "computed torque": (replace(PD, law="computed-torque", kp=np.full(3, 400.0), kd=np.full(3, 40.0)), ()),
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("name", LAWS)
+def test_what_is_told_of_a_step_is_what_it_leaves(name: str, noise: float) -> None:
+    """Where nothing rubs, all of the error is what was held: it has to be measured in the very integrator that is taken then."""
+    law, more = LAWS[name]
+    smooth = replace(rrr().arm, friction=()).extended(*more)
+    asked, drives = replace(experiment(law, SAMPLES), feedforward_arm=rrr().arm), Noise(np.full(3, noise), np.zeros(3))
+    step = choose_step(Plant.of(smooth), asked, drives)
+    fine = run(Plant.of(smooth), asked, FINE).true_q[0]
+    taken = run(Plant.of(smooth), asked, step.per_sample, exact=step.exact).true_q[0]
+    assert (np.sqrt(np.mean((taken - fine) ** 2, axis=0)) <= 1.5 * step.allowed).all()
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    hump = Acting.of(Stribeck(2, speed=0.2), {name: np.float64(x) for name, x in Stribeck(2, speed=0.2).values([0.8]).items()})
+    assert np.isfinite(moved(Plant.of(rrr().arm.extended(hump)), 1, exact=False)).all()

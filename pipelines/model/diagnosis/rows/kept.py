@@ -36,7 +36,6 @@ class Kept:
         self._rows: OrderedDict[Hashable, Rows] = OrderedDict()
         self._numbered: list[tuple[weakref.ref[object], Hashable]] = []
         self._count = 0
-        self.rigid: list[tuple[Any, Rows]] = []  # arms that columns of the rigid body were laid for, and their rigid torque
 
     def of(self, key: Hashable, lay: Callable[[], Rows]) -> Rows:
         found = self._rows.pop(key, None)

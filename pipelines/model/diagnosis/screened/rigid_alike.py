@@ -3,6 +3,8 @@
     arms = alike(data, model)      (joints + 1,) of arms that were asked for before, where one will do: for each joint, then for all
     remember(data, arms)           columns have been laid for these
 
+Which arms were asked for before is part of the answer, then, in its last digits.
+
 A link in its gap is followed sample by sample over all logs, for every gap at every joint: half of what a screening takes. A cause
 that was found moves the base parameters of the joints beside it by some parts in ten thousand.
 """
@@ -10,6 +12,7 @@ that was found moves the base parameters of the joints beside it by some parts i
 from __future__ import annotations
 
 from collections.abc import Iterable
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,6 +21,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import rigid_rows
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.rows.kept import Kept
 
 __all__ = ["RigidArm", "alike", "remember"]
 
@@ -27,6 +31,8 @@ _ALIKE = 1e-3
 _MOST = 8  # arms that are remembered
 
 RigidArm = tuple[Arm, Array]  # and its rigid torque (rows,) [N m]
+_Places = tuple[int, ...]  # of the logs among those that are kept together
+_KNOWN: WeakKeyDictionary[Kept, list[tuple[_Places, RigidArm]]] = WeakKeyDictionary()  # by where their columns are kept
 
 
 def alike(data: Data, model: Exact) -> tuple[RigidArm, ...]:
@@ -41,11 +47,17 @@ def alike(data: Data, model: Exact) -> tuple[RigidArm, ...]:
 
 def remember(data: Data, arms: Iterable[RigidArm]) -> None:
     """They are alike for others after them; none whose effects change how torque is recorded."""
+    kept = _KNOWN.setdefault(data.logs[0].kept, [])
     for one in arms:
         if not any(one[0] is other for other, _ in _known(data)) and not any(acting.effect.last for acting in one[0].effects):
-            _known(data).append(one)
-    del _known(data)[:-_MOST]
+            kept.append((_places(data), one))
+    del kept[:-_MOST]
 
 
 def _known(data: Data) -> list[RigidArm]:
-    return data.logs[0].kept.rigid
+    """Those of the very logs, the oldest first."""
+    return [one for places, one in _KNOWN.get(data.logs[0].kept, []) if places == _places(data)]
+
+
+def _places(data: Data) -> _Places:
+    return tuple(log.place for log in data.logs)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +16,7 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.candidates import Arms, Family
-from pipelines.model.diagnosis.screened.rigid_alike import alike, remember
+from pipelines.model.diagnosis.screened.rigid_alike import _KNOWN, alike, remember
 from pipelines.model.diagnosis.screened.screen import screen
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.backlash import Backlash
@@ -69,6 +71,30 @@ def test_friction_is_none_of_it() -> None:
     beta = model.beta.copy()
     beta[len(model.columns.kept):] *= 3.0
     assert all(one is model.arm for one, _ in alike(data, replace(model, beta=beta)))
+
+
+def test_some_of_the_logs_are_other_rows() -> None:
+    """What a second log did to an arm is nothing that the first knows of."""
+    prepared = prepare(Logs((hidden(1), hidden(2))), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit)
+    remember(prepared.data, alike(prepared.data, model))
+    for place in (0, 1):
+        one = replace(prepared.data, logs=prepared.data.logs[place:place + 1])
+        assert alike(one, scaled(model, 1.0 + 5e-4))[0][0] is not model.arm
+
+
+def test_the_oldest_is_forgotten_and_the_store_with_its_logs() -> None:
+    model, data = start()
+    for k in range(9):
+        remember(data, alike(data, scaled(model, 1.0 + 0.01 * k)))
+    assert alike(data, model)[0][0] is model.arm
+    assert alike(data, scaled(model, 1.01))[0][0] is not model.arm
+    kept, known = weakref.ref(data.logs[0].kept), len(_KNOWN)
+    del data
+    gc.collect()
+    assert kept() is None
+    assert len(_KNOWN) < known
 
 
 def test_nothing_is_taken_from_an_arm_whose_record_is_changed() -> None:
