@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from pipelines.log import shared_work
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
@@ -17,6 +18,8 @@ from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.given.since import Since, since_reference
+from pipelines.model.diagnosis.reference.standing import Chosen
+from pipelines.model.diagnosis.reference.standing_shapes import fitted_shapes
 from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.stribeck import Stribeck
@@ -33,6 +36,13 @@ def hump(motion: Motion, size: float) -> Array:
     """Friction of joint 2 at low speed, between two of the speeds that a screening tries."""
     v, out = motion.dq[:, 1], np.zeros_like(motion.q)
     out[:, 1] = size * np.exp(-((v / SPEED) ** 2)) * np.tanh(SHARPNESS * v)
+    return out
+
+
+def wide(motion: Motion) -> Array:
+    """The same with a tail."""
+    v, out = motion.dq[:, 1], np.zeros_like(motion.q)
+    out[:, 1] = AMPLITUDE / (1.0 + (v / SPEED) ** 2) * np.tanh(SHARPNESS * v)
     return out
 
 
@@ -56,6 +66,21 @@ def test_it_has_the_shape_and_the_size_that_the_reference_logs_say(grown: Since)
     values = grown.acting[0].values
     assert values["speed"] == pytest.approx(SPEED, rel=0.03)
     assert values["amplitude"] == pytest.approx(AMPLITUDE, rel=0.05)
+
+
+def test_forms_fitted_by_two_processes_are_those_that_one_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit: a hump with another tail than the one that was chosen."""
+    data = prepare(Logs((hidden(4, wide), hidden(5, wide))), SETTINGS)
+    columns, fit = fit_nominal(data.data, data.columns)
+    chosen = [Chosen(Stribeck(2, speed=SPEED, sharpness=SHARPNESS), 0.1, np.array([AMPLITUDE]))]
+    monkeypatch.setattr("multiprocessing.parent_process", lambda: None)
+    found = []
+    for count in (1, 2):
+        monkeypatch.setattr(shared_work, "processors", lambda count=count: count)
+        (one,), laws, beta = fitted_shapes(chosen, columns, fit)
+        found.append((one.effect, one.amplitudes.tolist(), laws.laws, beta.tolist()))
+    assert found[0] == found[1]
+    assert found[0][0] != Stribeck(2, speed=SPEED, sharpness=SHARPNESS)
 
 
 def test_the_reference_logs_then_leave_noise(grown: Since) -> None:
