@@ -54,7 +54,7 @@ class Spring(Effect):
     signature = "A torque that depends on the angle of its joint alone and pulls towards one angle."
     explanation = "A cable bundle, a hose or a balancing spring pulls the joint."
     remedy = "Look for a cable that is led too short or has come loose; add it to the model."
-    experiment = "Hold the joint at rest in many angles over its whole range, with the joint before it in two postures."
+    experiment = "Hold the joint at rest in many angles over its whole range, with another joint in two postures."
     twins = ("gravity_tilt", "cogging", "torque_offset")
     from_motion = True
 
