@@ -119,7 +119,7 @@ class OneRRR:
 
     def __init__(self, plant: Plant, sample_time: float, steps: int) -> None:
         """`plant` as `fits` it; `steps` of equal size make one control sample."""
-        self.step = self._compiled(plant, sample_time / steps)
+        self.step = _compiled(plant, sample_time / steps)
         self._steps = steps
 
     @staticmethod
@@ -129,26 +129,23 @@ class OneRRR:
     def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:
         """Move `state` (6, 1) on by one sample, in place, and return the memories' new states; nothing depends on time."""
         del t
-        now = self._moved((*state[:, 0].tolist(), *states[0].tolist()), command[:, 0].tolist())
-        state[:, 0] = now[:6]
-        return np.array([now[6:]])
-
-    def _moved(self, now: tuple[float, ...], torque: Sequence[float]) -> tuple[float, ...]:
-        step = self.step
+        step, torque = self.step, command[:, 0].tolist()
+        now: tuple[float, ...] = (*state[:, 0].tolist(), *states[0].tolist())
         try:
             for _ in range(self._steps):
                 now = step(*now, *torque)
         except (ValueError, OverflowError):  # of an infinite number there is no sine
             now = (nan,) * len(now)
-        return now
+        state[:, 0] = now[:6]
+        return np.array([now[6:]])
 
-    @staticmethod
-    def _compiled(plant: Plant, h: float) -> Step:
-        """(q1, q2, q3, v1, v2, v3, memories, u1, u2, u3) -> all but u after a step of length h [s]."""
-        lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
-        joints = [joint for joint, _ in plant.own_memories]
-        step: Step = written(_STEP, plant, joints, plant.drives, **lengths, **memories(joints, **lengths))["step"]
-        return step
+
+def _compiled(plant: Plant, h: float) -> Step:
+    """(q1, q2, q3, v1, v2, v3, memories, u1, u2, u3) -> all but u after a step of length h [s]."""
+    lengths = {"h": repr(h), "half": repr(0.5 * h), "sixth": repr(h / 6.0)}
+    joints = [joint for joint, _ in plant.own_memories]
+    step: Step = written(_STEP, plant, joints, plant.drives, **lengths, **memories(joints, **lengths))["step"]
+    return step
 
 
 def memories(joints: Sequence[int], h: str, half: str, sixth: str) -> dict[str, str]:
