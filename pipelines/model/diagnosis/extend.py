@@ -4,8 +4,8 @@
     found.accepted, found.extended, found.gain
 
 No threshold and no twin: the cause was named. It is accepted where its gain on held-out torque is beyond its bootstrap interval,
-where the logs agree on its size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no
-farther from the measured one.
+where the logs agree on its size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes
+nearer to the measured one, if anything can be simulated.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.ledger import IMPOSSIBLE, UNBELIEVABLE
 from pipelines.model.diagnosis.searched.search import Found, search
 from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
-from pipelines.model.diagnosis.worth.gains import farther, gain_of, simulation_errors, torque_gain_of
+from pipelines.model.diagnosis.worth.gains import gain_of, no_nearer, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
@@ -183,7 +183,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: boo
     there = set[tuple[str, int | None]]()
     for k, step in enumerate(steps):
         if step.best is not None and (doubt := at_odds(found, k, prepared, case) or
-                                      farther(simulated[k], simulated[k + 1], late=late) or
+                                      no_nearer(simulated[k], simulated[k + 1], late=late) or
                                       (BY_CHANCE if vague(found, k, prepared, case) else "")):
             if (step.best.effect.name, step.best.effect.joint) in there:
                 return _tried(case, prepared, chosen, again=False)

@@ -13,7 +13,7 @@ from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.searched.beside import acted
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.search import Found
-from pipelines.model.diagnosis.worth.gains import Simulation, farther, simulation_errors
+from pipelines.model.diagnosis.worth.gains import Simulation, no_nearer, simulation_errors
 
 __all__ = ["simulated_steps", "strays"]
 
@@ -34,7 +34,7 @@ def strays(found: Found, plain: Found, k: int, simulated: Sequence[Simulation], 
         plain: the same steps as rows weighed alike have them.
         rest: fits the final model without this step.
     """
-    why = farther(simulated[k], simulated[k + 1], late=late)
+    why = no_nearer(simulated[k], simulated[k + 1], late=late)
     best, last = plain.steps[k].best, max(j for j, one in enumerate(found.steps) if one.best is not None)
     if why and best is not None and best is not found.steps[k].best:
         why = _between(plain.steps[k].before, best.done, prepared, case, late)
@@ -45,4 +45,4 @@ def strays(found: Found, plain: Found, k: int, simulated: Sequence[Simulation], 
 
 def _between(before: Refined, after: Refined, prepared: Prepared, case: Case, late: bool) -> str:
     arms = [acted(one.model.arm, case.beside) for one in (before, after)]
-    return farther(*simulation_errors(arms, prepared.judging or prepared.motions), late=late)
+    return no_nearer(*simulation_errors(arms, prepared.judging or prepared.motions), late=late)

@@ -23,7 +23,7 @@ from pipelines.model.diagnosis.result import Finding, ResidualRms
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.searched.beside import acted
 from pipelines.model.diagnosis.worth.evidence import proof
-from pipelines.model.diagnosis.worth.gains import Simulation, farther, gain_of, simulation_errors, torque_gain_of, worse_log
+from pipelines.model.diagnosis.worth.gains import Simulation, gain_of, no_nearer, simulation_errors, torque_gain_of, worse_log
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.diagnosis.worth.numbers import told
 from pipelines.model.rigid.body import Motion
@@ -75,7 +75,7 @@ def carried(moved: Absorbed, done: Refined, whole: Arm, prepared: Prepared, stan
     arms = [acted(arm, standing) for arm in (bare.arm, _with_base(bare.arm, masses).extended(moved.acting))]
     simulated = simulation_errors(arms, prepared.judging or prepared.motions)
     doubt = "" if (torque.ci95[:, 1] < 0.0).any() else "what moved in the base parameters does not show on held-out torque"
-    doubt = doubt or worse_log(rows, *left) or farther(*simulated)
+    doubt = doubt or worse_log(rows, *left) or no_nearer(*simulated)
     size, joint, of_rated = _size(load, data)
     finding = Finding(effect.name, effect.joint, effect.title, told(moved.acting), moved.explained, 0.0, (), None,
                       gain_of(torque, *simulated), "base parameters", size, of_rated,

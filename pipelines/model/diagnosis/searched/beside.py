@@ -87,11 +87,15 @@ class Judged:
 def judged(held: Held, final: Refined) -> Judged:
     """What each effect is worth beside all that was found since; `final` is the model with all of it.
 
-    Responses have named it, so that it need not prove itself again; but it must do no harm.
+    Responses have named it, so that it need not prove itself again; but it must do no harm. Where it is so slight that what moves
+    beside it hides whether the simulated arm comes nearer, all else stays as it was without it, if that does.
     """
     case, prepared = held.case, held.prepared
     judge, every = prepared.judge, case.beside
     parts = tuple(_part(one, held, final) for one in held.acting)
+    if len(parts) == 1 and not (parts[0].doubt or _nearer(parts[0])):
+        calm = _part(held.acting[0], held, final, alike=True)
+        parts, final = ((calm,), calm.after) if not calm.doubt and _nearer(calm) else (parts, final)
     harmful = [part.acting for part in parts if part.doubt]
     if not harmful:
         return Judged(parts, final, every, judge)
@@ -101,12 +105,21 @@ def judged(held: Held, final: Refined) -> Judged:
     return Judged(parts, refine(final.model, data, final.weight), tuple(back), rows)
 
 
-def _part(acting: Acting, held: Held, final: Refined) -> Part:
+def _nearer(part: Part) -> bool:
+    """Whether the simulated positions come nearer to the measured ones, all joints together, or nothing could be simulated."""
+    told = part.gain.simulated_position_rms
+    return told is None or float(np.linalg.norm(told.after)) < float(np.linalg.norm(told.before))
+
+
+def _part(acting: Acting, held: Held, final: Refined, alike: bool = False) -> Part:
+    """`alike`: with all other numbers as they are without it."""
     case, prepared = held.case, held.prepared
     judge, arm = prepared.judge, final.model.nominal
     data = less(final.data, -torque_of((acting,), arm, final.data))
     there = None if judge is None else less(judge, -torque_of((acting,), arm, judge))
     before = refine(final.model, data, final.weight)
+    if alike:
+        final = replace(before, data=final.data, left=final.data.y - before.model.torque(final.data))
     left = held_out_left(before, there, case.blocks), held_out_left(final, judge, case.blocks)
     rows = final.data if judge is None else judge
     torque = torque_gain_of(rows, *left)

@@ -4,6 +4,7 @@
     surely_less(before, after, own, ...)    of all joints together
     simulation_errors(arms, logs)           position error of each arm, in closed loop or over short windows
     farther(before, after)                  whether the second is worse than chance does
+    no_nearer(before, after)                or no better
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, Windows, simulate_windows
 
-__all__ = ["Simulation", "Strayed", "farther", "gain_of", "nearer", "simulation_errors", "surely_less", "torque_gain",
+__all__ = ["Simulation", "Strayed", "farther", "gain_of", "nearer", "no_nearer", "simulation_errors", "surely_less", "torque_gain",
            "torque_gain_of", "worse_log"]
 
 Mask = npt.NDArray[np.bool_]
@@ -145,6 +146,17 @@ def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str
         return "the simulated arm runs away with it"
     low, _ = apart(before.power, after.power, before.samples, np.random.default_rng(_SEED))
     return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
+
+
+def no_nearer(before: Simulation, after: Simulation, *, late: bool = False) -> str:
+    """Why an extension by what the second arm has more is not accepted: the simulated positions have to come nearer, by whatever
+    little, all joints together as they are told; empty where they do. `late` as in `farther`."""
+    if why := farther(before, after, late=late):
+        return why
+    if before.how == "none" or (late and before.how == "windowed"):
+        return ""
+    less = float(np.linalg.norm(after.position_rms)) < float(np.linalg.norm(before.position_rms))
+    return "" if less else "the simulated arm with it comes no nearer to the measured one"
 
 
 def nearer(before: Simulation, after: Simulation, *, late: bool = False) -> bool:
