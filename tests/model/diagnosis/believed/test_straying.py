@@ -39,7 +39,7 @@ def asked(found: Any, plain: Any, k: int) -> str:
 def test_beside_what_was_found_after_it(beside: str, strays: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Both joints are late: with the first alone told so, the arm strays; the last was found beside all the others already."""
     found = found_two()
-    monkeypatch.setattr(straying, "farther", lambda before, after, late: beside if before == "rest" else "farther")
+    monkeypatch.setattr(straying, "no_nearer", lambda before, after, late: beside if before == "rest" else "farther")
     assert bool(asked(found, found, 0)) is strays
     assert asked(found, found, 1) == "farther"
 
@@ -52,5 +52,5 @@ def test_as_rows_weighed_alike_have_it(alike: str, strays: bool, monkeypatch: py
     def farther(before: Any, after: Any, late: bool) -> str:
         return alike if (before, after) == ("first alike", "both alike") else "farther"
 
-    monkeypatch.setattr(straying, "farther", farther)
+    monkeypatch.setattr(straying, "no_nearer", farther)
     assert bool(asked(found, plain, 1)) is strays

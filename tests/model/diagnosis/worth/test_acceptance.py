@@ -20,7 +20,7 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.result import TorqueGain
 from pipelines.model.diagnosis.worth import gains
-from pipelines.model.diagnosis.worth.gains import Simulation, farther, gain_of, simulation_errors, worse_log
+from pipelines.model.diagnosis.worth.gains import Simulation, farther, gain_of, no_nearer, simulation_errors, worse_log
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation.windows import Windows, simulate_windows
 from tests.diagnose.sessions import session
@@ -40,6 +40,28 @@ def simulated(power: Any, how: Any = "closed-loop") -> Simulation:
 def test_a_simulated_arm_that_is_farther_than_chance_explains_is_refused(after: Any, words: str) -> None:
     said = farther(simulated(NOISE), simulated(after))
     assert (words in said) if words else not said
+
+
+@pytest.mark.parametrize(("after", "words"), [
+    ([1e-4, 1e-4, 0.999e-4], ""),
+    ([0.9e-4, 1.05e-4, 1e-4], ""),  # one joint farther, all together nearer
+    ([1e-4, 1e-4, 1e-4], "no nearer"),
+    ([0.999e-4, 1e-4, 1.002e-4], "no nearer")])
+def test_an_extension_has_to_bring_the_simulated_arm_nearer_by_whatever_little(after: list[float], words: str) -> None:
+    """Though chance hides which of the two is."""
+    with_it = replace(simulated(NOISE), position_rms=np.array(after))
+    assert not farther(simulated(NOISE), with_it)
+    said = no_nearer(simulated(NOISE), with_it)
+    assert (words in said) if words else not said
+
+
+def test_no_nearer_is_farther_and_what_is_not_simulated_says_nothing() -> None:
+    assert "farther" in no_nearer(simulated(NOISE), simulated(2.0 * NOISE))
+    assert "runs away" in no_nearer(simulated(NOISE), Simulation.none(3))
+    assert not no_nearer(Simulation.none(3), Simulation.none(3))
+    windows = [simulated(NOISE, "windowed") for _ in range(2)]
+    assert no_nearer(*windows)
+    assert not no_nearer(*windows, late=True)  # they are driven by a torque that is not what the arm felt
 
 
 def test_a_model_that_runs_away_is_refused_and_has_no_simulated_gain() -> None:
