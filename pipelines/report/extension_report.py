@@ -58,8 +58,8 @@ def _first_reason(result: Extension) -> str:
 def _basis(result: Extension, units: Units) -> Section:
     text = [laws_words(result.laws_of, fewer=result.fewer_terms), held_out_words(result.held_out),
             "A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its "
-            "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the "
-            "measured one."]
+            "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes nearer to the measured "
+            "one."]
     if result.standing:
         text.append(f"The reference logs show as well, and the model has: {', '.join(map(without_keys, result.standing))}.")
     if result.model is not None:
