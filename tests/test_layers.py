@@ -34,7 +34,8 @@ WITHIN = "pipelines.model.diagnosis"
 # Its folders, and the modules beside them, from the bottom up. It is not the order in which things happen: `given` runs a search.
 DIAGNOSIS = ("rows", "fitted", "asked", "screened", "floor", "result", "worth", "unseen", "reference", "searched", "given", "named",
              "believed", "memory", "answered", "extend", "changed", "diagnose")
-CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".terms")}  # of the effects, all that one of them may import
+# Of the effects, all that one of them may import.
+CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".placed", ".terms")}
 DOORS = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": "pipelines.log",
     "pandas": "pipelines.log", "pyarrow": "pipelines.log", "filterpy": "pipelines.signal.kalman", "mujoco": "pipelines.bench",
