@@ -5,7 +5,7 @@ Writes   model.json where every rule of acceptance is kept, result.json, result.
 Source   causes.md for the causes; Kostić et al. 2004, eq. (4), (12)-(15), for the rest
 
 A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its size, where no
-held-out log gets worse by more than a tenth, and where the simulated arm comes no farther from the measured one. What gives way
+held-out log gets worse by more than a tenth, and where the simulated arm comes nearer to the measured one. What gives way
 takes its numbers from frequency responses, a load from how the base parameters moved since the reference logs. What is not accepted
 is named with the reason; there is no way around it. A model that an earlier extension left in the default folder, and this one
 does not make anew, is moved beside it with its whole output, extend-cogging-2: the default folder holds the newest outcome, whoever

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -23,8 +24,10 @@ from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narro
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.believed.chance import BY_CHANCE
+from pipelines.model.diagnosis.believed.fewer import all_but
 from pipelines.model.diagnosis.believed.pruned import at_odds, vague
 from pipelines.model.diagnosis.believed.steadied import steadied, steady
+from pipelines.model.diagnosis.believed.straying import strays
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined
@@ -45,7 +48,7 @@ from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.ledger import IMPOSSIBLE, UNBELIEVABLE
 from pipelines.model.diagnosis.searched.search import Found, search
 from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
-from pipelines.model.diagnosis.worth.gains import gain_of, no_nearer, simulation_errors, torque_gain_of
+from pipelines.model.diagnosis.worth.gains import gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
@@ -183,7 +186,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: boo
     there = set[tuple[str, int | None]]()
     for k, step in enumerate(steps):
         if step.best is not None and (doubt := at_odds(found, k, prepared, case) or
-                                      no_nearer(simulated[k], simulated[k + 1], late=late) or
+                                      strays(found, found, k, simulated, prepared, case, late, partial(all_but, found, k, case)) or
                                       (BY_CHANCE if vague(found, k, prepared, case) else "")):
             if (step.best.effect.name, step.best.effect.joint) in there:
                 return _tried(case, prepared, chosen, again=False)
@@ -200,7 +203,7 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: boo
 def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], first: Responding,
           moved: Absorbed | None, chosen: DiagnosisSettings) -> Extended:
     """Everything that was accepted, in one model."""
-    prepared, done = first.held.prepared, judged(first.held, found.final)
+    prepared, done = first.held.prepared, judged(first.held, found.final, paying=True)
     judge, final = done.judge, done.final
     floor = white(final.data, final.left)
     steps = tuple(range(sum(step.best is not None for step in found.steps)))  # of one finding there may be several

@@ -20,11 +20,11 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
-from pipelines.model.diagnosis.fitted.refit import Refined, refine
+from pipelines.model.diagnosis.fitted.refit import Refined, moved_by, refine
 from pipelines.model.diagnosis.result import Gain
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.searched.case import Case
-from pipelines.model.diagnosis.worth.gains import farther, gain_of, simulation_errors, torque_gain_of, worse_log
+from pipelines.model.diagnosis.worth.gains import farther, gain_of, no_nearer, simulation_errors, torque_gain_of, worse_log
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.diagnosis.worth.numbers import standard_deviations
 from pipelines.model.effects import all_effects
@@ -48,6 +48,7 @@ class Part:
     after: Refined
     gain: Gain
     doubt: str  # why the model goes without it all the same; empty where it does not
+    useless: str  # why it is of no use in a simulation; empty where it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,18 +85,17 @@ class Judged:
     judge: Data | None
 
 
-def judged(held: Held, final: Refined) -> Judged:
+def judged(held: Held, final: Refined, paying: bool = False) -> Judged:
     """What each effect is worth beside all that was found since; `final` is the model with all of it.
 
-    Responses have named it, so that it need not prove itself again; but it must do no harm. Where it is so slight that what moves
-    beside it hides whether the simulated arm comes nearer, all else stays as it was without it, if that does.
+    Responses have named it, so that it need not prove itself again; but it must do no harm, and be of use to who asks for a model
+    that is `paying`.
     """
     case, prepared = held.case, held.prepared
     judge, every = prepared.judge, case.beside
     parts = tuple(_part(one, held, final) for one in held.acting)
-    if len(parts) == 1 and not (parts[0].doubt or _nearer(parts[0])):
-        calm = _part(held.acting[0], held, final, alike=True)
-        parts, final = ((calm,), calm.after) if not calm.doubt and _nearer(calm) else (parts, final)
+    if paying:
+        parts = tuple(replace(part, doubt=part.doubt or part.useless) for part in parts)
     harmful = [part.acting for part in parts if part.doubt]
     if not harmful:
         return Judged(parts, final, every, judge)
@@ -105,21 +105,14 @@ def judged(held: Held, final: Refined) -> Judged:
     return Judged(parts, refine(final.model, data, final.weight), tuple(back), rows)
 
 
-def _nearer(part: Part) -> bool:
-    """Whether the simulated positions come nearer to the measured ones, all joints together, or nothing could be simulated."""
-    told = part.gain.simulated_position_rms
-    return told is None or float(np.linalg.norm(told.after)) < float(np.linalg.norm(told.before))
-
-
-def _part(acting: Acting, held: Held, final: Refined, alike: bool = False) -> Part:
-    """`alike`: with all other numbers as they are without it."""
+def _part(acting: Acting, held: Held, final: Refined) -> Part:
+    """What sampling did to numbers was taken out of the final ones, and a fit would have it again: as much is taken out of those of
+    the model without the effect, or what one of them lacks beside the other would count for the effect."""
     case, prepared = held.case, held.prepared
     judge, arm = prepared.judge, final.model.nominal
     data = less(final.data, -torque_of((acting,), arm, final.data))
     there = None if judge is None else less(judge, -torque_of((acting,), arm, judge))
-    before = refine(final.model, data, final.weight)
-    if alike:
-        final = replace(before, data=final.data, left=final.data.y - before.model.torque(final.data))
+    before = moved_by(refine(final.model, data, final.weight), -final.left)
     left = held_out_left(before, there, case.blocks), held_out_left(final, judge, case.blocks)
     rows = final.data if judge is None else judge
     torque = torque_gain_of(rows, *left)
@@ -129,7 +122,7 @@ def _part(acting: Acting, held: Held, final: Refined, alike: bool = False) -> Pa
     worse = float(np.linalg.norm(left[1] * weights)) > float(np.linalg.norm(left[0] * weights))
     doubt = ("the held-out torque error is larger with it" if worse and (torque.ci95[:, 0] > 0.0).any()
              else worse_log(rows, *left) or farther(*simulated))
-    return Part(acting, before, final, gain_of(torque, *simulated), doubt)
+    return Part(acting, before, final, gain_of(torque, *simulated), doubt, no_nearer(*simulated))
 
 
 def acted(arm: Arm, acting: Sequence[Acting]) -> Arm:

@@ -4,7 +4,7 @@
     surely_less(before, after, own, ...)    of all joints together
     simulation_errors(arms, logs)           position error of each arm, in closed loop or over short windows
     farther(before, after)                  whether the second is worse than chance does
-    no_nearer(before, after)                or no better
+    no_nearer(before, after)                whether it is no better
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def worse_log(data: Data, before: Array, after: Array) -> str:
 
 
 def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str:
-    """Why the second simulated arm is no nearer to the measured one than the first; empty where it is, or chance hides it.
+    """Why the second simulated arm is farther from the measured one than chance explains; empty where it is not.
 
     Args:
         late: the log's torque is not what the arm felt: windows, which it drives, tell nothing then.
@@ -149,14 +149,13 @@ def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str
 
 
 def no_nearer(before: Simulation, after: Simulation, *, late: bool = False) -> str:
-    """Why an extension by what the second arm has more is not accepted: the simulated positions have to come nearer, by whatever
-    little, all joints together as they are told; empty where they do. `late` as in `farther`."""
+    """Why an extension by what the second arm has more is not accepted: the simulated one has to come nearer, chance or not; empty
+    where it does, and where nothing can be simulated. `late` as in `farther`."""
     if why := farther(before, after, late=late):
         return why
-    if before.how == "none" or (late and before.how == "windowed"):
+    if before.how == "none" or (late and before.how == "windowed") or nearer(before, after, late=late):
         return ""
-    less = float(np.linalg.norm(after.position_rms)) < float(np.linalg.norm(before.position_rms))
-    return "" if less else "the simulated arm with it comes no nearer to the measured one"
+    return "the simulated arm with it comes no nearer to the measured one"
 
 
 def nearer(before: Simulation, after: Simulation, *, late: bool = False) -> bool:

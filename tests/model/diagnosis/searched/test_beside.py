@@ -1,45 +1,59 @@
-"""What responses have named is judged beside all that was found: where it is too slight to tell, nothing else moves for it."""
+"""What responses have named is judged beside all that was found."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.result import BeforeAfter, Gain, TorqueGain
+from pipelines.model.arm import Acting
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.fitted.refit import moved_by, refine
 from pipelines.model.diagnosis.searched import beside
-from pipelines.model.diagnosis.searched.beside import Part, judged
-
-TORQUE = TorqueGain(np.ones(3), np.ones(3), np.zeros((3, 2)))
-
-
-def part(after: float | None, final: str, doubt: str = "") -> Any:
-    """Positions were 1e-5 rad off before."""
-    told = None if after is None else BeforeAfter(np.full(3, 1e-5), np.array([1e-5, 1e-5, after]))
-    gain = Gain(TORQUE, told, "none" if told is None else "closed-loop", None)
-    return Part("base", "before", final, gain, doubt)  # type: ignore[arg-type]
+from pipelines.model.diagnosis.searched.beside import judged, less, torque_of
+from pipelines.model.effects.spring import Spring
+from tests.model.diagnosis.arms import hidden
 
 
-def asked(monkeypatch: pytest.MonkeyPatch, refitted: Any, alike: Any, count: int = 1) -> beside.Judged:
-    held: Any = SimpleNamespace(case=SimpleNamespace(beside=("base",)), prepared=SimpleNamespace(judge=None),
-                                acting=("base",) * count)
-    monkeypatch.setattr(beside, "_part", lambda acting, held, final, alike=False, two=(refitted, alike): two[alike])
-    return judged(held, "refitted")  # type: ignore[arg-type]
+def test_what_was_taken_out_of_the_numbers_is_taken_out_of_those_without_the_effect() -> None:
+    """Sampling has moved numbers by what it leaves of the rows. Of a torque of no size that is named beside them, nothing is left
+    between the two models then; of one that is fitted anew, all of it."""
+    prepared = prepare(Logs((hidden(1), hidden(2))), DiagnosisSettings())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    law = Spring(2, degree=1, highest=1)
+    slight = Acting.of(law, law.values([1e-9, 0.0]))
+    model, arm = Exact.start(columns, fit), Exact.start(columns, fit).nominal
+    data = less(prepared.data, torque_of((slight,), arm, prepared.data))
+    fitted = refine(model, data, fit.weight)
+    artefact = 0.02 * np.tanh(50.0 * np.concatenate([one.motion.dq[:, 1] for one in data.logs])).std() * fitted.slopes[3]
+    final = moved_by(fitted, -artefact)
+    held: Any = SimpleNamespace(case=SimpleNamespace(beside=(slight,), blocks=10), acting=(slight,),
+                                prepared=replace(prepared, data=data))
+    part, = judged(held, final).parts
+    moved = np.abs(final.model.beta - fitted.model.beta).max()
+    assert moved > 1e-6
+    assert np.abs(part.before.model.beta - final.model.beta).max() < 1e-3 * moved
 
 
-@pytest.mark.parametrize(("refitted", "alike", "kept"), [
-    (part(0.9e-5, "refitted"), part(0.8e-5, "alike"), "refitted"),  # nearer already
-    (part(None, "refitted"), part(0.8e-5, "alike"), "refitted"),  # nothing can be simulated
-    (part(1.01e-5, "refitted"), part(0.99e-5, "alike"), "alike"),
-    (part(1.01e-5, "refitted"), part(1.02e-5, "alike"), "refitted"),  # nor does it come nearer then
-    (part(1.01e-5, "refitted"), part(0.99e-5, "alike", "a log gets worse"), "refitted")])
-def test_all_else_stays_where_only_that_comes_nearer(refitted: Any, alike: Any, kept: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = asked(monkeypatch, refitted, alike)
-    assert found.final == kept
-    assert [one.after for one in found.parts] == [kept]
-
-
-def test_of_several_each_is_judged_beside_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert asked(monkeypatch, part(1.01e-5, "refitted"), part(0.99e-5, "alike"), 2).final == "refitted"
+@pytest.mark.parametrize(("doubt", "useless", "paying", "kept"), [
+    ("", "", False, True), ("", "", True, True), ("", "no nearer", False, True), ("", "no nearer", True, False),
+    ("harm", "no nearer", False, False)])
+def test_who_asks_for_a_model_that_pays_has_it_without_what_is_of_no_use(
+        doubt: str, useless: str, paying: bool, kept: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A diagnosis names it all the same."""
+    monkeypatch.setattr(beside, "_part", lambda acting, held, final: beside.Part(acting, final, final, None, doubt, useless))
+    monkeypatch.setattr(beside, "less", lambda data, torque: data)
+    monkeypatch.setattr(beside, "torque_of", lambda acting, arm, data: np.zeros(1))
+    monkeypatch.setattr(beside, "refine", lambda model, data, weight: "without it")
+    held: Any = SimpleNamespace(case=SimpleNamespace(beside=("base",)), prepared=SimpleNamespace(judge=None), acting=("base",))
+    final: Any = SimpleNamespace(model=SimpleNamespace(nominal=None), data=None, weight=None)
+    found = judged(held, final, paying)
+    assert found.acting == (("base",) if kept else ())
+    assert (found.final is final) is kept
+    assert bool(found.parts[0].doubt) is not kept
