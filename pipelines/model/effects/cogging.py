@@ -121,7 +121,7 @@ class Cogging(Effect):
         shaped = self.at(values)
         parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
         waves = [(m * shaped.order, in_phase, across) for m, (in_phase, across) in enumerate(parts, start=1)]
-        return Formula(" + ".join(f"({a!r}) * sin({k!r} * {{q}}) + ({b!r}) * cos({k!r} * {{q}})" for k, a, b in waves))
+        return Formula.of_waves(waves)
 
     def amplitudes(self, values: Values) -> Array:
         waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in ("", "_2", "_3")[:self.harmonics]]

@@ -91,9 +91,9 @@ class PositionFriction(Effect):
 
     def own_load(self, values: Values) -> OwnLoad:
         shaped, sharpness = self.at(values), values["sharpness"]
-        waves = [(m * shaped.order, *pair) for m, pair in enumerate(np.reshape(shaped.amplitudes(values), (-1, 2)).tolist(), 1)]
-        sums = " + ".join(f"({a!r}) * sin({k!r} * {{q}}) + ({b!r}) * cos({k!r} * {{q}})" for k, a, b in waves)
-        return Formula(f"tanh({sharpness!r} * {{v}}) * ({sums})")
+        parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
+        waves = [(m * shaped.order, in_phase, across) for m, (in_phase, across) in enumerate(parts, start=1)]
+        return Formula.of_waves(waves, f"tanh({sharpness!r} * {{v}}) * ")
 
     def amplitudes(self, values: Values) -> Array:
         waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in _TAILS[:self.harmonics]]

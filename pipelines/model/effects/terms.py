@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -83,6 +83,12 @@ class Formula:
 
     def __call__(self, angle: float, speed: float) -> float:
         return self._called(angle, speed)
+
+    @classmethod
+    def of_waves(cls, waves: Sequence[tuple[float, float, float]], times: str = "") -> Formula:
+        """The sum of a sin(k q) + b cos(k q) over all (k, a, b), `times` what stands before it."""
+        each = (f"({a!r}) * sin({k!r} * {{q}}) + ({b!r}) * cos({k!r} * {{q}})" for k, a, b in waves)
+        return cls(f"{times}({' + '.join(each)})")
 
     @cached_property
     def _called(self) -> OwnLoad:

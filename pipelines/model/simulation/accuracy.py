@@ -40,7 +40,7 @@ class Step:
     """How many integrator steps a sample, and what that was judged by. Arrays per joint."""
 
     per_sample: int
-    error: Array  # [rad] rms, largest of the stretches, measured by halving: an upper bound
+    error: Array  # [rad] rms, largest of the stretches, measured by halving; of twice the steps that were tried, what that leaves
     noise: Array  # [rad] rms difference of two runs with different noise
     allowed: Array  # [rad]
     exact: bool  # the rigid body is nowhere held
