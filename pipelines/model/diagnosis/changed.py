@@ -70,9 +70,7 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
              memory.since(first.held.prepared, chosen))
     alone = since
     drives = partial(_drives, first, reference, seed=chosen.seed)
-    with meanwhile(partial(drives, alone)) as noise_beside:
-        since, found = _compared(first, alone, reference, chosen, memory)
-        noise = noise_beside() if since is alone else None
+    since, found, noise = _compared(first, alone, reference, chosen, memory, drives)
     case = first.nameable(since.case)
     floor = since.floor_of(case.data)
     case = replace(case, unlike=frozenset(np.flatnonzero(floor > since.floor).tolist()))
@@ -83,7 +81,6 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
         done = settled(found, rule(found, floor), case, now, floor)
         done = replace(done, found=steady_nominal(done.found))
         done = unlike_noise(done, lambda: oscillation(reference, since.left).stands)
-        noise = noise if since is alone else drives(since)
         moved = since.absorbed(done.found.final, () if done.ruling.named else case.families)
         if isinstance(moved, Absorbed) and done.ruling.verdict == "unknown":
             done = unnamed(done, _with_load(found, case, now, since.floor, floor, noise, chosen.seed))
@@ -126,21 +123,22 @@ def _taken(limits: Callable[[], tuple[Limits, Gained]], chance: Chance) -> Limit
     return found
 
 
-def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings,
-              memory: Memory) -> tuple[Since, Found]:
-    """The search in what has changed. What it finds that stood in the reference logs as well is taken out with the rest that
-    stands, and it searches again."""
+def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings, memory: Memory,
+              drives: Callable[[Since], DriveNoise | None]) -> tuple[Since, Found, DriveNoise | None]:
+    """The search in what has changed, and the noise of the drives. What it finds that stood in the reference logs as well is taken
+    out with the rest that stands, and it searches again."""
     taken = first.held.case.beside
     for _ in range(_STOOD):
         case = first.nameable(since.case)
-        found = search(case, chosen.most)
-        more = stood_before(found, case)
-        if not more:
-            return since, found
+        with meanwhile(partial(drives, since)) as noise:
+            found = search(case, chosen.most)
+            more = stood_before(found, case)
+            if not more:
+                return since, found, noise()
         before, stood = since, (*since.stood, *more)  # beside more that stands, chance gives each cause less: known is no longer
-        since = since_reference(first.held.prepared, reference, chosen, taken, None, stood)
+        since = since_reference(first.held.prepared, reference, chosen, taken, None, stood, since.first)
         memory.instead(before, since)
-    return since, search(first.nameable(since.case), chosen.most)
+    return since, search(first.nameable(since.case), chosen.most), drives(since)
 
 
 def _nameless(told: Diagnosis, why: str) -> Diagnosis:

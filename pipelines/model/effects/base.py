@@ -34,7 +34,8 @@ What a search over effects asks, so that it need not know any of them:
     beyond               whether logs go where those that it was fitted to say nothing of it
     acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
     reported             the parameters as causes.md names them
-    from_motion          whether its columns hang on the motion alone; from_body: on the rigid body as well, and nothing else
+    from_motion          whether its columns hang on the motion alone; from_body: on the rigid body as well, and nothing else;
+                         from_own_joint: on these and on what acts at its joint
     mixing               the matrix by which it mixes the torques of a moment, where that is all it does
 
 The columns of an effect need not be independent of each other, nor all seen, on every arm: solve with a rank threshold. Each
@@ -99,6 +100,7 @@ class Effect(Placed, ABC):
     shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
     from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
     from_body: ClassVar[bool] = False  # from motion and rigid body alone, whatever else acts
+    from_own_joint: ClassVar[bool] = False  # from these and what acts at its own joint, whatever adds its torque to others
     last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
     in_drive: ClassVar[bool] = False  # all torque of its joint comes through it, whatever was found after it
     misread: ClassVar[bool] = False  # it changes what an encoder says: all but the record is felt where the joint truly is

@@ -44,6 +44,7 @@ class BaseResonance(Effect):
     size = "frequency"
     evidence = "frequency responses"
     twins = ("joint_elasticity",)
+    from_body = True
     needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

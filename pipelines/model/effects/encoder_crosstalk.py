@@ -34,6 +34,7 @@ class EncoderCrosstalk(Effect):
     experiment = "Hold this joint still against a stop or a level and move the other over its range."
     size = "coefficient"
     twins = ("link_length", "transmission_coupling")
+    from_own_joint = True
     misread = True
 
     @classmethod

@@ -35,6 +35,7 @@ class EncoderEccentricity(Effect):
     experiment = "Turn the joint over a full turn at three constant speeds."
     size = "amplitude"
     twins = ("cogging", "spring", "gravity_tilt")
+    from_own_joint = True
     misread = True
     turns = True
 

@@ -42,6 +42,7 @@ class GravityTilt(Effect):
     experiment = "Hold the arm still, stretched out, in eight angles of joint 1, and with the elbow bent in the same eight."
     size = "angle"
     twins = ("spring", "cogging", "torque_offset")
+    from_body = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         size, _, first, second = _axes(arm)

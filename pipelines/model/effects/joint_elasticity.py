@@ -46,6 +46,7 @@ class JointElasticity(Effect):
     size = "frequency"
     evidence = "frequency responses"
     twins = ("base_resonance", "backlash")
+    from_body = True
     needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

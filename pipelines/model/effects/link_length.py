@@ -39,6 +39,7 @@ class LinkLength(Effect):
     experiment = "Hold the arm in static poses with the elbow bent and straight, and move it fast in the same poses."
     size = "error"
     twins = ("rotor_inertia", "payload", "encoder_crosstalk")
+    from_body = True
 
     @classmethod
     def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:

@@ -35,6 +35,7 @@ class TimeDelay(Effect):
     experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
     size = "delay"
     twins = ("drive_lag", "torque_lag")
+    from_own_joint = True
     misread = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

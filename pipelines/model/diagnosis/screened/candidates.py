@@ -21,7 +21,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.fitted.record import changing, recorded, recorded_of
 from pipelines.model.diagnosis.rows.data import Data, LogData
-from pipelines.model.diagnosis.screened.rigid_alike import RigidArm
+from pipelines.model.diagnosis.screened.rigid_alike import Asked
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -56,16 +56,20 @@ class Arms:
 
     now: Arm  # with all that was found
     start: Arm  # for what just adds its torque, whatever else acts
-    rigid: tuple[RigidArm, ...] = ()  # of each joint, then of all: for what of that follows from the rigid body; none: `start`
+    rigid: tuple[Asked, ...] = ()  # at each joint, then at all: for what follows from the rigid body alone
+    moving: tuple[Asked, ...] = ()  # at each joint: for what follows from that and from what acts at the joint
 
     @property
     def every(self) -> tuple[Arm, ...]:
-        return (self.now, self.start, *(arm for arm, _ in self.rigid))
+        return (self.now, self.start, *(one.arm for one in (*self.rigid, *self.moving)))
 
     def of(self, family: Family) -> Arm:
-        effect, whole = family.shapes[0], len(self.rigid)
-        if whole and effect.adds and effect.from_body:
-            return self.rigid[(family.joint or whole) - 1][0]
+        effect = family.shapes[0]
+        if self.rigid and effect.from_body:
+            # What joints beside it do to a gap is little; a column that is to be exact beside what was found has all of them alike.
+            return self.rigid[family.joint - 1 if effect.adds and family.joint else -1].arm
+        if self.moving and effect.from_own_joint and family.joint:
+            return self.moving[family.joint - 1].arm
         return self.start if effect.adds else self.now
 
 

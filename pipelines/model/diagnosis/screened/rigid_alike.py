@@ -1,20 +1,25 @@
-"""Arms whose rigid bodies are nearly the same: what follows from the rigid body alone need not be laid again for each of them.
+"""Arms that are nearly the same: what follows from them need not be laid again for each.
 
-    arms = alike(data, model)      (joints + 1,) of arms that were asked for before, where one will do: for each joint, then for all
-    remember(data, arms)           columns have been laid for these
+    arms = alike(data, own)            (joints + 1,) of arms that were asked for before, those that will do for what follows from
+                                       the rigid body: at each joint, then at all
+    arms = moving_alike(data, own)     (joints,) the same for what hangs on the friction and effects of that joint as well
+    remember(data, arms)               columns have been laid for these
 
 Which arms were asked for before is part of the answer, then, in its last digits.
 
-A link in its gap is followed sample by sample over all logs, for every gap at every joint: half of what a screening takes. A cause
-that was found moves the base parameters of the joints beside it by some parts in ten thousand.
+A link in its gap is followed sample by sample over all logs, for every gap at every joint: half of what a first screening takes.
+An encoder that is not true changes the torque of the whole arm: half of any other. A cause that was found moves the base
+parameters of the joints beside it by some parts in ten thousand, and what it adds is torque of its own joint.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
@@ -23,38 +28,79 @@ from pipelines.model.diagnosis.fitted.nominal import rigid_rows
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.kept import Kept
 
-__all__ = ["RigidArm", "alike", "remember"]
+__all__ = ["Asked", "alike", "moving_alike", "remember"]
 
-# Of a joint's rigid torque: what arms differ by at most. Gains of gaps then are the same to 3e-5 of the squared residual, a
+Mask = npt.NDArray[np.bool_]
+
+# Of a joint's torque: what arms differ by at most. Gains of gaps then are the same to 3e-5 of the squared residual, a
 # hundredth of what any cause is looked at for; at thirty times as much they are off by up to a half.
 _ALIKE = 1e-3
-_MOST = 8  # arms that are remembered
+_MOST = 16  # arms that are remembered
 
-RigidArm = tuple[Arm, Array]  # and its rigid torque (rows,) [N m]
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """An arm for which columns are laid. Arrays (rows,) [N m]."""
+
+    arm: Arm
+    rigid: Array  # torque of its rigid body
+    torque: Array  # all of it
+
+    @classmethod
+    def of(cls, data: Data, model: Exact, torque: Array) -> Asked:
+        """`torque`: that of the model."""
+        return cls(model.arm, np.asarray(model.beta[:len(model.columns.kept)] @ rigid_rows(data, model.columns)), torque)
+
+
 _Places = tuple[int, ...]  # of the logs among those that are kept together
-_KNOWN: WeakKeyDictionary[Kept, list[tuple[_Places, RigidArm]]] = WeakKeyDictionary()  # by where their columns are kept
+_KNOWN: WeakKeyDictionary[Kept, list[tuple[_Places, Asked]]] = WeakKeyDictionary()  # by where their columns are kept
 
 
-def alike(data: Data, model: Exact) -> tuple[RigidArm, ...]:
-    """The first arm that has nearly the rigid torque of `model`'s at a joint, and at all; else the model's own, and so where
-    something changes how every torque is recorded."""
-    own = model.arm, np.asarray(model.beta[:len(model.columns.kept)] @ rigid_rows(data, model.columns))
-    known = () if any(one.effect.last for one in model.effects) else _known(data)
-    allowed, every = _ALIKE * data.rms(own[1]), range(data.n_joints)
-    near = [(one, data.rms(one[1] - own[1]) <= allowed) for one in known]
+def alike(data: Data, own: Asked) -> tuple[Asked, ...]:
+    """The first arm that has nearly the rigid torque of this one at a joint, and at all; else this one, and so where something
+    changes how every torque is recorded."""
+    near = [(one, _near(data, one.rigid, own.rigid)) for one in _able(data, own)]
+    every = range(data.n_joints)
     return tuple(next((one for one, same in near if same[joints].all()), own) for joints in (*every, list(every)))
 
 
-def remember(data: Data, arms: Iterable[RigidArm]) -> None:
+def moving_alike(data: Data, own: Asked) -> tuple[Asked, ...]:
+    """The first that has nearly its rigid torque at all joints, nearly all of its torque at this one, and effects that change the
+    torque of others where it has them."""
+    near = [(one, _near(data, one.torque, own.torque)) for one in _able(data, own)
+            if _changing(one.arm) == _changing(own.arm) and _near(data, one.rigid, own.rigid).all()]
+    return tuple(next((one for one, same in near if same[joint]), own) for joint in range(data.n_joints))
+
+
+def remember(data: Data, arms: Iterable[Asked]) -> None:
     """They are alike for others after them; none whose effects change how torque is recorded."""
     kept = _KNOWN.setdefault(data.logs[0].kept, [])
     for one in arms:
-        if not any(one[0] is other for other, _ in _known(data)) and not any(acting.effect.last for acting in one[0].effects):
+        if not any(one.arm is other.arm for other in _known(data)) and not _late(one.arm):
             kept.append((_places(data), one))
     del kept[:-_MOST]
 
 
-def _known(data: Data) -> list[RigidArm]:
+def _near(data: Data, torque: Array, own: Array) -> Mask:
+    """(joints,) at which they differ by next to nothing."""
+    return np.asarray(data.rms(torque - own) <= _ALIKE * data.rms(own))
+
+
+def _able(data: Data, own: Asked) -> list[Asked]:
+    return [] if _late(own.arm) else _known(data)
+
+
+def _late(arm: Arm) -> bool:
+    """Whether something changes how every torque is recorded."""
+    return any(acting.effect.last for acting in arm.effects)
+
+
+def _changing(arm: Arm) -> set[str]:
+    """What does more than to add a torque of its own joint."""
+    return {acting.place for acting in arm.effects if acting.effect.joint is None or not acting.effect.adds}
+
+
+def _known(data: Data) -> list[Asked]:
     """Those of the very logs, the oldest first."""
     return [one for places, one in _KNOWN.get(data.logs[0].kept, []) if places == _places(data)]
 

@@ -15,7 +15,7 @@ from pipelines.model.diagnosis.floor.thresholds import Thresholds
 from pipelines.model.diagnosis.reference.stood import Share
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.candidates import Arms, Family
-from pipelines.model.diagnosis.screened.rigid_alike import alike
+from pipelines.model.diagnosis.screened.rigid_alike import Asked, alike, moving_alike
 from pipelines.model.diagnosis.screened.screen import Screened
 from pipelines.model.diagnosis.searched.elsewhere import Shared
 from pipelines.model.diagnosis.worth.held_out import held_out_left
@@ -57,16 +57,17 @@ class Case:
 
     def arms(self, model: Exact) -> Arms:
         """By whose columns causes are screened beside `model`: what just adds its torque by those of the start, which are laid
-        already, as long as that arm has the same torque, and what was found does not change how any torque is recorded; of that,
-        what follows from the rigid body alone by those of any that were laid of nearly the same rigid torque.
+        already, as long as that arm has the same torque, and what was found does not change how any torque is recorded; what
+        follows from the rigid body alone, or from that and what acts at its joint, by those of any arm that is nearly the same.
 
         Columns are of first order. Those of an arm that differs by a twentieth are off by as much, and gain a thousandth less.
         """
-        torque = model.torque(self.data)
-        more = self.data.rms(self.model.torque(self.data) - torque)
+        torque, before = model.torque(self.data), self.model.torque(self.data)
+        more = self.data.rms(before - torque)
         same = (more <= _ALIKE * self.data.rms(torque)).all() and not any(one.effect.last for one in model.effects)
-        start = self.model if same else model
-        return Arms(model.arm, start.arm, alike(self.data, start))
+        now = Asked.of(self.data, model, torque)
+        start = Asked.of(self.data, self.model, before) if same else now
+        return Arms(now.arm, start.arm, alike(self.data, start), moving_alike(self.data, now))
 
 
 @dataclass(frozen=True, eq=False)

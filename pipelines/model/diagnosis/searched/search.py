@@ -215,7 +215,7 @@ def _share(one: Screened, now: Refined) -> float:
 def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
     arms = case.arms(now.model)
     found = tuple(screen(case.data, now.fit, case.families, arms))
-    remember(case.data, arms.rigid)
+    remember(case.data, (*arms.rigid, *arms.moving))
     return found
 
 

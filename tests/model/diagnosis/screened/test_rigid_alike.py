@@ -9,18 +9,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.model.arm import Arm
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.candidates import Arms, Family
-from pipelines.model.diagnosis.screened.rigid_alike import _KNOWN, alike, remember
+from pipelines.model.diagnosis.screened.rigid_alike import _KNOWN, _MOST, Asked, moving_alike, remember
+from pipelines.model.diagnosis.screened.rigid_alike import alike as alike_of
 from pipelines.model.diagnosis.screened.screen import screen
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.gravity_tilt import GravityTilt
+from pipelines.model.effects.quadratic_drag import QuadraticDrag
+from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
@@ -36,6 +40,18 @@ def start() -> tuple[Exact, Data]:
     return Exact.start(columns, fit), prepared.data
 
 
+def asked(data: Data, model: Exact) -> Asked:
+    return Asked.of(data, model, model.torque(data))
+
+
+def alike(data: Data, model: Exact) -> tuple[Asked, ...]:
+    return alike_of(data, asked(data, model))
+
+
+def moving(data: Data, model: Exact) -> list[Arm]:
+    return [one.arm for one in moving_alike(data, asked(data, model))]
+
+
 def scaled(model: Exact, factor: float) -> Exact:
     kept = len(model.columns.kept)
     return replace(model, beta=np.concatenate([factor * model.beta[:kept], model.beta[kept:]]))
@@ -48,9 +64,9 @@ def test_an_arm_that_is_nearly_the_same_stands_for_it(moved: float, same: bool) 
     remember(data, alike(data, model))
     other = scaled(model, 1.0 + moved)
     found = alike(data, other)
-    assert [one is (model.arm if same else other.arm) for one, _ in found] == [True] * 4
+    assert [one.arm is (model.arm if same else other.arm) for one in found] == [True] * 4
     remember(data, found)
-    assert not any(one is model.arm for one, _ in alike(data, scaled(model, 1.0 + 2.5 * moved)))
+    assert not any(one.arm is model.arm for one in alike(data, scaled(model, 1.0 + 2.5 * moved)))
 
 
 def test_each_joint_by_itself() -> None:
@@ -61,7 +77,7 @@ def test_each_joint_by_itself() -> None:
     beta = model.beta.copy()
     beta[names.index("p7")] *= 1.5  # inertia about the waist: no torque of another joint
     other = replace(model, beta=beta)
-    assert [one is model.arm for one, _ in alike(data, other)] == [False, True, True, False]
+    assert [one.arm is model.arm for one in alike(data, other)] == [False, True, True, False]
 
 
 def test_friction_is_none_of_it() -> None:
@@ -69,7 +85,32 @@ def test_friction_is_none_of_it() -> None:
     remember(data, alike(data, model))
     beta = model.beta.copy()
     beta[len(model.columns.kept):] *= 3.0
-    assert all(one is model.arm for one, _ in alike(data, replace(model, beta=beta)))
+    assert all(one.arm is model.arm for one in alike(data, replace(model, beta=beta)))
+
+
+def test_what_acts_at_another_joint_changes_no_encoder_of_this_one() -> None:
+    """Friction found at joint 2: what hangs on the motion of the others, and of the arm, is that of the arm as it was."""
+    model, data = start()
+    remember(data, [asked(data, model)])
+    rubbing = model.with_effect(QuadraticDrag(2), np.array([0.7]))
+    assert [one is model.arm for one in moving(data, rubbing)] == [True, False, True]
+    assert all(one.arm is model.arm for one in alike(data, rubbing))
+
+
+@pytest.mark.parametrize("effect", [GravityTilt(), TorqueCrosstalk(1, from_joint=2.0)], ids=lambda effect: effect.name)
+def test_what_changes_the_torque_of_others_makes_another_arm(effect: Effect) -> None:
+    """However little of it there is: an encoder that is not true has it on all rows."""
+    model, data = start()
+    remember(data, [asked(data, model)])
+    other = model.with_effect(effect, 1e-9 * np.ones(effect.columns(data.logs[0].motion, model.arm).shape[2]))
+    assert all(one is other.arm for one in moving(data, other))
+
+
+def test_another_rigid_body_is_another_arm_for_all_encoders() -> None:
+    model, data = start()
+    remember(data, [asked(data, model)])
+    other = scaled(model, 1.0 + 2e-3)
+    assert all(one is other.arm for one in moving(data, other))
 
 
 def test_some_of_the_logs_are_other_rows() -> None:
@@ -80,15 +121,15 @@ def test_some_of_the_logs_are_other_rows() -> None:
     remember(prepared.data, alike(prepared.data, model))
     for place in (0, 1):
         one = replace(prepared.data, logs=prepared.data.logs[place:place + 1])
-        assert alike(one, scaled(model, 1.0 + 5e-4))[0][0] is not model.arm
+        assert alike(one, scaled(model, 1.0 + 5e-4))[0].arm is not model.arm
 
 
 def test_the_oldest_is_forgotten_and_the_store_with_its_logs() -> None:
     model, data = start()
-    for k in range(9):
+    for k in range(_MOST + 1):
         remember(data, alike(data, scaled(model, 1.0 + 0.01 * k)))
-    assert alike(data, model)[0][0] is model.arm
-    assert alike(data, scaled(model, 1.01))[0][0] is not model.arm
+    assert alike(data, model)[0].arm is model.arm
+    assert alike(data, scaled(model, 1.01))[0].arm is not model.arm
     kept, known = weakref.ref(data.logs[0].kept), len(_KNOWN)
     del data
     gc.collect()
@@ -100,9 +141,9 @@ def test_nothing_is_taken_from_an_arm_whose_record_is_changed() -> None:
     model, data = start()
     late = model.with_effect(TorqueLag(2), np.array([0.01]))
     remember(data, alike(data, late))
-    assert all(one is model.arm for one, _ in alike(data, model))
+    assert all(one.arm is model.arm for one in alike(data, model))
     remember(data, alike(data, model))
-    assert all(one is late.arm for one, _ in alike(data, late))
+    assert all(one.arm is late.arm for one in alike(data, late))
 
 
 def test_gaps_are_not_followed_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,4 +166,14 @@ def test_who_says_so_follows_from_the_rigid_body_alone(kind: type[Effect], arm: 
     shape = placed(kind).at(drawn(placed(kind), 3))
     bare = replace(arm, friction=(), effects=())
     np.testing.assert_array_equal(shape.columns(motion, arm), shape.columns(motion, bare))
-    assert shape.adds
+
+
+@pytest.mark.parametrize("kind", [kind for kind in all_effects() if kind.from_own_joint], ids=lambda kind: kind.name)
+def test_who_says_so_does_not_feel_what_adds_its_torque_to_others(kind: type[Effect], arm: Arm, motion: Motion) -> None:
+    """A joint beside it that rubs more changes nothing; its own does. A new file inherits this."""
+    shape = placed(kind).at(drawn(placed(kind), 3))
+    there, beside = (arm.extended(Acting.of(QuadraticDrag(joint), {"coefficient": 0.7}))
+                     for joint in (shape.joint, shape.joint % arm.n_joints + 1))
+    plain = shape.columns(motion, arm)
+    np.testing.assert_allclose(shape.columns(motion, beside), plain, atol=1e-6 * np.abs(plain).max())
+    assert not np.allclose(shape.columns(motion, there), plain, atol=1e-6 * np.abs(plain).max())
