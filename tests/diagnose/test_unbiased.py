@@ -84,6 +84,24 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
     assert after < 0.7 * before
 
 
+def test_the_noise_of_a_run_moves_next_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Amplifiers of ten times the noise: what the rigid body's numbers differ by from one run to the next is half at most of what it
+    is where a log has what the drives were asked for."""
+    done, prepared = fitted(1501, 0)
+    noise = 10.0 * np.array(draw_machine(1501, "fault").amplifier_noise)
+    rigid = slice(len(done.model.columns.kept))
+    deviation = np.sqrt(np.diag(done.covariance()))[rigid]
+
+    def scatter() -> float:
+        left = [smoothed_away(done.model.arm, noise, done.data, prepared, 10 * k) for k in range(5)]
+        moved = [moved_by(done, -one).model.beta[rigid] / deviation for one in left if one is not None]
+        return float(np.sqrt(np.mean(np.var(moved, axis=0, ddof=1))))
+
+    known = scatter()
+    monkeypatch.setattr(unbiased, "torque_noise", lambda *_: 0.0)
+    assert known < 0.5 * scatter()
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_every_model_of_a_search_is_moved_by_what_the_arm_that_was_found_leaves(known: bool) -> None:
     """The nominal one, that of the only step, before and after, and the final one; none where no log can be run."""
