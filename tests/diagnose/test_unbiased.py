@@ -85,8 +85,8 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
 
 
 def test_the_noise_of_a_run_moves_next_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Amplifiers of ten times the noise: what the rigid body's numbers differ by from one run to the next is half at most of what it
-    is where a log has what the drives were asked for."""
+    """Amplifiers of ten times the noise: what the rigid body's numbers differ by from one run to the next is half at most of what
+    it is where a log has what the drives were asked for."""
     done, prepared = fitted(1501, 0)
     noise = 10.0 * np.array(draw_machine(1501, "fault").amplifier_noise)
     rigid = slice(len(done.model.columns.kept))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -23,7 +23,7 @@ from pipelines.model.diagnosis.believed.doubted import unlike_noise, unnamed
 from pipelines.model.diagnosis.believed.oscillating import oscillation
 from pipelines.model.diagnosis.believed.pruned import settled
 from pipelines.model.diagnosis.believed.steadied import steadied, steady_nominal
-from pipelines.model.diagnosis.believed.unchanged import stood_before
+from pipelines.model.diagnosis.believed.unchanged import Before
 from pipelines.model.diagnosis.floor.calibrated import conditions_of, origin_of, refuse_calibration
 from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.model.diagnosis.floor.motion_floor import motion_floor, noise_in
@@ -70,8 +70,8 @@ def changed(first: Responding, reference: Data, chosen: DiagnosisSettings, given
              memory.since(first.held.prepared, chosen))
     alone = since
     drives = partial(_drives, first, reference, seed=chosen.seed)
-    since, found, noise = _compared(first, alone, reference, chosen, memory, drives)
-    case = first.nameable(since.case)
+    one = _compared(first, alone, reference, chosen, memory, drives)
+    since, found, case, noise = one.since, one.found, one.case, one.noise
     floor = since.floor_of(case.data)
     case = replace(case, unlike=frozenset(np.flatnonzero(floor > since.floor).tolist()))
     now = replace(first.held.prepared, data=case.data, judge=case.judge)
@@ -123,22 +123,33 @@ def _taken(limits: Callable[[], tuple[Limits, Gained]], chance: Chance) -> Limit
     return found
 
 
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """Logs held against the reference logs."""
+
+    since: Since
+    found: Found
+    case: Case  # which knows already how much of what was found the reference logs have
+    noise: DriveNoise | None
+
+
 def _compared(first: Responding, since: Since, reference: Data, chosen: DiagnosisSettings, memory: Memory,
-              drives: Callable[[Since], DriveNoise | None]) -> tuple[Since, Found, DriveNoise | None]:
-    """The search in what has changed, and the noise of the drives. What it finds that stood in the reference logs as well is taken
-    out with the rest that stands, and it searches again."""
+              drives: Callable[[Since], DriveNoise | None]) -> _Compared:
+    """The search in what has changed, and meanwhile the noise of the drives. What it finds that stood in the reference logs as well
+    is taken out with the rest that stands, and it searches again."""
     taken = first.held.case.beside
-    for _ in range(_STOOD):
+    for again in (*[True] * _STOOD, False):
         case = first.nameable(since.case)
+        asked = Before(case, again)
         with meanwhile(partial(drives, since)) as noise:
-            found = search(case, chosen.most)
-            more = stood_before(found, case)
+            found = search(case, chosen.most, ends=asked.ended)
+            more = asked.stood(found.final)
             if not more:
-                return since, found, noise()
+                return _Compared(since, found, asked.told(found.final), noise())
         before, stood = since, (*since.stood, *more)  # beside more that stands, chance gives each cause less: known is no longer
         since = since_reference(first.held.prepared, reference, chosen, taken, None, stood, since.first)
         memory.instead(before, since)
-    return since, search(first.nameable(since.case), chosen.most), drives(since)
+    raise AssertionError("nothing stands in the last round")
 
 
 def _nameless(told: Diagnosis, why: str) -> Diagnosis:

@@ -105,7 +105,8 @@ def smoothed_away(arm: Arm, noise: Array, data: Data, prepared: Prepared, seed: 
     mean = [np.zeros(one.rows * one.n_joints) for one in data.logs]
     try:
         experiments = {place: experiment_of(logs[place]) for place in places}
-        steps = choose_steps(arm, list(experiments.values()), drawn)
+        first = {logs[place].sample_time: experiments[place] for place in reversed(places)}
+        steps = choose_steps(arm, list(first.values()), drawn)  # what suffices for a log suffices for the next
         pieces = [(place, some) for place in sorted(places, key=lambda place: -logs[place].n_samples)
                   for some in ([(one,) for one in seeds] if runs_alone(arm, experiments[place]) else [seeds])]
         for (place, _), left in zip(pieces, shared_out(of_runs, pieces), strict=True):

@@ -1,6 +1,8 @@
 """What was found beside reference logs and is no change since then.
 
-    stood_before(found, case)              effects that stood before, and may be taken out with the rest that stands
+    asked = Before(case)                   how much of what a search finds the reference logs have
+    asked.ended(done)                      whether what was found last stood before: it is searched again beside that
+    asked.stood(done)                      what did, and may be taken out with the rest that stands
     no_change(found, k, case, floor)       why step `k` is not believed to have changed
     near_other_motion(ruling, ...)         nothing gives way where no more is left than of such a motion
 """
@@ -11,23 +13,52 @@ from dataclasses import replace
 
 from pipelines.log.experiment import Array
 from pipelines.log.shared_work import shared_out
+from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.named.verdict import Ruling, at_floor, takes_most
+from pipelines.model.diagnosis.reference.stood import Share
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.search import Found
 from pipelines.model.effects.base import Effect
 
-__all__ = ["near_other_motion", "no_change", "stood_before"]
+__all__ = ["Before", "near_other_motion", "no_change"]
 
 _AS_MUCH = "its joint moves at other speeds than in the reference logs, and no more is left of it than they leave at such speeds"
 _UNCHANGED = "the reference logs may have had it: fitted to them alone, some of it is there as well"
 
 
-def stood_before(found: Found, case: Case) -> list[Effect]:
-    """What was found of which the reference logs have as much, and which the standing set may have."""
-    every = () if case.before is None else tuple(enumerate(found.final.model.effects))
-    able = [(k, one.effect) for k, one in every if one.log is None and one.possible and not one.effect.needs]
-    stood = shared_out(lambda one: case.before is not None and case.before(found.final, one[0]).stood, able)
-    return [effect for (_, effect), before in zip(able, stood, strict=True) if before]
+class Before:
+    """What the reference logs have of what one search finds; each effect of each model is asked for once."""
+
+    def __init__(self, case: Case, again: bool = True) -> None:
+        """`again`: whether there is another search, beside what stood before."""
+        self._case, self._again = case, again and case.before is not None
+        self._known: dict[tuple[int, int], tuple[Refined, Share]] = {}  # by model, which keeps its id, and place
+
+    def ended(self, done: Refined) -> bool:
+        """Whether the effect that was found last stood before."""
+        last = len(done.model.effects) - 1
+        return last in self._able(done) and self._share(done, last).stood
+
+    def stood(self, done: Refined) -> list[Effect]:
+        """Effects that stood before, and may be taken out with the rest that stands."""
+        able = self._able(done)
+        found = shared_out(lambda place: self._share(done, place), able)
+        self._known |= {(id(done), place): (done, share) for place, share in zip(able, found, strict=True)}
+        return [done.model.effects[place].effect for place, share in zip(able, found, strict=True) if share.stood]
+
+    def told(self, done: Refined) -> Case:
+        """The case with the answers for this model as those for any that has the same effects: as steady rows have them, say."""
+        return self._case if self._case.before is None else replace(self._case, before=lambda _, place: self._share(done, place))
+
+    def _share(self, done: Refined, place: int) -> Share:
+        if (id(done), place) not in self._known and self._case.before is not None:
+            self._known[id(done), place] = done, self._case.before(done, place)
+        return self._known[id(done), place][1]
+
+    def _able(self, done: Refined) -> list[int]:
+        """Places of effects which the standing set may have."""
+        every = enumerate(done.model.effects if self._again else ())
+        return [k for k, one in every if one.log is None and one.possible and not one.effect.needs]
 
 
 def no_change(found: Found, k: int, case: Case, floor: Array) -> str:

@@ -198,7 +198,7 @@ class Chance:
         """Several at once."""
         new = [family for family in families if family not in self.known]
         if new:
-            self.known.update(zip(new, for_each(self.data, self._gained, new, self.fits, self.arm), strict=True))
+            self.known.update(zip(new, for_each(self.data, self._gained, new, self.fits, self.arm, laid=True), strict=True))
 
     def moved(self, kept: int) -> float:
         """Share of the squared residual that the first `kept` columns of the nominal model, the rigid body's, take away by
@@ -245,7 +245,7 @@ def changes(data: Data, later: Mask, nominal: Array, common: Array, more: Array,
         return (screen_event(data, fit, family, arm, happened) if family.event else _screened(data, later, fit, family, arm)).lean
 
     asked = [family for family, is_asked in zip(families, wanted, strict=True) if is_asked]
-    seen = dict(zip(asked, for_each(data, one, asked, (fit,), arm), strict=True))
+    seen = dict(zip(asked, for_each(data, one, asked, (fit,), arm, laid=True), strict=True))
     found = [replace(seen[family], family=family) if family in seen else
              Screened(family, np.zeros(1), family.shapes[:1], np.ones(1), 1.0, 0.0, 1) for family in families]
     return found, bounds(families, wanted, fit, later, chance)

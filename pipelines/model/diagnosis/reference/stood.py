@@ -21,8 +21,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.fitted.linear import covariance
-from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns
+from pipelines.model.diagnosis.fitted.linear import covariance, solved
+from pipelines.model.diagnosis.fitted.nominal import orthonormal
 from pipelines.model.diagnosis.rows.data import Data
 
 __all__ = ["ANYTHING", "Share", "share_before"]
@@ -30,6 +30,7 @@ __all__ = ["ANYTHING", "Share", "share_before"]
 _SAME, _TWICE, _SURE = 0.5, 2.0, 0.25  # of what is there now, that was there before: at least, at most; its standard deviation
 _LIKE = 0.3  # the same in any shape, from which it may have been there
 _CHANCE = 2.0  # of these deviations, below which nobody knows
+_ROUNDING = 1e-6  # of a column: what others leave of it, when they are all of it
 _REST = 0.3  # of what shows of it in the reference logs: what stands there is the rest of it, in this shape or nearly
 
 
@@ -68,23 +69,33 @@ def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], other
         others: (n, rows) columns of all else that the model has; `standing`: (m, rows) those of what stands.
         weight: (joints,) [1/(N m)].
     """
-    count = len(columns)
-    before, after = np.where(later, 0.0, columns), np.where(later, columns, 0.0)
-    whole = np.concatenate([others, standing])
-
-    def beside(table: Array) -> Fit:
-        """Nothing is fitted: what these columns leave of others is asked."""
-        return Fit(data, table, data.y, weight, np.zeros(len(table)))
-
-    shows, left = (np.linalg.norm(beside(np.concatenate([table, after])).project(before)) for table in (others, whole))
+    count, weights = len(columns), weight[data.joint]
+    own = columns * weights
+    before, after = np.where(later, 0.0, own), np.where(later, own, 0.0)
+    plain = orthonormal(others * weights)
+    every = _extended(plain, standing * weights)
+    shows, left = (np.linalg.norm(_beside(_extended(basis, after), before)) for basis in (plain, every))
     if left <= _REST * shows:
         return Share(0.0, 0.0, 0.0 if before.any() else np.inf)
-    fit = fit_columns(data, np.concatenate([whole, before, after]), weight=weight)
-    own = slice(len(whole), len(whole) + count)
-    was, now = fit.beta[own], fit.beta[own.stop:]
-    seen = beside(whole).project(after)
-    gram = seen @ seen.T
+    # Of the whole fit only these coefficients are asked: of what all others leave of the columns and the torque
+    # (Frisch & Waugh 1933, Lovell 1963), and so their covariance.
+    seen, torque = _beside(every, np.concatenate([before, after])), _beside(every, data.y * weights)
+    beta = solved(seen, torque)
+    was, now = beta[:count], beta[count:]
+    gram = seen[count:] @ seen[count:].T
     there = max(float(now @ gram @ now), 1e-300)
-    spread = float(np.trace(gram @ covariance(fit.table * fit.weights, fit.residual)[own, own]))
+    spread = float(np.trace(gram @ covariance(seen, torque - beta @ seen)[:count, :count]))
     size, std = (float(np.sqrt(max(x, 0.0) / there)) for x in (float(was @ gram @ was), spread))
     return Share(float(was @ gram @ now) / there, size, std)
+
+
+def _extended(basis: Array, table: Array) -> Array:
+    """Orthonormal rows that span those of `basis`, which are, and of `table`."""
+    left = _beside(basis, table)
+    new = np.linalg.norm(left, axis=1) > _ROUNDING * np.linalg.norm(table, axis=1)
+    return np.concatenate([basis, orthonormal(_beside(basis, left[new]))])
+
+
+def _beside(basis: Array, x: Array) -> Array:
+    """Rows (…, rows) less what the orthonormal ones of `basis` make of them."""
+    return np.asarray(x - (x @ basis.T) @ basis)

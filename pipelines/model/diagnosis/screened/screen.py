@@ -38,8 +38,9 @@ INVISIBLE = 1e-3  # η below which a column is what the nominal model makes of r
 _USUAL = 0.25  # of the shapes reach less
 _EVENTS = 3  # residuals that an event is looked for in
 _MOMENTS, _AGAIN = 2, 1.0 / 3.0  # that an event may have; of its gain, that any further moment gains at most
-# Rows times shapes, up to which a second process costs more than it takes off: to copy this one, and every page that either writes.
-_LITTLE = 10_000_000
+# Rows times shapes that are laid already, up to which a second process costs more than it takes off: to copy this one, and every
+# page that either writes.
+_LITTLE = 15_000_000
 _SPREAD = 1e-4  # of the largest: directions of c⊥ that are left alone
 
 
@@ -88,14 +89,19 @@ def screen(data: Data, fit: Fit, candidates: Sequence[Family], arm: Arm | Arms, 
     return [replace(seen, family=family) for seen, family in zip(found, candidates, strict=True)]
 
 
-def for_each(data: Data, work: Callable[[Family], A], candidates: Sequence[Family], fits: Iterable[Fit], *arms: Arm) -> list[A]:
-    """What `work` makes of each family, by two processes where it is much; `fits` and `arms` are what it needs."""
+def for_each(data: Data, work: Callable[[Family], A], candidates: Sequence[Family], fits: Iterable[Fit], *arms: Arm,
+             laid: bool = False) -> list[A]:
+    """What `work` makes of each family, by two processes; `fits` and `arms` are what it needs.
+
+    Args:
+        laid: most of the columns have been asked for before: what is little is done here, then.
+    """
     for fit in fits:
         _ = fit.basis, fit.residual  # once, before there are two
     for log in data.logs:
         for arm in arms:
             log.kept.number(arm)
-    if data.rows * sum(len(family.shapes) for family in candidates) < _LITTLE:
+    if laid and data.rows * sum(len(family.shapes) for family in candidates) < _LITTLE:
         return [work(family) for family in candidates]
     return together([log.kept for log in data.logs], work, candidates)
 

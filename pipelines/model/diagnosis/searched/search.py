@@ -12,7 +12,7 @@ or with one more that is worth it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,9 +107,13 @@ def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:
     return [(best.effect.name, best.effect.joint) for one, best in found if _share(best.screened, one.before) >= _LARGE]
 
 
-def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
+def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable[[Refined], bool] = lambda _: False) -> Found:
     """Up to `most` causes, the same at several joints being one; what `rough` explored already is not done again, as long as it
-    leads the same way."""
+    leads the same way.
+
+    Args:
+        ends: whether nothing more is worth looking for beside the model with the cause that was found last.
+    """
     now = rough[0].before if rough else refine(case.model, case.data, case.weight)
     nominal = now
     steps: list[Step] = []
@@ -140,6 +144,8 @@ def search(case: Case, most: int, rough: Sequence[Explored] = ()) -> Found:
             continue
         follows = number < len(rough) and same and step.best is fewest(rough[number - 1].tried)
         now = rough[number].before if follows else _reweighted(step.best.done, case)
+        if ends(now):
+            break
     return Found(nominal, tuple(steps), now)
 
 
