@@ -40,7 +40,7 @@ Mask = npt.NDArray[np.bool_]
 _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
 _LONGEST = 5.0  # [s] of a log that is simulated
-_SOFT = 1.0  # [s] the same, where something moves beside the joints of an arm, which takes many steps
+_SOFT = 1.0  # [s] the same, where something moves beside the joints of an arm, or a drive remembers, which takes many steps
 _LONGER = 6.0  # times as long, where the last arm comes no nearer than the first: what noise does to an error averages out
 _WINDOW = 0.1  # [s]
 _HELD = 1e-4  # [rad or m] standard deviation of a joint that does not move
@@ -178,7 +178,7 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
     if not motions:
         return none
     logs = motions[:_LOGS]
-    soft = any(hook.rate is not None for arm in arms for hook in Plant.of(arm).hooks)
+    soft = any(hook.rate or (hook.actuator and hook.states) for arm in arms for hook in Plant.of(arm).hooks)
     if known:
         one, left = next(iter(known.values())), [k for k in range(len(arms)) if k not in known]
         if one.how == "none":
