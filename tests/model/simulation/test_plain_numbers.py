@@ -8,11 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import Controller
 from pipelines.model.arm import Acting
+from pipelines.model.effects.cogging import Cogging
+from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.load_friction import LoadFriction
 from pipelines.model.effects.presliding import Presliding
 from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.effects.torque_saturation import TorqueSaturation
@@ -85,6 +89,34 @@ def test_the_integrator_moves_memories_as_runge_kutta_does() -> None:
     np.testing.assert_allclose(state[:, 0], other[:, 1], rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(states[0], others[1], rtol=0.0, atol=1e-10)
     assert np.ptp(seen, axis=0).min() > 1.0  # they bent to one side, and to the other
+
+
+def leaning(*more: Acting) -> Plant:
+    """Its rigid body is in no closed form: it takes arrays, but for the loads of single joints."""
+    return plant(Acting.of(GravityTilt(), {"angle": 0.05, "direction": 0.7, "waist_sine": 0.0, "waist_cosine": 0.0}), *more)
+
+
+def waves(amplitude: float) -> Acting:
+    cogging = Cogging(joint=3, order=11.0)
+    return Acting.of(cogging, cogging.values([amplitude, 0.2 * amplitude, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_loads_of_single_joints_beside_a_body_that_takes_arrays() -> None:
+    """Two of them, at one joint, and a drive before them: alone as among many."""
+    drag = Acting.of(Stribeck(joint=3, speed=0.1), {"amplitude": 0.4, "speed": 0.1, "sharpness": 60.0, "tail": 0.0, "exponent": 2.0})
+    arm = leaning(waves(0.3), drag, Acting.of(TorqueGain(joint=2), {"gain_error": 0.1}))
+    assert not OneRRR.fits(arm)
+    assert len(arm.own_loads) == 2
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+    assert np.abs(alone - both(leaning())[0]).max() > 1e-5
+
+
+def test_an_arm_that_runs_away_says_so_whatever_its_loads_make_of_it() -> None:
+    """D17: there is no sine of an infinite angle."""
+    with pytest.raises(InputRejected) as raised:
+        run(leaning(waves(0.3)), experiment(Controller("pd", -300.0 * KP, -300.0 * KD, velocity="backward-difference"), SAMPLES), 1)
+    assert raised.value.code == "RRID-D17"
 
 
 def test_what_remembers_more_numbers_takes_arrays() -> None:
