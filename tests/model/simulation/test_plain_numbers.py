@@ -103,8 +103,8 @@ def waves(amplitude: float) -> Acting:
 
 def test_loads_of_single_joints_beside_a_body_that_takes_arrays() -> None:
     """Two of them, at one joint, and a drive before them: alone as among many."""
-    drag = Acting.of(Stribeck(joint=3, speed=0.1), {"amplitude": 0.4, "speed": 0.1, "sharpness": 60.0, "tail": 0.0, "exponent": 2.0})
-    arm = leaning(waves(0.3), drag, Acting.of(TorqueGain(joint=2), {"gain_error": 0.1}))
+    values = {"amplitude": 0.4, "speed": 0.1, "sharpness": 60.0, "tail": 0.0, "exponent": 2.0}
+    arm = leaning(waves(0.3), Acting.of(Stribeck(joint=3, speed=0.1), values), Acting.of(TorqueGain(joint=2), {"gain_error": 0.1}))
     assert not OneRRR.fits(arm)
     assert len(arm.own_loads) == 2
     alone, among = both(arm)
