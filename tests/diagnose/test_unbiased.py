@@ -16,6 +16,7 @@ from pipelines.bench import experiments
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.answered import unbiased
 from pipelines.model.diagnosis.answered.unbiased import smoothed_away
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
@@ -24,6 +25,7 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, moved_by, refine
 from pipelines.model.diagnosis.searched.search import Found, Step
+from pipelines.model.effects.torque_lag import TorqueLag
 
 MACHINES = (1501, 1502, 1503, 1505)
 
@@ -84,21 +86,24 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
     assert after < 0.7 * before
 
 
-def test_the_noise_of_a_run_moves_next_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+def test_the_noise_of_a_run_moves_next_to_nothing(lag: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Amplifiers of ten times the noise: what the rigid body's numbers differ by from one run to the next is half at most of what
-    it is where a log has what the drives were asked for."""
+    it is where a log has what the drives were asked for; also of torque that is logged late."""
     done, prepared = fitted(1501, 0)
     noise = 10.0 * np.array(draw_machine(1501, "fault").amplifier_noise)
     rigid = slice(len(done.model.columns.kept))
     deviation = np.sqrt(np.diag(done.covariance()))[rigid]
 
+    arm = done.model.arm if lag == 0.0 else done.model.arm.extended(Acting.of(TorqueLag(2), {"time_constant": lag}))
+
     def scatter() -> float:
-        left = [smoothed_away(done.model.arm, noise, done.data, prepared, 10 * k) for k in range(5)]
+        left = [smoothed_away(arm, noise, done.data, prepared, 10 * k) for k in range(5)]
         moved = [moved_by(done, -one).model.beta[rigid] / deviation for one in left if one is not None]
         return float(np.sqrt(np.mean(np.var(moved, axis=0, ddof=1))))
 
     known = scatter()
-    monkeypatch.setattr(unbiased, "torque_noise", lambda *_: 0.0)
+    monkeypatch.setattr(unbiased, "torque_noise", lambda _, seeds, samples: np.zeros((len(seeds), samples, 3)))
     assert known < 0.5 * scatter()
 
 

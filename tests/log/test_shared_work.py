@@ -192,6 +192,19 @@ def test_a_program_whose_children_nobody_waits_for_gets_its_answers() -> None:
         signal.signal(signal.SIGCHLD, before)
 
 
+def test_a_process_that_has_answered_leaves_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody kills it or waits for it, and by the next but one call nothing is left of it."""
+    started, fork = list[int](), os.fork
+    monkeypatch.setattr(os, "fork", lambda: started.append(child := fork()) or child)
+    monkeypatch.setattr(os, "kill", None)
+    shared_out(slowly, PIECES[:4])
+    time.sleep(0.1)
+    shared_out(slowly, PIECES[:4])
+    assert len(started) == 2
+    with pytest.raises(ChildProcessError):
+        os.waitpid(started[0], os.WNOHANG)
+
+
 def test_workers_of_a_batch_share_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("multiprocessing.parent_process", lambda: object())
     assert {process for _, process in shared_out(slowly, PIECES[:3])} == {os.getpid()}

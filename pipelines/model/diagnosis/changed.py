@@ -138,16 +138,17 @@ def _compared(first: Responding, since: Since, reference: Data, chosen: Diagnosi
     """The search in what has changed, and meanwhile the noise of the drives. What it finds that stood in the reference logs as well
     is taken out with the rest that stands, and it searches again."""
     taken = first.held.case.beside
-    for again in (*[True] * _STOOD, False):
+    for count in range(_STOOD + 1):
         case = first.nameable(since.case)
-        asked = Before(case, again)
+        asked = Before(case, again=count < _STOOD)
         with meanwhile(partial(drives, since)) as noise:
-            found = search(case, chosen.most, ends=asked.ended)
+            # Once a search ends early: of many joints that have the same law each would have a search of its own.
+            found = search(case, chosen.most, ends=asked.ended if count == 0 else None)
             more = asked.stood(found.final)
             if not more:
                 return _Compared(since, found, asked.told(found.final), noise())
         before, stood = since, (*since.stood, *more)  # beside more that stands, chance gives each cause less: known is no longer
-        since = since_reference(first.held.prepared, reference, chosen, taken, None, stood, since.first)
+        since = since_reference(first.held.prepared, reference, chosen, taken, None, stood, since.of_reference)
         memory.instead(before, since)
     raise AssertionError("nothing stands in the last round")
 

@@ -12,8 +12,8 @@ Gouriéroux, Monfort, Renault 1993, to first order):
 
 Several runs with the noise of the amplifiers are averaged: without it, each reversal falls between samples in the one way that may
 not have been the logs'. What the drives gave stands in their logs, not what they were asked for: the noise itself, which is nothing
-on average, moves no number then. Of three arms this left numbers off by 0.06 to 0.10 of their deviations, what they were asked for
-by 0.13 to 0.20. Logs that no controller is known of, or that come to other rows, count as if the arm left nothing of them.
+on average, is no part of what is left then. Of three arms this left numbers off by 0.06 to 0.10 of their deviations, what they were
+asked for by 0.13 to 0.20. Logs that no controller is known of, or that come to other rows, count as left with nothing.
 The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction. That is told best
 beside all that was found; of the models that have less of it, the same is taken out.
 """
@@ -36,7 +36,7 @@ from pipelines.model.diagnosis.floor.twin import replayable, replica
 from pipelines.model.diagnosis.rows.data import Data, gather
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.search import Found, Step
-from pipelines.model.simulation import Noise, Simulated, choose_steps, runs_alone, simulate_together, torque_noise
+from pipelines.model.simulation import Noise, Plant, Simulated, choose_steps, runs_alone, simulate_together, torque_noise
 
 __all__ = ["smoothed_away", "unbiased"]
 
@@ -97,16 +97,16 @@ def smoothed_away(arm: Arm, noise: Array, data: Data, prepared: Prepared, seed: 
         place, seeds = piece
         log = logs[place]
         done, = simulate_together(arm, [experiments[place]], drawn, seeds, steps)
-        given = done.tau + torque_noise(drawn, seeds, done.tau.shape[1])
+        noise = torque_noise(drawn, seeds, done.tau.shape[1])
+        given = done.tau + np.stack([plant.logged(done.t, one) for one in noise])
         holes = replace(done, q=_as_missing(as_recorded(log, done.q), log.q), tau=_as_missing(as_recorded(log, given), log.tau))
         return np.asarray(np.sum([_left(arm, holes, k, data, prepared, place) for k in range(len(seeds))], axis=0))
 
-    seeds = tuple(range(seed, seed + _RUNS))
+    seeds, plant = tuple(range(seed, seed + _RUNS)), Plant.of(arm)
     mean = [np.zeros(one.rows * one.n_joints) for one in data.logs]
     try:
         experiments = {place: experiment_of(logs[place]) for place in places}
-        first = {logs[place].sample_time: experiments[place] for place in reversed(places)}
-        steps = choose_steps(arm, list(first.values()), drawn)  # what suffices for a log suffices for the next
+        steps = choose_steps(arm, list(experiments.values()), drawn)
         pieces = [(place, some) for place in sorted(places, key=lambda place: -logs[place].n_samples)
                   for some in ([(one,) for one in seeds] if runs_alone(arm, experiments[place]) else [seeds])]
         for (place, _), left in zip(pieces, shared_out(of_runs, pieces), strict=True):

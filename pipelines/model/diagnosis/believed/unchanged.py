@@ -47,8 +47,14 @@ class Before:
         return [done.model.effects[place].effect for place, share in zip(able, found, strict=True) if share.stood]
 
     def told(self, done: Refined) -> Case:
-        """The case with the answers for this model as those for any that has the same effects: as steady rows have them, say."""
-        return self._case if self._case.before is None else replace(self._case, before=lambda _, place: self._share(done, place))
+        """The case with the answers for this model as those for any that has the same effects in its places: as steady rows have
+        them, say."""
+        ask = self._case.before
+        if ask is None:
+            return self._case
+        places = _places(done)
+        return replace(self._case, before=lambda other, place: self._share(done, place) if _places(other) == places else
+                       ask(other, place))
 
     def _share(self, done: Refined, place: int) -> Share:
         if (id(done), place) not in self._known and self._case.before is not None:
@@ -59,6 +65,10 @@ class Before:
         """Places of effects which the standing set may have."""
         every = enumerate(done.model.effects if self._again else ())
         return [k for k, one in every if one.log is None and one.possible and not one.effect.needs]
+
+
+def _places(done: Refined) -> list[tuple[str, int | None]]:
+    return [(one.effect.name, one.effect.joint) for one in done.model.effects]
 
 
 def no_change(found: Found, k: int, case: Case, floor: Array) -> str:

@@ -48,7 +48,7 @@ from pipelines.model.diagnosis.worth.numbers import of_amplitudes, told
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.regression import Columns
 
-__all__ = ["Known", "Moved", "OfReference", "Probed", "Since", "of_reference", "since_reference"]
+__all__ = ["Known", "Moved", "OfReference", "Probed", "Since", "since_reference"]
 
 _NEARLY = 0.9  # of the length of columns, that others can imitate
 _ALLOWED, _SHARE = 3.0, 0.1  # standard deviations of the reference logs alone; of an amplitude: no law is that of the machine
@@ -85,10 +85,10 @@ class Since:
     probed: Probed  # beside a final model: what limits are looked for with
     floor_of: Callable[[Data], Array]  # (joints,) [N m] of logs of another motion
     stood: tuple[Effect, ...]  # those of the standing effects that later logs have shown
-    first: OfReference
+    of_reference: OfReference
 
 
-def of_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings) -> OfReference:
+def _of_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings) -> OfReference:
     """What stands by the reference logs alone."""
     columns, fit = fit_nominal(reference, prepared.columns)
     arm = Exact.start(columns, fit).arm
@@ -99,18 +99,18 @@ def of_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings)
 
 
 def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettings, before: Sequence[Acting] = (),
-                    known: Known | None = None, stood: Sequence[Effect] = (), first: OfReference | None = None) -> Since:
+                    known: Known | None = None, stood: Sequence[Effect] = (), known_alone: OfReference | None = None) -> Since:
     """Standing effects, the gate for changes, and causes that base parameters show.
 
     Args:
         before: effects that were taken out of the rows already.
         stood: effects of which is known that they stand as well, in these shapes.
         known: what chance gives each cause on the same reference logs, where an earlier diagnosis has found it.
-        first: what the reference logs say by themselves, where it is known.
+        known_alone: what the reference logs say by themselves, where it is known.
     """
-    first = of_reference(prepared, reference, chosen) if first is None else first
-    data, later, every, arm, columns, beta = first.data, first.later, first.every, first.arm, first.columns, first.beta
-    standing = _with(first.standing, stood, data, arm)
+    own = known_alone or _of_reference(prepared, reference, chosen)
+    data, later, every, arm, columns, beta = own.data, own.later, own.every, own.arm, own.columns, own.beta
+    standing = _with(own.standing, stood, data, arm)
     base = rows_of(data, columns)
     nominal = np.concatenate([base, *law_slopes(data, columns, beta[:len(base)])[0]])
     common = _torques(data, standing, arm)
@@ -170,7 +170,7 @@ def since_reference(prepared: Prepared, reference: Data, chosen: DiagnosisSettin
     shown = tuple(Standing(own.effect.name, own.effect.joint, told(own), one.gain)
                   for one, own in zip(standing, acting, strict=True))
     return Since(case, floor, left, shown, case.beside, moved, chance, probed,
-                 partial(floor_by_speed, reference, left), tuple(stood), first)
+                 partial(floor_by_speed, reference, left), tuple(stood), own)
 
 
 def _farther(effect: Effect, standing: Sequence[Chosen], now: Data, reference: Data) -> bool:

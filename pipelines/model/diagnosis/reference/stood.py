@@ -79,7 +79,9 @@ def share_before(columns: Array, data: Data, later: npt.NDArray[np.bool_], other
         return Share(0.0, 0.0, 0.0 if before.any() else np.inf)
     # Of the whole fit only these coefficients are asked: of what all others leave of the columns and the torque
     # (Frisch & Waugh 1933, Lovell 1963), and so their covariance.
-    seen, torque = _beside(every, np.concatenate([before, after])), _beside(every, data.y * weights)
+    table = np.concatenate([before, after])
+    seen, torque = _beside(every, table), _beside(every, data.y * weights)
+    seen[np.linalg.norm(seen, axis=1) <= _ROUNDING * np.linalg.norm(table, axis=1)] = 0.0
     beta = solved(seen, torque)
     was, now = beta[:count], beta[count:]
     gram = seen[count:] @ seen[count:].T

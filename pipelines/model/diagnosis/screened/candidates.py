@@ -21,7 +21,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.fitted.record import changing, recorded, recorded_of
 from pipelines.model.diagnosis.rows.data import Data, LogData
-from pipelines.model.diagnosis.screened.rigid_alike import Asked
+from pipelines.model.diagnosis.screened.arms_alike import Asked
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -56,18 +56,24 @@ class Arms:
 
     now: Arm  # with all that was found
     start: Arm  # for what just adds its torque, whatever else acts
-    rigid: tuple[Asked, ...] = ()  # at each joint, then at all: for what follows from the rigid body alone
+    rigid: tuple[Asked, ...] = ()  # at each joint: for what just adds what follows from the rigid body alone
+    body: Asked | None = None  # for what follows from that and does more
     moving: tuple[Asked, ...] = ()  # at each joint: for what follows from that and from what acts at the joint
 
     @property
+    def asked(self) -> tuple[Asked, ...]:
+        return (*self.rigid, *self.moving, *(() if self.body is None else (self.body,)))
+
+    @property
     def every(self) -> tuple[Arm, ...]:
-        return (self.now, self.start, *(one.arm for one in (*self.rigid, *self.moving)))
+        return (self.now, self.start, *(one.arm for one in self.asked))
 
     def of(self, family: Family) -> Arm:
         effect = family.shapes[0]
-        if self.rigid and effect.from_body:
-            # What joints beside it do to a gap is little; a column that is to be exact beside what was found has all of them alike.
-            return self.rigid[family.joint - 1 if effect.adds and family.joint else -1].arm
+        if self.rigid and effect.from_body and effect.adds and family.joint:
+            return self.rigid[family.joint - 1].arm
+        if self.body is not None and effect.from_body:
+            return self.body.arm
         if self.moving and effect.from_own_joint and family.joint:
             return self.moving[family.joint - 1].arm
         return self.start if effect.adds else self.now

@@ -26,6 +26,7 @@ import numpy as np
 
 from pipelines.fit.flips import by_flips
 from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.screened.blocked import Blocked
 from pipelines.model.diagnosis.screened.candidates import Family
@@ -49,6 +50,7 @@ class _Asked:
 
     place: int
     family: Family
+    arm: Arm  # by whose columns
     gains: Array  # (blocks,) held out
     taken: Array  # (rows,) t⊥ what its best shape takes off the weighted residual
 
@@ -60,9 +62,9 @@ class _Asked:
 def not_borne_out(case: Case, now: Refined, screened: Sequence[Screened]) -> frozenset[int]:
     """Places of those that other time does not bear out, or not alone; what is not linear, or happens once, waits to be fitted."""
     blocked = Blocked.of(now, _BLOCKS)
-    linear = [(k, one) for k, one in enumerate(screened) if _linear(one)]
-    asked = [_Asked(k, one.family, blocked.gains(one.family, case.arms(now.model).of(one.family)), _taken(now, one))
-             for k, one in linear]
+    arms = case.arms(now.model)
+    linear = [(k, one, arms.of(one.family)) for k, one in enumerate(screened) if _linear(one)]
+    asked = [_Asked(k, one.family, arm, blocked.gains(one.family, arm), _taken(now, one)) for k, one, arm in linear]
     asked.sort(key=lambda one: -float(one.gains.sum()))
     there = [one for one in asked if one.there]
     refused: list[_Asked] = []  # for themselves
@@ -70,9 +72,9 @@ def not_borne_out(case: Case, now: Refined, screened: Sequence[Screened]) -> fro
     for one in asked:
         if one.place in out:
             refused.append(one)
-        elif any(_share(case, now, other, one) > _PART for other in refused):
+        elif any(_share(now, other, one) > _PART for other in refused):
             out.add(one.place)
-        elif any(_instead(case, now, one, other) for other in there if other is not one):
+        elif any(_instead(now, one, other) for other in there if other is not one):
             refused.append(one)
             out.add(one.place)
     return frozenset(out)
@@ -105,14 +107,14 @@ def _taken(now: Refined, one: Screened) -> Array:
     return np.asarray(solved @ unit)
 
 
-def _instead(case: Case, now: Refined, own: _Asked, other: _Asked) -> bool:
+def _instead(now: Refined, own: _Asked, other: _Asked) -> bool:
     """Whether another cause takes part of the same, and is not decidedly worse."""
     if by_flips(own.gains - other.gains) <= _CHANCE:
         return False
-    return _PART < max(_share(case, now, other, own), _share(case, now, own, other)) <= _ALL
+    return _PART < max(_share(now, other, own), _share(now, own, other)) <= _ALL
 
 
-def _share(case: Case, now: Refined, family: _Asked, of: _Asked) -> float:
+def _share(now: Refined, family: _Asked, of: _Asked) -> float:
     """Of what one cause takes, that the other one in its best shape takes as well."""
-    seen = screen_family(now.data, now.fit, family.family, case.arms(now.model).of(family.family), of.taken[None])
+    seen = screen_family(now.data, now.fit, family.family, family.arm, of.taken[None])
     return float(seen.gain[0]) / max(float(of.taken @ of.taken), 1e-300)

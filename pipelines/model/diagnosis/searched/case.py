@@ -14,8 +14,8 @@ from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
 from pipelines.model.diagnosis.reference.stood import Share
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.screened.arms_alike import Asked, alike, moving_alike
 from pipelines.model.diagnosis.screened.candidates import Arms, Family
-from pipelines.model.diagnosis.screened.rigid_alike import Asked, alike, moving_alike
 from pipelines.model.diagnosis.screened.screen import Screened
 from pipelines.model.diagnosis.searched.elsewhere import Shared
 from pipelines.model.diagnosis.worth.held_out import held_out_left
@@ -65,9 +65,11 @@ class Case:
         torque, before = model.torque(self.data), self.model.torque(self.data)
         more = self.data.rms(before - torque)
         same = (more <= _ALIKE * self.data.rms(torque)).all() and not any(one.effect.last for one in model.effects)
-        now = Asked.of(self.data, model, torque)
-        start = Asked.of(self.data, self.model, before) if same else now
-        return Arms(now.arm, start.arm, alike(self.data, start), moving_alike(self.data, now))
+        now, start = Asked.of(self.data, model, torque), Asked.of(self.data, self.model, before)
+        start = start if same else now
+        apart = self.data.rms(start.rigid - now.rigid) > _ALIKE * self.data.rms(now.rigid)
+        gaps = alike(self.data, now if apart.any() else start)  # inertia of a rotor may have come out of the rigid body
+        return Arms(now.arm, start.arm, gaps[:-1], alike(self.data, now)[-1], moving_alike(self.data, now))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.fitted.linear import solved
-from pipelines.model.diagnosis.fitted.nominal import Fit
+from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.candidates import Family, lay_family
@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.searched.ledger import Tried
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.effects.base import Effect
 
-__all__ = ["apart_from", "best_form", "each_fitted", "fitted", "laid_whole", "plainer"]
+__all__ = ["apart_from", "best_form", "each_fitted", "first_order_missed", "fitted", "laid_whole", "plainer"]
 
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less, and a cause in a shape that is not the best
 _NEARLY = 0.95  # of what the best shape explains
@@ -245,3 +245,15 @@ def _amplitudes(fit: Fit, table: Array) -> Array:
     unit = c / size[:, None]
     solved, *_ = np.linalg.lstsq(unit @ unit.T, unit @ fit.residual, rcond=1e-8)
     return np.asarray(solved / size)
+
+
+def first_order_missed(rival: Tried, place: int, last: Tried, case: Case) -> float:
+    """Squared weighted torque of effect number `place` and the last one together that `rival` cannot do to first order, beside all
+    else: a fit, which tells it exactly, costs ten times as much."""
+    done, two = last.done, (place, len(last.done.model.effects) - 1)
+    others = replace(done.model, effects=tuple(e for k, e in enumerate(done.model.effects) if k not in two))
+    own = laid_whole(case.data, rival.done.model.effects[-1].effect, done.model.arm)
+    rest = np.delete(done.slopes, [k for which in two for k in done.of_effect(which)], axis=0)
+    missed = fit_columns(case.data, np.concatenate([rest, own]), done.model.torque(case.data) - others.torque(case.data),
+                         done.weight).residual
+    return float(missed @ missed)

@@ -17,11 +17,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.model.diagnosis.fitted.nominal import fit_columns
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
 from pipelines.model.diagnosis.result import Trial
-from pipelines.model.diagnosis.screened.rigid_alike import remember
+from pipelines.model.diagnosis.screened.arms_alike import remember
 from pipelines.model.diagnosis.screened.screen import Screened, screen
 from pipelines.model.diagnosis.searched.barred import better_than
 from pipelines.model.diagnosis.searched.borne_out import borne_out
@@ -29,7 +28,7 @@ from pipelines.model.diagnosis.searched.case import Case, HeldOut, held_out
 from pipelines.model.diagnosis.searched.curves import with_curves_anew
 from pipelines.model.diagnosis.searched.elsewhere import at_its_joint
 from pipelines.model.diagnosis.searched.gate import CLOSE, Gate, gate_of, once_more
-from pipelines.model.diagnosis.searched.hypotheses import best_form, each_fitted, laid_whole, plainer
+from pipelines.model.diagnosis.searched.hypotheses import best_form, each_fitted, first_order_missed, plainer
 from pipelines.model.diagnosis.searched.ledger import Tried, ledger
 from pipelines.model.diagnosis.searched.parsimony import PARSIMONY, different, fewest
 from pipelines.model.diagnosis.searched.unnameable import unnameable
@@ -107,7 +106,7 @@ def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:
     return [(best.effect.name, best.effect.joint) for one, best in found if _share(best.screened, one.before) >= _LARGE]
 
 
-def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable[[Refined], bool] = lambda _: False) -> Found:
+def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable[[Refined], bool] | None = None) -> Found:
     """Up to `most` causes, the same at several joints being one; what `rough` explored already is not done again, as long as it
     leads the same way.
 
@@ -144,7 +143,7 @@ def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable
             continue
         follows = number < len(rough) and same and step.best is fewest(rough[number - 1].tried)
         now = rough[number].before if follows else _reweighted(step.best.done, case)
-        if ends(now):
+        if ends is not None and ends(now):
             break
     return Found(nominal, tuple(steps), now)
 
@@ -175,7 +174,7 @@ def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explor
             if rival.error >= 1.0 or not rival.possible:
                 continue
             gain = max(last.before.rss - last.best.done.rss, 1e-300)
-            if _first_order_missed(rival, place, last.best, case) > _NEAR * gain:
+            if first_order_missed(rival, place, last.best, case) > _NEAR * gain:
                 continue
             effects = (*rival.done.model.effects, *last.before.model.effects[place + 1:])
             alone = refine(replace(last.before.model, effects=effects), case.data, last.before.weight)
@@ -186,18 +185,6 @@ def _one_for_two(case: Case, steps: Sequence[Step], asked: Sequence[tuple[Explor
             if instead.best is rival:
                 return place, instead, rival
     return None
-
-
-def _first_order_missed(rival: Tried, place: int, last: Tried, case: Case) -> float:
-    """Squared weighted torque of effect number `place` and the last one together that `rival` cannot do to first order, beside all
-    else: a fit, which tells it exactly, costs ten times as much."""
-    done, two = last.done, (place, len(last.done.model.effects) - 1)
-    others = replace(done.model, effects=tuple(e for k, e in enumerate(done.model.effects) if k not in two))
-    own = laid_whole(case.data, rival.done.model.effects[-1].effect, done.model.arm)
-    rest = np.delete(done.slopes, [k for which in two for k in done.of_effect(which)], axis=0)
-    missed = fit_columns(case.data, np.concatenate([rest, own]), done.model.torque(case.data) - others.torque(case.data),
-                         done.weight).residual
-    return float(missed @ missed)
 
 
 def gives_way(explored: Explored) -> bool:
@@ -221,7 +208,7 @@ def _share(one: Screened, now: Refined) -> float:
 def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
     arms = case.arms(now.model)
     found = tuple(screen(case.data, now.fit, case.families, arms))
-    remember(case.data, (*arms.rigid, *arms.moving))
+    remember(case.data, arms.asked)
     return found
 
 

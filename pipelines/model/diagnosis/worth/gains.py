@@ -178,7 +178,9 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
     if not motions:
         return none
     logs = motions[:_LOGS]
-    soft = any(hook.rate or (hook.actuator and hook.states) for arm in arms for hook in Plant.of(arm).hooks)
+    hooks = [hook for arm in arms for hook in Plant.of(arm).hooks]
+    soft = any(hook.rate for hook in hooks)
+    slow = soft or any(hook.actuator and hook.states for hook in hooks)
     if known:
         one, left = next(iter(known.values())), [k for k in range(len(arms)) if k not in known]
         if one.how == "none":
@@ -187,7 +189,7 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
         every = {**known, **dict(zip(left, found, strict=True))}
         return [every[k] for k in range(len(arms))]
     if all(in_loop(arms[0], log) for log, _ in logs):
-        longest = _SOFT if soft else _LONGEST
+        longest = _SOFT if slow else _LONGEST
         found = _each(arms, logs, soft, longest)
         if _open(found[0], found[-1]) and any(log.n_samples * log.sample_time > longest for log, _ in logs):
             longer = _each(arms, logs, soft, _LONGER * longest)

@@ -15,7 +15,7 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis import changed as changed_module
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.believed.unchanged import Before, near_other_motion, no_change
+from pipelines.model.diagnosis.believed.unchanged import near_other_motion, no_change
 from pipelines.model.diagnosis.changed import _times
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.fitted.nominal import rows_of
@@ -26,7 +26,6 @@ from pipelines.model.diagnosis.reference.standing import Chosen, apart, joined
 from pipelines.model.diagnosis.reference.stood import ANYTHING, Share, share_before
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.candidates import lay_one
-from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -145,7 +144,7 @@ def test_it_searches_until_nothing_more_stood(answers: list[str], searched: int,
 
     def since_with(*given: Any) -> Any:
         known.append(given[-2])
-        return SimpleNamespace(case=len(known), stood=given[-2], first=given[-1])
+        return SimpleNamespace(case=len(known), stood=given[-2], of_reference=given[-1])
 
     class Asked:
         def __init__(self, case: int, again: bool) -> None:
@@ -166,11 +165,11 @@ def test_it_searches_until_nothing_more_stood(answers: list[str], searched: int,
     monkeypatch.setattr(changed_module, "since_reference", since_with)
     first: Any = SimpleNamespace(held=SimpleNamespace(case=SimpleNamespace(beside=()), prepared=None), nameable=lambda case: case)
     memory: Any = SimpleNamespace(instead=lambda *_: None)
-    start: Any = SimpleNamespace(case=0, stood=(), first="the reference logs alone")
+    start: Any = SimpleNamespace(case=0, stood=(), of_reference="the reference logs alone")
     found = changed_module._compared(first, start, None, SETTINGS, memory, lambda since: since.case)  # type: ignore[arg-type]
     assert count == list(range(searched))
     assert known == [tuple(answers[:k]) for k in range(1, searched)]
-    assert (found.case, found.noise, found.since.first) == (searched - 1, searched - 1, "the reference logs alone")
+    assert (found.case, found.noise, found.since.of_reference) == (searched - 1, searched - 1, "the reference logs alone")
 
 
 def test_a_wave_of_another_order_stays_beside_the_one_that_stood() -> None:
@@ -226,50 +225,29 @@ def test_what_stands_is_known_as_far_as_the_reference_logs_went(name: str, joint
     assert not ANYTHING.stood
 
 
-def three_effects(asked: list[int], stood: float) -> tuple[Any, Any, SimpleNamespace]:
-    """A model with an event, a law and a scale of torque, and a case that says how much of the law there was."""
-    contact, stribeck, gain = (SimpleNamespace(needs=needs) for needs in ((), (), ("known",)))
-    effects = (SimpleNamespace(log=1, effect=contact), SimpleNamespace(log=None, effect=gain, possible=True),
-               SimpleNamespace(log=None, effect=stribeck, possible=True))
-
-    def before(_: Any, place: int) -> Share:
-        asked.append(place)
-        return Share(stood, stood, 0.01)
-
-    data: Any = None
-    case = Case(data, None, data, np.ones(3), (), None, before=before)
-    return SimpleNamespace(model=SimpleNamespace(effects=effects)), case, stribeck
-
-
-def test_an_event_is_never_asked() -> None:
-    """Nor what no standing set may have: a scale of torque explains itself. The others once, however often it is wanted."""
-    asked = list[int]()
-    done, case, stribeck = three_effects(asked, 1.0)
-    before = Before(case)
-    assert before.ended(done)
-    assert (before.stood(done), asked) == ([stribeck], [2])
-    as_steady_rows_have_it: Any = SimpleNamespace(model=done.model)
-    told = before.told(done).before
-    assert told is not None
-    assert (told(as_steady_rows_have_it, 2).stood, asked) == (True, [2])
-    assert (told(as_steady_rows_have_it, 1).stood, asked) == (True, [2, 1])
-
-
-def test_what_has_changed_ends_no_search() -> None:
-    asked = list[int]()
-    done, case, _ = three_effects(asked, 0.1)
-    before = Before(case)
-    assert not before.ended(done)
-    assert (before.stood(done), asked) == ([], [2])
-
-
-@pytest.mark.parametrize("again", [True, False])
-def test_without_reference_logs_or_another_search_nothing_stood(again: bool) -> None:
-    asked = list[int]()
-    done, case, _ = three_effects(asked, 1.0)
-    before = Before(replace(case, before=None) if again else case, again)
-    assert not before.ended(done)
-    assert (before.stood(done), asked) == ([], [])
+def test_what_only_others_show_in_the_reference_logs_is_no_amplitude_of_it() -> None:
+    """One of two columns is nothing but what the others make of it there: rounding is all they leave. By all coefficients at once,
+    smallest where rows do not tell, NumPy says the same of the other one."""
+    rng = np.random.default_rng(3)
+    data = rows(hidden(1))
+    later = np.arange(data.rows) >= data.rows // 3
+    others = rng.normal(size=(5, data.rows))
+    columns = rng.normal(size=(2, data.rows))
+    columns[1, ~later] = rng.normal(size=5) @ others[:, ~later]
+    others = apart(others, later)
+    weight = np.array([50.0, 100.0, 200.0])
+    was, now = np.array([0.6, 0.0]), np.array([1.0, 0.8])
+    torque = np.where(later, now @ columns, was @ columns) + 0.01 * rng.normal(size=data.rows)
+    made: Any = SimpleNamespace(joint=data.joint, y=torque)
+    found = share_before(columns, made, later, others, others[:0], weight)
+    table = np.concatenate([others, np.where(later, 0.0, columns)[:1], np.where(later, columns, 0.0)])
+    beta = np.linalg.lstsq((table * weight[data.joint]).T, torque * weight[data.joint], rcond=None)[0]
+    left = (table[-2:] - (np.linalg.lstsq(table[:-3].T, table[-2:].T, rcond=None)[0].T @ table[:-3]))
+    assert beta[-3] == pytest.approx(0.6, abs=0.01)
+    gram = left @ left.T
+    same = float(np.array([beta[-3], 0.0]) @ gram @ beta[-2:] / (beta[-2:] @ gram @ beta[-2:]))
+    assert found.same == pytest.approx(same, rel=0.05)
+    assert found.std < 0.1
 
 
 def rows(log: ExperimentLog) -> Data:

@@ -78,6 +78,6 @@ def test_of_causes_that_explain_the_same_one_is_named_if_it_is_decidedly_better(
     blocked = SimpleNamespace(gains=lambda family, arm: gains[family.number])
     monkeypatch.setattr(borne_out.Blocked, "of", lambda now, count: blocked)
     monkeypatch.setattr(borne_out, "_taken", lambda now, one: towards[one.family.number])
-    monkeypatch.setattr(borne_out, "_share", lambda case, now, by, of: float(by.taken @ of.taken)**2)
+    monkeypatch.setattr(borne_out, "_share", lambda now, by, of: float(by.taken @ of.taken)**2)
     case: Any = SimpleNamespace(arms=lambda model: SimpleNamespace(of=lambda family: None))
     assert borne_out.not_borne_out(case, cast(Any, SimpleNamespace(model=None)), some) == frozenset(refused)

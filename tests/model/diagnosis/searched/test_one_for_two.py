@@ -71,7 +71,7 @@ def test_one_for_two_is_what_could_have_been_accepted(possible: bool, error: flo
                   SimpleNamespace(best=tried(1), before=SimpleNamespace(model=plain, weight=None, rss=before)))
     monkeypatch.setattr(search_module, "held_out", lambda *args: 1.0)
     monkeypatch.setattr(search_module, "refine", lambda *args: SimpleNamespace(rss=1.01))
-    monkeypatch.setattr(search_module, "_first_order_missed", lambda *args: 0.0)
+    monkeypatch.setattr(search_module, "first_order_missed", lambda *args: 0.0)
     monkeypatch.setattr(search_module, "_step", lambda *args: SimpleNamespace(best=None if gives_way else args[-1]))
     found = search_module._one_for_two(cast("Case", SimpleNamespace(data=None)), steps, cast("Any", ((None, None),)))
     assert (found is not None and found[2] is rival) is (taken and before == 2.0)

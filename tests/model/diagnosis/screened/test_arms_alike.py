@@ -15,15 +15,18 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.screened.arms_alike import _KNOWN, _MOST, Asked, moving_alike, remember
+from pipelines.model.diagnosis.screened.arms_alike import alike as alike_of
 from pipelines.model.diagnosis.screened.candidates import Arms, Family
-from pipelines.model.diagnosis.screened.rigid_alike import _KNOWN, _MOST, Asked, moving_alike, remember
-from pipelines.model.diagnosis.screened.rigid_alike import alike as alike_of
 from pipelines.model.diagnosis.screened.screen import screen
+from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.gravity_tilt import GravityTilt
+from pipelines.model.effects.joint_elasticity import JointElasticity
 from pipelines.model.effects.quadratic_drag import QuadraticDrag
+from pipelines.model.effects.rotor_inertia import RotorInertia
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
@@ -97,6 +100,34 @@ def test_what_acts_at_another_joint_changes_no_encoder_of_this_one() -> None:
     assert all(one.arm is model.arm for one in alike(data, rubbing))
 
 
+@pytest.mark.parametrize(("other", "same"), [(TorqueCrosstalk(1, from_joint=2.0), [0.1, 0.1001]),
+                                             (TorqueCrosstalk(1, from_joint=2.0), [0.3, 0.02]),
+                                             (TorqueCrosstalk(1, from_joint=3.0), [0.3, 0.3])])
+def test_as_much_of_what_changes_the_torque_of_others(other: Effect, same: list[float]) -> None:
+    """Wherever it is felt: in another number, or from another joint, it is another arm for every joint."""
+    model, data = start()
+    there = model.with_effect(TorqueCrosstalk(1, from_joint=2.0), np.array(same[:1]))
+    remember(data, [asked(data, there)])
+    own = model.with_effect(other, np.array(same[1:]))
+    assert [one is there.arm for one in moving(data, own)] == [same[1] == 0.1001] * 3
+
+
+def test_inertia_that_a_rotor_has_taken_over_is_another_rigid_body() -> None:
+    """Though all of the torque is that of the start: what hangs on the rigid body alone, whatever it does, is laid anew."""
+    model, data = start()
+    names = [model.columns.names[k].name for k in range(len(model.columns.kept))]
+    beta = model.beta.copy()
+    taken = 0.5 * beta[names.index("p12")]
+    beta[names.index("p12")] -= taken
+    own = replace(model, beta=beta).with_effect(RotorInertia(2), np.array([taken]))
+    np.testing.assert_allclose(data.rms(own.torque(data) - model.torque(data)), 0.0, atol=1e-6 * data.rms(model.torque(data)).max())
+    case = Case(data, None, model, np.ones(3), (), None)
+    remember(data, case.arms(model).asked)
+    arms = case.arms(own)
+    for effect in (JointElasticity(2), Backlash(2, gap=1e-3)):
+        assert arms.of(Family(effect.name, effect.joint, (effect,))) is own.arm
+
+
 @pytest.mark.parametrize("effect", [GravityTilt(), TorqueCrosstalk(1, from_joint=2.0)], ids=lambda effect: effect.name)
 def test_what_changes_the_torque_of_others_makes_another_arm(effect: Effect) -> None:
     """However little of it there is: an encoder that is not true has it on all rows."""
@@ -152,11 +183,11 @@ def test_gaps_are_not_followed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     fit = fit_nominal(data, model.columns)[1]
     family = Family("backlash", 2, tuple(Backlash(2, gap=gap) for gap in (1e-3, 2e-3)))
     before = alike(data, model)
-    first, = screen(data, fit, [family], Arms(model.arm, model.arm, before))
+    first, = screen(data, fit, [family], Arms(model.arm, model.arm, before[:-1]))
     remember(data, before)
     other = scaled(model, 1.0 + 5e-4)
     monkeypatch.setattr(Backlash, "several", None)
-    again, = screen(data, fit, [family], Arms(other.arm, other.arm, alike(data, other)))
+    again, = screen(data, fit, [family], Arms(other.arm, other.arm, alike(data, other)[:-1]))
     np.testing.assert_array_equal(again.gain, first.gain)
 
 
