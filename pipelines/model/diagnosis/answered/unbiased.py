@@ -13,9 +13,9 @@ Gouriéroux, Monfort, Renault 1993, to first order):
 Several runs with the noise of the amplifiers are averaged: without it, each reversal falls between samples in the one way that may
 not have been the logs'. What the drives gave stands in their logs, not what they were asked for: the noise itself, which is nothing
 on average, is no part of what is left then. Of three arms this left numbers off by 0.06 to 0.10 of their deviations, what they were
-asked for by 0.13 to 0.20. Logs that no controller is known of, or that come to other rows, count as left with nothing.
-The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction. That is told best
-beside all that was found; of the models that have less of it, the same is taken out.
+asked for by 0.13 to 0.20. Logs that no controller is known of, or that come to other rows, count as if the arm left nothing of
+them. The arm that is run has no faults but what comes late: what smoothing does to a reversal hangs on its friction. That is told
+best beside all that was found; of the models that have less of it, the same is taken out.
 """
 
 from __future__ import annotations
