@@ -73,8 +73,8 @@ def refuse_unknown(text: str, where: str) -> None:
 
 def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bool], where: str) -> tuple[int | None, str]:
     """The joint, and the text of the numbers."""
-    belongs = f"write {kind.name}:JOINT:NAME=VALUE" if kind.scope == "joint" else f"write {kind.name}:NAME=VALUE"
     numbers = rest.pop() if rest and "=" in rest[-1] else ""
+    belongs = f"write {kind.name}{':JOINT' if kind.scope == 'joint' else ''}{f':{numbers}' if numbers else ''}"
     wanted = 1 if kind.scope == "joint" else 0
     if len(rest) != wanted:
         what = "a joint" if wanted else "no joint, it belongs to the whole arm"

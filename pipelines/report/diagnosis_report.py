@@ -20,6 +20,7 @@ from pipelines.report.diagnosis_moved import of_moved, unmoved_words
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
     as_sentence,
+    at_places,
     floor_words,
     held_out_floor,
     held_out_words,
@@ -86,7 +87,8 @@ def _said(result: Result) -> str:
     if result.verdict == "nothing-wrong":
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
-        return f"Nothing{since}, as far as these logs can tell: what they could have shown, the report lists.{caveat}"
+        beyond = f"{_untold(result)}; what they would have shown, the report lists"
+        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}"
     if result.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
     first, *more = result.findings
@@ -100,6 +102,14 @@ def _said(result: Result) -> str:
     rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
     cause = f"{first.title}{how_much(first)}{where(first)}"
     return f"{changed}{cause}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
+
+
+def _untold(result: Result) -> str:
+    """What nobody should take for looked at: of it these logs say nothing."""
+    places = [words for _, words in at_places((one.cause, str(one.joint or "")) for one in result.not_testable)]
+    if not places:
+        return ""
+    return f", and they say nothing of {' and '.join(filter(None, (', '.join(places[:-1]), places[-1])))}"
 
 
 def _beside(more: Sequence[Finding]) -> Iterator[str]:

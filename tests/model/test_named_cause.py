@@ -63,6 +63,15 @@ def test_anything_else_is_refused(text: str, code: str, words: str) -> None:
     assert refused.value.remedy
 
 
+@pytest.mark.parametrize(("text", "remedy"), [
+    ("cogging", "cogging:JOINT"), ("cogging:order=6", "cogging:JOINT:order=6"), ("payload:1", "payload"),
+    ("payload:1:mass=0.1", "payload:mass=0.1")])
+def test_what_to_write_is_no_more_than_what_was_meant(text: str, remedy: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        wanted_cause(text, REVOLUTE)
+    assert refused.value.remedy == f"write {remedy}"
+
+
 @pytest.mark.parametrize("text", ["transmission_coupling:2:with_joint=7", "transmission_coupling:2:with_joint=2",
                                   "link_length:link=3", "link_length:link=0.5", "encoder_crosstalk:1:from_joint=9"])
 def test_a_start_is_held_to_the_arm_as_well(text: str) -> None:

@@ -16,6 +16,7 @@ from pipelines.model.diagnosis.result import (
     Diagnosis,
     Finding,
     Gain,
+    NotTestable,
     Proof,
     Rejected,
     ResidualRms,
@@ -262,3 +263,14 @@ def test_the_verdict_says_what_was_not_looked_for(verdict: str) -> None:
         assert page.verdict.endswith("Not looked for, because you said so: presliding, Stribeck friction.")
     assert "looked for" not in diagnosis_report(Result(**(there | {"without": ("coulomb",)}))).verdict
     assert "looked for" not in diagnosis_report(Result(**there)).verdict
+
+
+def test_nothing_wrong_says_at_once_of_what_it_says_nothing() -> None:
+    """A load at the tip that these logs cannot tell from the arm is not nothing."""
+    beyond = tuple(NotTestable(cause, joint, "why", "what") for cause, joint in (
+        ("rotor_inertia", 1), ("rotor_inertia", 2), ("payload", None)))
+    said = diagnosis_report(Result(**(NOTHING | {"not_testable": beyond}))).verdict
+    assert "as far as these logs can tell, and they say nothing of rotor inertia at joints 1 and 2 and a load at the tip;" in said
+    one = diagnosis_report(Result(**(NOTHING | {"not_testable": beyond[2:]}))).verdict
+    assert "they say nothing of a load at the tip;" in one
+    assert "nothing of" not in diagnosis_report(Result(**NOTHING)).verdict
