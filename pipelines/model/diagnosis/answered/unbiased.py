@@ -97,14 +97,15 @@ def smoothed_away(arm: Arm, noise: Array, data: Data, prepared: Prepared, seed: 
         place, seeds = piece
         log = logs[place]
         done, = simulate_together(arm, [experiments[place]], drawn, seeds, steps)
-        noise = torque_noise(drawn, seeds, done.tau.shape[1])
-        given = done.tau + np.stack([plant.logged(done.t, one) for one in noise])
+        beside = torque_noise(drawn, seeds, done.tau.shape[1])
+        given = done.tau + np.stack([plant.logged(done.t, one) for one in beside])
         holes = replace(done, q=_as_missing(as_recorded(log, done.q), log.q), tau=_as_missing(as_recorded(log, given), log.tau))
         return np.asarray(np.sum([_left(arm, holes, k, data, prepared, place) for k in range(len(seeds))], axis=0))
 
-    seeds, plant = tuple(range(seed, seed + _RUNS)), Plant.of(arm)
+    seeds = tuple(range(seed, seed + _RUNS))
     mean = [np.zeros(one.rows * one.n_joints) for one in data.logs]
     try:
+        plant = Plant.of(arm)
         experiments = {place: experiment_of(logs[place]) for place in places}
         steps = choose_steps(arm, list(experiments.values()), drawn)
         pieces = [(place, some) for place in sorted(places, key=lambda place: -logs[place].n_samples)

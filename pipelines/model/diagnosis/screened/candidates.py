@@ -62,6 +62,7 @@ class Arms:
 
     @property
     def asked(self) -> tuple[Asked, ...]:
+        """Those that stand for others that are nearly the same."""
         return (*self.rigid, *self.moving, *(() if self.body is None else (self.body,)))
 
     @property
