@@ -19,6 +19,7 @@ from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_moved import of_moved, unmoved_words
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
+    above_in_order,
     as_sentence,
     at_places,
     floor_words,
@@ -88,7 +89,7 @@ def _said(result: Result) -> str:
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         beyond = f"{_untold(result)}; what they would have shown, the report lists"
-        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}"
+        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}{above_in_order(result)}"
     if result.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
     first, *more = result.findings

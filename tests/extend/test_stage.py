@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -45,6 +46,21 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
     assert result.rejected[0].reason
     assert (result.accepted, outcome.exit_code) == (False, 1)
     assert "Stribeck friction at joint 2" in outcome.report.verdict
+
+
+def test_an_order_of_which_only_a_harmonic_is_there_is_refused_with_what_was_fitted(
+        rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path) -> None:
+    """Asked for a third of the waves that there are, the third harmonic takes all: the first wave would be a made-up one."""
+    folder, outcome = rippled
+    true = outcome.result.findings[0].parameters
+    result = extended(folder, tmp_path / "out", f"cogging:2:order={true['order'].value / 3.0}").result
+    assert not result.findings
+    (rejected,) = result.rejected
+    assert "its numbers are none that it can have: order = " in rejected.reason
+    told = dict(re.findall(r"(\w+) = ([\d.]+)", rejected.reason))
+    assert float(told["order_3"]) == pytest.approx(true["order"].value, rel=0.02)
+    assert float(told["amplitude_3"]) == pytest.approx(true["amplitude"].value, rel=0.1)
+    assert float(told["amplitude"]) < 0.1 * float(told["amplitude_3"])
 
 
 def test_the_gain_is_that_of_diagnose(rippled: tuple[Path, Outcome[extend.Extension]]) -> None:

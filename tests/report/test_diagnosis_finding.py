@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
 from pipelines.model.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
-from pipelines.report.diagnosis_words import together, what_stays
+from pipelines.report.diagnosis_words import above_in_order, together, what_stays
 from pipelines.report.frf_figures import posture_words
 
 
@@ -39,6 +39,16 @@ def test_what_stays_above_the_floor_is_said(origin: str, own: bool, said: str) -
     there: Any = SimpleNamespace(floor_origin=origin, after_rms=rms, residual_rms=rms,
                                  held_out_floor=np.array([0.05, 0.04, 0.02]) if own else None)
     assert what_stays(there) == said
+
+
+@pytest.mark.parametrize(("own", "left", "said"), [
+    (True, 0.075, " Of the held-out logs joint 1 leaves 1.5 times what an arm in order leaves: in it no law was found, and so "
+                  "little alone is no fault."), (True, 0.06, ""), (False, 0.075, "")])
+def test_where_nothing_is_wrong_what_the_table_calls_above_is_told_with_it(own: bool, left: float, said: str) -> None:
+    """By the floor of the held-out logs alone is anything called that."""
+    rms = ResidualRms(np.array([0.05, 0.04]), np.array([left, 0.04]), np.array([0.05, 0.04]))
+    there: Any = SimpleNamespace(floor_origin="twin", after_rms=rms, residual_rms=rms, held_out_floor=rms.floor if own else None)
+    assert above_in_order(there) == said
 
 
 @pytest.mark.parametrize(("low", "said"), [(0.01, True), (-0.01, False)])

@@ -41,17 +41,18 @@ from pipelines.model.diagnosis.named.carried import carried
 from pipelines.model.diagnosis.named.findings import extended_arm, findings, held_finding
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.reference.absorbed import Absorbed
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms, Trial
 from pipelines.model.diagnosis.screened.candidates import place_of
 from pipelines.model.diagnosis.searched.beside import Held, acted, judged
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.ledger import IMPOSSIBLE, UNBELIEVABLE
-from pipelines.model.diagnosis.searched.search import Found, search
+from pipelines.model.diagnosis.searched.search import Found, Step, search
 from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
 from pipelines.model.diagnosis.worth.gains import gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
+from pipelines.model.words import plain_number
 
 __all__ = ["Extended", "extend"]
 
@@ -193,11 +194,26 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: boo
             why[step.best.effect.name, step.best.effect.joint] = doubt
         there |= {(step.best.effect.name, step.best.effect.joint)} if step.best is not None else set()
     taken = {(one.cause, one.joint) for one in told}
-    none_such = {(trial.cause, trial.joint): _REFUSED[trial.reason] for step in found.steps for trial in step.trials
-                 if trial.reason in _REFUSED}
+    none_such = {(trial.cause, trial.joint): _REFUSED[trial.reason] + _numbers(step, trial) for step in found.steps
+                 for trial in step.trials if trial.reason in _REFUSED}
     why |= {place: none_such.get(place, "it takes nothing off the held-out error")
             for place in ((f.cause, f.joint) for f in case.families) if place not in taken}
     return found, told, why
+
+
+def _numbers(step: Step, trial: Trial) -> str:
+    """What was fitted of a cause that it cannot be; nothing where the arm could have it, and could not have moved so."""
+    if trial.reason != IMPOSSIBLE:
+        return ""
+    tried = next((one for one in step.rivals if (one.effect.name, one.effect.joint) == (trial.cause, trial.joint)), None)
+    if tried is None:
+        return ""
+    last, revolute = tried.done.model.effects[-1], tried.done.model.arm.robot.revolute
+    turning = last.effect.joint is None or revolute[last.effect.joint - 1]
+    shown = last.effect.reported(last.values)
+    units = {q.name: "" if q.unit == "1" else f" {q.unit_at(turning)}" for q in last.effect.parameters if q.unit != "rad"}
+    told = [(name, value) for name, value in shown.items() if name in units and isinstance(value, float)]
+    return ": " + ", ".join(f"{name} = {plain_number(value, 3)}{units[name]}" for name, value in told)
 
 
 def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], first: Responding,

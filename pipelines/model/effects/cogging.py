@@ -21,6 +21,7 @@ _ROUNDED = 1e-11  # difference of orders that is rounding
 _ALL_BUT = 0.25
 _FEWEST = 1.25  # waves in the travel: a search begins at one and a half, and a fit may move it; half a wave is a spring
 _STILL = 1e-3  # [rad or m] of travel: none
+_LEADS = 0.1  # of its largest harmonic, that the first wave has at least: else the order is that of the harmonic
 _APART = 0.25  # of what the range tells apart: nearer to a whole order it is 45 degrees off that at either end at most
 
 
@@ -115,7 +116,8 @@ class Cogging(Effect):
 
     def possible(self, values: Values) -> bool:
         apart = self.whole or abs(self.order - round(self.order)) >= self.apart
-        return super().possible(values) and apart and values["order"] >= self.fewest
+        leads = values["amplitude"] >= _LEADS * max(values["amplitude_2"], values["amplitude_3"])
+        return super().possible(values) and apart and leads and values["order"] >= self.fewest
 
     def own_load(self, values: Values) -> OwnLoad:
         shaped = self.at(values)

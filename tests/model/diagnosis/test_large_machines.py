@@ -61,4 +61,6 @@ def test_a_cause_that_would_have_to_push_is_refused_for_that() -> None:
         return -100.0 * v * np.abs(v)
 
     found = extend(Logs((slide(1, "identify", less),), (slide(3, "validate", less),)), (Wanted(QuadraticDrag(joint=1)),))
-    assert [one.reason for one in found.rejected] == ["fitted exactly, its numbers are none that it can have"]
+    (rejected,) = found.rejected
+    assert rejected.reason.startswith("fitted exactly, its numbers are none that it can have: coefficient = -")
+    assert rejected.reason.endswith(" N s^2/m^2")

@@ -19,6 +19,7 @@ __all__ = ["ACCEPTED", "IMPOSSIBLE", "UNBELIEVABLE", "WEAKER", "Tried", "ledger"
 ACCEPTED = "accepted"
 WEAKER = "weaker than others"
 BETTER = "below its threshold, and decidedly more than the best that is above its own"  # accepted all the same
+_BY_FIT = "below its threshold to first order, and most of what its joint leaves when fitted exactly"  # likewise
 UNBELIEVABLE = "the arm could not have moved so with it"
 IMPOSSIBLE = "impossible numbers"
 _REFUSED = "time held out does not bear it out"
@@ -58,9 +59,11 @@ class Tried:
 
 
 def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
-            best: Tried | None, now: Refined, number: int, refused: Collection[int] = ()) -> tuple[Trial, ...]:
+            best: Tried | None, now: Refined, number: int, refused: Collection[int] = (),
+            near: Collection[int] = ()) -> tuple[Trial, ...]:
     """The lines of step `number`, greatest gain first; `judged` holds the gains that `thresholds` are for, `refused` the ids of
-    those screened that time held out does not bear out, or, of an event, what is left when it is fitted exactly."""
+    those screened that time held out does not bear out, or, of an event, what is left when it is fitted exactly, and `near` those
+    that only an exact fit tells."""
     exact = {id(one.screened): one for one in tried}
     there = {(one.effect.name, one.effect.joint) for one in now.model.effects}
     rows: list[Trial] = []
@@ -71,7 +74,8 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         accepted = best is not None and fitted is best
         if fitted is None and gain <= thresholds.gain[k] and len(rows) >= _SHOWN:
             continue
-        reason = (BETTER if accepted and gain <= thresholds.gain[k] else
+        reason = (_BY_FIT if accepted and gain <= thresholds.gain[k] and id(one) in near else
+                  BETTER if accepted and gain <= thresholds.gain[k] else
                   ACCEPTED if accepted else
                   _TOO_LITTLE if np.isinf(thresholds.gain[k]) else
                   "below its threshold" if gain <= thresholds.gain[k] else

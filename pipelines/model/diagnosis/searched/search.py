@@ -123,9 +123,9 @@ def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable
         same = number <= len(rough) and rough[number - 1].before is now
         screened = rough[number - 1].screened if same else _screened(case, now)
         gate = gate_of(case, now, screened)
-        explored = rough[number - 1] if same else _explored(case, now, screened, gate.passed)
+        explored = rough[number - 1] if same else _explored(case, now, screened, gate.asked)
         if same and (not case.floored or _others(case, explored, gate)):
-            explored = _explored(case, now, screened, gate.passed, explored.tried)
+            explored = _explored(case, now, screened, gate.asked, explored.tried)
         found = different((one.effect.name, one.effect.joint) for one in now.model.effects)
         step = _step(case, explored, gate, number, found < most)
         steps.append(step)
@@ -252,13 +252,12 @@ def _great(case: Case, now: Refined, screened: Sequence[Screened], wanted: Seque
 def _others(case: Case, explored: Explored, gate: Gate) -> bool:
     """Whether others than were explored are the greatest of those that pass."""
     tried = {id(one.screened) for one in explored.tried}
-    return any(id(one) not in tried for one in _great(case, explored.before, explored.screened, gate.passed))
+    return any(id(one) not in tried for one in _great(case, explored.before, explored.screened, gate.asked))
 
 
 def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, chosen: Tried | None = None) -> Step:
     now, screened, thresholds = explored.before, explored.screened, gate.thresholds
-    passes = {id(one) for one in gate.passed}
-    tried = [one for one in explored.tried if id(one.screened) in passes]
+    tried = [one for one in explored.tried if gate.told(one, now)]
     bound = {id(one): gain for one, gain in zip(screened, thresholds.gain, strict=True)}
     # What happened once no other time asks for: fitted exactly it has to take as much as its columns had to.
     happened = {id(one.screened) for one in tried if one.log is not None and now.rss - one.done.rss <= bound[id(one.screened)]}
@@ -277,7 +276,8 @@ def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, c
     other = unnameable(gate.passed, best, explored.tried, now, case)
     best = None if other is not None else best
     fitted_there = explored.tried if better is None or best is not better else (better, *explored.tried)
-    trials = ledger(screened, gate.judged, thresholds, fitted_there, best, now, number, refused)
+    trials = ledger(screened, gate.judged, thresholds, fitted_there, best, now, number, refused,
+                    [id(one) for one in gate.near])
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
 
 
