@@ -147,9 +147,10 @@ def unlike(before: Refined, after: Refined, place: int, prepared: Prepared, bloc
 def agreement(done: Refined, place: int, prepared: Prepared) -> list[float]:
     """The amplitude that each log asks for by itself, in parts of the one found; each block of time where there is one log.
 
-    Only of those that can tell.
+    Only of those that can tell. Where the joint of a gap is held, its two sides float against each other, and no torque says where.
     """
     scales = []
+    effect = done.model.effects[place].effect
     alone = prepared.judge is None and len(prepared.data.logs) == 1  # it would be asked what it was asked before
     for data in (prepared.data, prepared.judge):
         if data is None:
@@ -161,6 +162,8 @@ def agreement(done: Refined, place: int, prepared: Prepared) -> list[float]:
         parts = data.blocks(_BLOCKS) if alone else data.log_of
         for part in range(int(parts.max()) + 1):
             own = parts == part
+            if effect.evidence == "reversals" and effect.joint and not (own & data.counts & (data.joint == effect.joint - 1)).any():
+                continue
             s, r = share[own] * weights[own], left[own] * weights[own]
             power = float(s @ s)
             rows = max(int(np.count_nonzero(data.counts[own])), 1)  # those of joints that are held are none

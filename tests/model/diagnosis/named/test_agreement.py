@@ -16,6 +16,7 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import refine
 from pipelines.model.diagnosis.named.findings import agreement, unlike
+from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.cogging import Cogging
 from tests.model.diagnosis.screened.test_through import turned
 
@@ -63,7 +64,25 @@ def test_a_log_that_hardly_shows_a_cause_is_not_asked_for_its_size(held: int, as
         return SimpleNamespace(y=share + quiet * left, joint=(rows < 1.0).astype(int), counts=rows > 0.0,
                                log_of=np.zeros(len(rows), dtype=int))
 
-    whole: Any = SimpleNamespace(torque=lambda data: share, without=lambda place: model(np.zeros(len(rows))))
+    whole: Any = SimpleNamespace(torque=lambda data: share, without=lambda place: model(np.zeros(len(rows))),
+                                 effects=(SimpleNamespace(effect=Cogging(1)),))
     done: Any = SimpleNamespace(model=whole, weight=np.ones(2))
     prepared: Any = SimpleNamespace(data=data(1.0 if asked else 2.0), judge=data(1e-3))
     assert len(agreement(done, 0, prepared)) == (2 if asked else 1)
+
+
+@pytest.mark.parametrize(("effect", "held", "asked"), [(Backlash(2), True, 1), (Backlash(2), False, 2), (Cogging(2), True, 2)])
+def test_a_gap_is_asked_where_its_joint_moves(effect: Any, held: bool, asked: bool) -> None:
+    """Of what its other side does to the next joint while its own is held, a log may ask for any part: here for none of it. Other
+    causes act there as well, and are asked."""
+    joint = np.repeat([0, 1], 50)
+
+    def data(own: float, counts: Any) -> Any:
+        return SimpleNamespace(y=own * np.ones(100), joint=joint, counts=counts, log_of=np.zeros(100, dtype=int))
+
+    none: Any = SimpleNamespace(torque=lambda data: np.zeros(100))
+    whole: Any = SimpleNamespace(torque=lambda data: np.ones(100), without=lambda place: none,
+                                 effects=(SimpleNamespace(effect=effect),))
+    prepared: Any = SimpleNamespace(data=data(1.0, np.full(100, True)), judge=data(0.9, joint == 0 if held else np.full(100, True)))
+    done: Any = SimpleNamespace(model=whole, weight=np.ones(2))
+    assert len(agreement(done, 0, prepared)) == asked
