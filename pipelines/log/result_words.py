@@ -45,7 +45,7 @@ WORDS: Final[dict[str, str]] = {
     "ResidualRms.validate": "[N m] over what was held out, joint by joint",
     "ResidualRms.floor": "[N m] floor: what is left of it is no fault, joint by joint",
     "question": "what was asked: what is wrong, or what has changed since the reference logs",
-    "held_out": "what judged: logs of role validate, or blocks of time held out in turn",
+    "held_out": "what judged: logs of role validate, or blocks of time held out in turn, of all logs where those alone show it",
     "Validation.held_out": "whether the logs were held out of the fit", "ledger": "every hypothesis that was tried, step by step",
     "thresholds": "what each cause has to exceed", "evidence": "the picture of what is wrong, log by log, before any name",
     "Classified.evidence": "what it is seen by, in words", "Undecided.evidence": "what is seen, in words",

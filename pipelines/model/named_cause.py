@@ -2,8 +2,8 @@
 
     acting = acting_cause("cogging:2:amplitude=0.1", robot.revolute)
 
-What is not given keeps its default: a non-linear number that of the effect, an amplitude zero. At least one number is given, for
-an effect of which all are zero does nothing.
+What is not given keeps its default: a non-linear number that of the effect, an amplitude zero, or what physics gives it, as that of
+a drive that clips. Any other amplitude has to be given, for an effect of which all are zero does nothing.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") ->
     joint, numbers = _place(text, kind, rest, revolute, where)
     values = _values(text, kind, kind(joint=joint), numbers, where)
     _refuse_unfit(text, kind, values, joint, len(revolute), where)
+    _refuse_weak(text, kind, values, numbers, where)
     return Acting.of(kind(joint=joint), values, origin="assumed", revolute=joint is None or revolute[joint - 1])
 
 
@@ -92,7 +93,8 @@ def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bo
 
 def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: str) -> dict[str, float]:
     known = {quantity.name: quantity for quantity in kind.parameters}
-    values = {q.name: float(getattr(effect, q.name)) if q.shape else 0.0 for q in kind.parameters}
+    fixed = {} if kind.fixed_amplitudes is None else effect.values(kind.fixed_amplitudes)
+    values = {q.name: float(getattr(effect, q.name)) if q.shape else fixed.get(q.name, 0.0) for q in kind.parameters}
     ranges = ", ".join(f"{q.name} {q.low:g} to {q.high:g} {q.unit}" for q in kind.parameters)
     given = [part.partition("=") for part in numbers.split(",") if part.strip()]
     if not given:
@@ -106,6 +108,15 @@ def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: 
         if not known[name].low <= values[name] <= known[name].high:
             raise UsageError("C02", f"{name} = {values[name]:g} is out of range", where=where, remedy=f"it takes {ranges}")
     return values
+
+
+def _refuse_weak(text: str, kind: type[Effect], values: dict[str, float], numbers: str, where: str) -> None:
+    """C02, only numbers that do nothing without an amplitude: an order, a frequency."""
+    linear = [q for q in kind.parameters if not q.shape and not q.derived]
+    given = {part.partition("=")[0].strip() for part in numbers.split(",")}
+    if not given & {q.name for q in linear} and not any(values[q.name] for q in linear):
+        ranges = ", ".join(f"{q.name} {q.low:g} to {q.high:g} {q.unit}" for q in linear)
+        raise UsageError("C02", f"'{text}' does not say how strong it is", where=where, remedy=f"give {ranges}")
 
 
 def _refuse_unfit(text: str, kind: type[Effect], values: dict[str, float], joint: int | None, joints: int, where: str) -> None:

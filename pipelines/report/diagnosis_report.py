@@ -27,6 +27,7 @@ from pipelines.report.diagnosis_words import (
     held_out_words,
     in_order,
     is_cause,
+    judge_words,
     named,
     per_joint,
     three_digits,
@@ -79,7 +80,7 @@ def _tone(result: Result) -> Tone:
 def _verdict(result: Result) -> str:
     """One sentence; by what it was judged where that is no log of its own; what was not looked for. What to check stands in the
     first section."""
-    blocks = " Judged by blocks held out of the fitted logs, for none has role validate." if result.held_out == "blocks" else ""
+    blocks = "" if result.held_out == "logs" else f" Judged by {judge_words(result.held_out)}."
     causes = ", ".join(dict.fromkeys(within(title_of(cause)) for cause in result.without if is_cause(cause)))
     return f"{_said(result)}{blocks}{f' Not looked for, because you said so: {causes}.' if causes else ''}"
 

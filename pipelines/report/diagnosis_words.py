@@ -19,8 +19,9 @@ from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
 __all__ = ["above_in_order", "as_sentence", "at_places", "cause_at", "floor_name", "floor_words", "held_out_floor",
-           "held_out_words", "in_order", "is_cause", "meaning_of", "named", "per_joint", "spoken", "three_digits", "title_of",
-           "together", "told_value", "told_values", "torque_errors", "torque_of", "unit_or_dash", "what_stays", "without_keys"]
+           "held_out_words", "in_order", "is_cause", "judge_words", "meaning_of", "named", "per_joint", "spoken",
+           "three_digits", "title_of", "together", "told_value", "told_values", "torque_errors", "torque_of",
+           "unit_or_dash", "what_stays", "without_keys"]
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
@@ -223,8 +224,17 @@ def floor_words(found: Diagnosis) -> str:
     return _FLOORS.get(found.floor_origin, f"The floor comes from {found.floor_origin}.")
 
 
+def judge_words(held_out: str) -> str:
+    """What judged, within a sentence."""
+    why = "for none has role validate" if held_out == "blocks" else "for what is wrong shows in those of role validate alone"
+    return "held-out logs" if held_out == "logs" else f"blocks held out of the fitted logs ({why})"
+
+
 def held_out_words(held_out: str) -> str:
-    """What judged: "logs" or "blocks"."""
+    """What judged."""
+    if held_out == "blocks of all logs":
+        return ("What is wrong shows in the logs of role validate alone, so they were fitted too: contiguous blocks of time, of "
+                "all logs, were held out one after the other.")
     if held_out == "logs":
         return "Held-out errors are those of logs of role validate, to which nothing was fitted."
     return "No log has the role validate: contiguous blocks of time were held out, one after the other."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_words import held_out_words, title_of, together, torque_errors, without_keys
+from pipelines.report.diagnosis_words import held_out_words, judge_words, title_of, together, torque_errors, without_keys
 from pipelines.report.joint_units import Units, units_in
 from pipelines.report.model_words import laws_words
 from pipelines.report.report import Report, Section, Table, Tone
@@ -45,8 +45,7 @@ def _verdict(result: Extension) -> str:
     change = "" if result.gain is None else tip_change(result.gain)
     told = f"; with it {change}" if change else ""
     but = f" Not accepted: {refused}." if refused else ""
-    judge = "held-out logs" if result.held_out == "logs" else "blocks held out of the fitted logs (for none has role validate)"
-    return f"The model with {found}, all its numbers fitted again, is better on {judge}{told}.{but}"
+    return f"The model with {found}, all its numbers fitted again, is better on {judge_words(result.held_out)}{told}.{but}"
 
 
 def _first_reason(result: Extension) -> str:

@@ -50,6 +50,10 @@ def test_units_follow_the_kind_of_joint() -> None:
     ("torque_crosstalk:2:coefficient=0.1,from_joint=1.5", "C02", "no other joint"),
     ("transmission_coupling:2:inertia=0.1,with_joint=7", "C02", "no other joint of this arm, which has 3; it takes 1 or 3"),
     ("transmission_coupling:2:inertia=0.1,with_joint=2", "C02", "no other joint"),
+    ("presliding:1:distance=0.03", "C02", "does not say how strong it is"),
+    ("contact:force=25", "C02", "does not say how strong it is"),
+    ("joint_elasticity:2:frequency=50", "C02", "does not say how strong it is"),
+    ("cogging:2:order=18", "C02", "does not say how strong it is"),
     ("encoder_eccentricity:3:amplitude=0.001", "C02", "joint 3 slides, and only one that turns"),
     ("link_length:error=0.01,link=9", "C02", "no link with a joint beyond it on this arm, which has 3; it takes 1 or 2"),
     ("link_length:error=0.01,link=3", "C02", "no link with a joint beyond it"),
@@ -61,6 +65,12 @@ def test_anything_else_is_refused(text: str, code: str, words: str) -> None:
         acting_cause(text, REVOLUTE)
     assert refused.value.code == f"RRID-{code}"
     assert refused.value.remedy
+
+
+@pytest.mark.parametrize("text", ["torque_saturation:2:limit=9", "backlash:2:gap=0.004"])
+def test_an_amplitude_that_physics_gives_need_not_be_given(text: str) -> None:
+    """A drive with a limit clips, and a gap is one."""
+    assert {p.name: p.value for p in acting_cause(text, REVOLUTE).parameters}["coefficient"] == 1.0
 
 
 @pytest.mark.parametrize(("text", "remedy"), [

@@ -249,9 +249,11 @@ def test_a_torque_of_any_size_is_told_as_that() -> None:
 @pytest.mark.parametrize("verdict", ["cause", "nothing-wrong", "unknown"])
 def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
     there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
-    for held_out in ("logs", "blocks"):
+    for held_out in ("logs", "blocks", "blocks of all logs"):
         page = diagnosis_report(Result(**(there | {"held_out": held_out})))
-        assert ("Judged by blocks held out of the fitted logs" in page.verdict) is (held_out == "blocks")
+        assert ("Judged by blocks held out of the fitted logs" in page.verdict) is (held_out != "logs")
+        assert ("none has role validate" in page.verdict) is (held_out == "blocks")
+        assert ("shows in those of role validate alone" in page.verdict) is (held_out == "blocks of all logs")
 
 
 @pytest.mark.parametrize("verdict", ["cause", "nothing-wrong", "unknown"])

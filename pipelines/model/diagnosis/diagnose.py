@@ -13,9 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from pipelines.errors import InputRejected
+from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.answered.told import diagnosis_of
+from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, only_held_out
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.believed.doubted import of_replicas, unlike_motion, unlike_noise, without_replay, without_twin
@@ -63,6 +67,32 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
+    found = _asked(logs, chosen, arm, say, calibration, memory)
+    if calibration is not None or not _only_held_out(found):
+        return found
+    say("fitting the held-out logs too, which alone show what is wrong")
+    again = _asked(fitted_too(logs), chosen, arm, say, None, Memory())
+    # By the floors of before: a twin of logs that show it has its blows among its noise, as far as they were not found.
+    named = again.verdict == "cause" and at_floor(again.after_rms.validate, _floor(found))
+    return replace(again, held_out="blocks of all logs") if named else found
+
+
+def _floor(found: Diagnosis) -> Array:
+    """(joints,) [N m] of an arm in order, of fitted logs or held-out ones."""
+    floor = found.residual_rms.floor
+    return floor if found.held_out_floor is None else np.maximum(floor, found.held_out_floor)
+
+
+def _only_held_out(found: Diagnosis) -> bool:
+    """Whether nobody knows what is wrong, for the fitted logs are those of an arm in order, as its twin is."""
+    own, rms = found.held_out_floor, found.residual_rms
+    return (found.verdict == "unknown" and found.held_out == "logs" and found.floor_origin == "twin" and own is not None
+            and only_held_out(rms.identify, rms.floor, rms.validate, own))
+
+
+def _asked(logs: Logs, chosen: DiagnosisSettings, arm: Arm | None, say: Tell, calibration: Calibration | None,
+           memory: Memory) -> Diagnosis:
+    """Of these logs as they are, those of role validate judging."""
     prepared = memory.prepared(logs, chosen, arm, () if calibration is None else calibration.conditions.laws)
     seen = _looked_at(prepared, chosen, say, calibration, memory)
     other, again = loosened(prepared), None

@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.answered.unbiased import unbiased
+from pipelines.model.diagnosis.asked.fitted_too import JudgedBy, at_floor, fitted_too, only_held_out
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
@@ -72,7 +72,7 @@ class Extended:
     gain: Gain | None  # of all accepted together
     before: ResidualRms
     after: ResidualRms
-    held_out: Literal["logs", "blocks"]
+    held_out: JudgedBy
     standing: tuple[Acting, ...]  # what the reference logs show as well
     motions: Motions  # fitted, then judging
     fitted: int  # of them
@@ -94,6 +94,20 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
+    found = _by_curves(logs, wanted, chosen, arm, say, memory)
+    before = found.before
+    if found.arm is not None or not logs.validate or logs.reference or not only_held_out(
+            before.identify, before.identify, before.validate, before.identify):
+        return found
+    say("fitting the held-out logs too, which alone show what is wrong")
+    again = _by_curves(fitted_too(logs), wanted, chosen, arm, say, Memory())
+    named = again.arm is not None and at_floor(again.after.validate, before.identify)
+    return replace(again, held_out="blocks of all logs") if named else found
+
+
+def _by_curves(logs: Logs, wanted: Sequence[Wanted], chosen: DiagnosisSettings, arm: Arm | None, say: Callable[[str], None],
+               memory: Memory) -> Extended:
+    """By the curve of friction that fits better."""
     prepared = memory.prepared(logs, chosen, arm)
     found = _extended(prepared, wanted, chosen, say, memory)
     other = loosened(prepared)

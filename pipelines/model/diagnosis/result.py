@@ -12,6 +12,7 @@ from typing import Literal
 from pipelines.log.experiment import Array
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms, WithoutLimit
 from pipelines.model.diagnosis.floor.calibration import Calibration
 
@@ -279,7 +280,7 @@ class Diagnosis:
     not_testable: tuple[NotTestable, ...]
     residual_rms: ResidualRms
     question: Literal["what is wrong", "what has changed"]
-    held_out: Literal["logs", "blocks"]
+    held_out: JudgedBy
     floor_origin: str  # "twin" | "reference logs" | "repetition" | "blocks"
     reason: str  # why "unknown"; what "nothing wrong" cannot vouch for; what stands beside causes; else empty
     after_rms: ResidualRms  # the same with all findings and standing effects

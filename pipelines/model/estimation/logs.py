@@ -20,7 +20,7 @@ from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["FEWEST_OF_JOINT", "Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
-           "of_each", "refuse_too_few", "with_cutoff"]
+           "none_left", "of_each", "refuse_too_few", "with_cutoff"]
 
 Motions = tuple[tuple[ExperimentLog, Reconstructed], ...]
 
@@ -208,9 +208,14 @@ def _of_log(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: C
         raise InputRejected("T04", f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz",
                             where=log.source or log.name, remedy="filter higher with --filter, or record longer")
     if equations.rows.out.all():
-        saturated = bool(found.good.saturated.any(axis=1).mean() > _MOSTLY)
-        raise InputRejected("D05" if saturated else "T04", "no sample is left: "
-                            f"{'saturated torque' if saturated else 'what is missing or spoilt'} touches every one",
-                            where=log.source or log.name,
-                            remedy="drive it more gently" if saturated else "'rrrid inspect' shows what is wrong; record again")
+        raise none_left(log, found)
     return equations
+
+
+def none_left(log: ExperimentLog, found: Reconstructed, few: bool = False) -> InputRejected:
+    """What a log is refused with of which no sample is left, or so `few` that none is when they are thinned out."""
+    saturated = bool(found.good.saturated.any(axis=1).mean() > _MOSTLY)
+    what, touched = "saturated torque" if saturated else "what is missing or spoilt", "nearly every one" if few else "every one"
+    return InputRejected("D05" if saturated else "T04", f"no sample is left: {what} touches {touched}",
+                         where=log.source or log.name,
+                         remedy="drive it more gently" if saturated else "'rrrid inspect' shows what is wrong; record again")

@@ -23,7 +23,7 @@ def searched(nominal: Any, *causes: tuple[Effect, Any]) -> Any:
     """A search that accepted these causes, with what each left."""
     before, steps = nominal, []
     for effect, after in causes:
-        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=after, effect=effect), trials=()))
+        steps.append(SimpleNamespace(before=before, best=SimpleNamespace(done=after, effect=effect), trials=(), screened=()))
         before = after
     model = SimpleNamespace(effects=tuple(SimpleNamespace(effect=effect, log=None, possible=True) for effect, _ in causes))
     return SimpleNamespace(nominal=nominal, steps=steps, final=SimpleNamespace(rms=before.rms, model=model))

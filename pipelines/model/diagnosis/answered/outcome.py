@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from pipelines.errors import Check
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
+from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
@@ -41,7 +41,7 @@ class Extension:
     gain: Gain | None  # of all accepted together
     residual_rms: ResidualRms  # before
     after_rms: ResidualRms
-    held_out: Literal["logs", "blocks"]
+    held_out: JudgedBy
     standing: tuple[str, ...]  # effects that the reference logs show as well; the model has them
     robot: str
     joints: tuple[str, ...]

@@ -22,7 +22,16 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.rows.data import Data, gather
 from pipelines.model.diagnosis.rows.sharper import sharpened
-from pipelines.model.estimation.logs import FEWEST_OF_JOINT, Motions, Recipe, equations_of, motions_of, refuse_too_few, with_cutoff
+from pipelines.model.estimation.logs import (
+    FEWEST_OF_JOINT,
+    Motions,
+    Recipe,
+    equations_of,
+    motions_of,
+    none_left,
+    refuse_too_few,
+    with_cutoff,
+)
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstruction
@@ -79,8 +88,8 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
         arm: whose friction laws the nominal model takes; Coulomb and viscous friction where left out.
 
     Raises:
-        InputRejected: S01, no log to fit; T04, a log without a stretch that can be used; T08, of which, or of a joint, too few
-            equations are left.
+        InputRejected: S01, no log to fit; T04, a log without a stretch that can be used; D05, of which saturated torque leaves no
+            row; T08, of which, or of a joint, too few equations are left.
     """
     if not logs.identify:
         raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
@@ -121,6 +130,10 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
         rows = _without_rests(parts, columns, recipe, held, rests(motions, recipe.cutoff_hz, np.max(fastest, axis=0)), rows)
     data, judge, reference = rows
     assert data is not None  # prepare refuses logs without any to fit
+    for part, laid in zip(parts, (data, judge, reference), strict=True):
+        for (log, found), one in zip(part, laid.logs if laid else (), strict=True):
+            if not one.y.size:
+                raise none_left(log, found, few=True)
     return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
 
 

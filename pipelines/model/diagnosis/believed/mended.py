@@ -13,7 +13,7 @@ from pipelines.model.diagnosis.believed.fewer import family_of, possible, withou
 from pipelines.model.diagnosis.believed.mistaken import imitated
 from pipelines.model.diagnosis.screened.candidates import Family
 from pipelines.model.diagnosis.searched.case import Case, held_out
-from pipelines.model.diagnosis.searched.search import Found
+from pipelines.model.diagnosis.searched.search import Found, Step
 from pipelines.model.effects.base import Effect
 
 __all__ = ["not_mending", "turned"]
@@ -38,14 +38,20 @@ def not_mending(found: Found, kept: list[int], case: Case) -> list[int]:
         share = taken / max(_power(found, found.nominal.rms), 1e-300)
         own = found.final.model.effects[k].effect
         stood = bool(out) and share <= _TRACE and _stands(own, case)
-        gap = share <= _REST_OF_GAP and any(_gap_at(found.final.model.effects[j].effect, own.joint) for j in out)
+        gap = share <= _REST_OF_GAP and any(_rest_of_gap(found.final.model.effects[j].effect, own, step) for j in out)
         if not (stood or gap) and (share > _MENDS or not any(_mistaken(found, j, k, case) for j in out)):
             out.append(k)
     return out
 
 
-def _gap_at(effect: Effect, joint: int | None) -> bool:
-    return effect.evidence == "reversals" and effect.joint == joint
+def _rest_of_gap(effect: Effect, own: Effect, step: Step) -> bool:
+    """Whether what was found at step `step` may be what no law of an earlier gap has: it is at the joint of that, or the gap itself
+    takes more of what was left, once more, for its blows are felt at other joints."""
+    if effect.evidence != "reversals":
+        return False
+    gains = {(one.cause, one.joint): float(one.gain[0]) for one in step.screened}
+    again, here = (gains.get((one.name, one.joint), 0.0) for one in (effect, own))
+    return effect.joint == own.joint or again > here
 
 
 def _stands(own: Effect, case: Case) -> bool:

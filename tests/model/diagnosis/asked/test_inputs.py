@@ -35,6 +35,17 @@ def test_a_joint_that_moves_in_one_of_them_is_fitted() -> None:
     assert np.bincount(prepared.data.joint[prepared.data.counts], minlength=3).min() > 0
 
 
+@pytest.mark.parametrize("left", [0, 3])
+def test_a_log_of_which_saturated_torque_leaves_no_row_is_refused(left: int) -> None:
+    """Of a few samples between saturated ones none is left when they are thinned out."""
+    limit = np.array([joint.torque for joint in FITTED.robot.joints])
+    tau = np.tile(limit, (FITTED.n_samples, 1))
+    middle = slice(FITTED.n_samples // 2, FITTED.n_samples // 2 + left)
+    tau[middle] = 0.5 * limit
+    with pytest.raises(InputRejected, match="RRID-D05.*no sample is left: saturated torque touches"):
+        prepare(Logs((FITTED, with_signal(FITTED, tau=tau))), DiagnosisSettings())
+
+
 @pytest.mark.parametrize(("settings", "words"), [
     (DiagnosisSettings(min_speed=(20.0, 0.0, 0.0)), "no equation of joint 1 is left: its largest speed is"),
     (DiagnosisSettings(cutoff_hz=1.0, decimation=200), "equations")])

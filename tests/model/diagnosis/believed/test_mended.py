@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pipelines.model.diagnosis.believed import mended
@@ -53,6 +54,16 @@ def test_a_trace_at_the_joint_of_a_gap_is_what_no_law_of_it_has(joint: int, rest
     between[joint - 1] = rest
     found = searched(left(*before), (effect("backlash", 1), left(*between)), (effect("time_delay", joint), left(0.01, 0.01, 0.01)))
     assert mended.not_mending(found, [0, 1], among(effect("backlash", 1), effect("time_delay", joint))) == kept
+
+
+@pytest.mark.parametrize(("again", "rest", "kept"), [(5.0, 0.012, [0]), (0.5, 0.012, [0, 1]), (5.0, 0.06, [0, 1])])
+def test_a_trace_elsewhere_is_the_rest_of_a_gap_that_would_take_more_of_it(again: float, rest: float, kept: list[int]) -> None:
+    """Of what was left when joint 3 was found eccentric, one more gap at joint 2 takes five times as much."""
+    gap, other = effect("backlash", 2), effect("encoder_eccentricity", 3)
+    found = searched(left(0.01, 0.1, 0.1), (gap, left(0.01, 0.01, rest)), (other, left(0.01, 0.01, 0.01)))
+    found.steps[1].screened = [SimpleNamespace(cause=one.name, joint=one.joint, gain=np.array([gain]))
+                               for one, gain in ((gap, again), (other, 1.0))]
+    assert mended.not_mending(found, [0, 1], among(gap, other)) == kept
 
 
 @pytest.mark.parametrize(("share", "kept"), [(0.9, [0]), (0.2, [0, 1])])
