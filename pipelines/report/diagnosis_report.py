@@ -28,6 +28,7 @@ from pipelines.report.diagnosis_words import (
     in_order,
     is_cause,
     judge_words,
+    loud_drives,
     named,
     per_joint,
     three_digits,
@@ -72,6 +73,8 @@ def diagnosis_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     """What machines in order have as well is no fault of this one, unless it has changed, or may be something else."""
+    if result.verdict == "nothing-wrong" and loud_drives(result.noise, result.rated):
+        return "attention"
     causes = [cause for one in result.findings for cause in (one.cause, *(rival.cause for rival in one.rivals))]
     ordinary = result.question != "what has changed" and all(find_effect(cause).ordinary for cause in causes)
     return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
@@ -90,7 +93,8 @@ def _said(result: Result) -> str:
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         beyond = f"{_untold(result)}; what they would have shown, the report lists"
-        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}{above_in_order(result)}"
+        doubt = loud_drives(result.noise, result.rated) or above_in_order(result)
+        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}{doubt}"
     if result.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
     first, *more = result.findings

@@ -19,8 +19,8 @@ from pipelines.report.report import Table
 from pipelines.report.style import format_number, format_unit, to_one_place, unit_in_words, with_std
 
 __all__ = ["above_in_order", "as_sentence", "at_places", "cause_at", "floor_name", "floor_words", "held_out_floor",
-           "held_out_words", "in_order", "is_cause", "judge_words", "meaning_of", "named", "per_joint", "spoken",
-           "three_digits", "title_of", "together", "told_value", "told_values", "torque_errors", "torque_of",
+           "held_out_words", "in_order", "is_cause", "judge_words", "loud_drives", "meaning_of", "named", "per_joint",
+           "spoken", "three_digits", "title_of", "together", "told_value", "told_values", "torque_errors", "torque_of",
            "unit_or_dash", "what_stays", "without_keys"]
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
@@ -38,8 +38,10 @@ _FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference
 
 
 _TURNING = Units()
-_STAYS, _STAYS_ABOVE_NOISE = 1.6, 10.0  # times the floor, and the noise: what stands higher, held out, is not explained
 _ORDER = 1.3  # times what an arm in order leaves: no further than that may an extended model be from it (issue 9)
+# Times the floor, up to which the table calls an error in order, and times the noise: what stands higher is not explained.
+_STAYS, _STAYS_ABOVE_NOISE = _ORDER, 10.0
+_LOUD = 0.01  # of the rated torque: three times the noise of the test bench's drives at ten times their usual one
 _HELD_OUT_FLOOR = ("An arm in order is the fitted rigid body and friction, simulated in the held-out experiments with the noise of "
                    "these drives")
 _LEFT_IN_ORDER = "an arm in order leaves"
@@ -117,6 +119,19 @@ def above_in_order(found: Diagnosis) -> str:
         return ""
     each = " and ".join(f"joint {j + 1} leaves {_times(float(times[j]))[:-1]} times" for j in high)
     return f" Of the held-out logs {each} what {name}: in it no law was found, and so little alone is no fault."
+
+
+def loud_drives(noise: Array, rated: Sequence[float]) -> str:
+    """" For that its drives would have to be as noisy as 0.35 N m at joint 3 …", where the noise that a twin was given, (joints,)
+    [N m], is more than drives have: what shakes an arm, a gap say, is taken for noise, and raises the floor. Empty elsewhere."""
+    share = np.array([noise[j] / rated[j] if j < len(rated) and rated[j] > 0.0 else 0.0 for j in range(len(noise))])
+    share = np.nan_to_num(share, nan=0.0, posinf=0.0)
+    if not len(share) or share.max() <= _LOUD:
+        return ""
+    j = int(share.argmax())
+    return (f" For that its drives would have to be as noisy as {format_number(float(noise[j]), 2)} N m at joint {j + 1}, "
+            f"{format_number(100.0 * float(share[j]), 2)} % of the rated torque: so much noise hides faults, and may be one; "
+            "record reference logs while the arm is known to be in order, or frequency responses.")
 
 
 def as_sentence(text: str) -> str:

@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
 from pipelines.model.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
-from pipelines.report.diagnosis_words import above_in_order, together, what_stays
+from pipelines.report.diagnosis_words import above_in_order, loud_drives, together, what_stays
 from pipelines.report.frf_figures import posture_words
 
 
@@ -49,6 +49,16 @@ def test_where_nothing_is_wrong_what_the_table_calls_above_is_told_with_it(own: 
     rms = ResidualRms(np.array([0.05, 0.04]), np.array([left, 0.04]), np.array([0.05, 0.04]))
     there: Any = SimpleNamespace(floor_origin="twin", after_rms=rms, residual_rms=rms, held_out_floor=rms.floor if own else None)
     assert above_in_order(there) == said
+
+
+@pytest.mark.parametrize(("noise", "said"), [(0.31, "as noisy as 0.31 N m at joint 2, 1 % of the rated torque"), (0.29, "")])
+def test_a_floor_that_only_loud_drives_would_have_is_told(noise: float, said: str) -> None:
+    """Where a gap shakes the arm, its twin is as loud."""
+    text = loud_drives(np.array([0.1, noise, 0.1]), (60.0, 30.0, 15.0))
+    assert (said in text) if said else not text
+    assert not loud_drives(np.full(3, np.nan), (60.0, 30.0, 15.0))
+    assert not loud_drives(np.array([noise]), (float("inf"),))
+    assert not loud_drives(np.array([noise]), ())
 
 
 @pytest.mark.parametrize(("low", "said"), [(0.01, True), (-0.01, False)])

@@ -67,8 +67,21 @@ def of_amplitudes(effect: Effect, amplitudes: Array, covariance: Array, revolute
 
 
 def of_no_size(done: Refined) -> list[int]:
-    """Places of effects of one number alone that is not told from zero, in the model with all of them."""
-    return [place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std]
+    """Places of effects of one number alone that is not told from zero, in the model with all of them; and of what happened once,
+    if its numbers together are not: a touch so short, or so near the end of its log, that any force would do."""
+    once = [place for place, one in enumerate(done.model.effects) if one.log is not None and _from_none(done, place) < _STDS]
+    return [*(place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std and place not in once), *once]
+
+
+def _from_none(done: Refined, place: int) -> float:
+    """Deviations between the amplitudes a of an effect and none, whatever its other numbers are: √(aᵀ C⁻¹ a) (Wald 1943)."""
+    index = [k for k in done.of_effect(place) if done.names[k - len(done.model.beta)][2].isdigit()]
+    own = done.covariance()[np.ix_(index, index)]
+    if len(index) != len(done.model.effects[place].amplitudes) or set(index) & set(done.unseen) or not np.isfinite(own).all():
+        return np.inf  # who does not know them does not know that they are none
+    a = np.array(done.model.effects[place].amplitudes)
+    size = np.maximum(np.sqrt(np.maximum(np.diag(own), 0.0)), 1e-300)
+    return float(np.sqrt(max(float(a / size @ np.linalg.pinv(own / size[:, None] / size, hermitian=True) @ (a / size)), 0.0)))
 
 
 def too_slight(done: Refined) -> list[int]:

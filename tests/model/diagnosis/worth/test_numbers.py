@@ -59,11 +59,26 @@ def test_an_inertia_that_is_a_part_of_the_links_is_not_known(joint: int, told: b
 @pytest.mark.parametrize(("size", "small"), [(4.9e-5, [0]), (5.1e-5, []), (-4.9e-5, [0]), (-5.1e-5, [])])
 def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, small: list[int]) -> None:
     """A delay of some microseconds, as sampling leaves it in an arm in order; a spring has more numbers, each of them poor."""
-    delay = SimpleNamespace(free_amplitudes=True, amplitudes=(size,))
-    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5))
+    delay = SimpleNamespace(free_amplitudes=True, amplitudes=(size,), log=None)
+    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5), log=None)
     done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(3), model=SimpleNamespace(effects=(delay, spring)),
                                 of_effect=lambda place: [0] if place == 0 else [1, 2])
     assert of_no_size(done) == small
+
+
+@pytest.mark.parametrize(("force", "together", "small"), [
+    ((8.0, 1.0, 0.0), 0.0, []), ((3.0, 1.0, 0.0), 0.0, [0]), ((3.0, 3.0, 0.0), 0.0, [0]), ((3.0, -3.0, 0.0), 0.9, [])])
+def test_a_touch_whose_force_is_not_told_from_none_is_no_touch(force: tuple[float, ...], together: float, small: list[int]) -> None:
+    """Three components, known to 1 N each, and so far together; how long it lasts is none of its amplitudes."""
+    touch = SimpleNamespace(free_amplitudes=True, amplitudes=force, log=1)
+    covariance = np.eye(5)
+    covariance[2, 3] = covariance[3, 2] = together
+    names = ((0, 0, "sharpness"), (1, 0, "duration"), (1, 0, "0"), (1, 0, "1"), (1, 0, "2"))
+    done: Any = SimpleNamespace(covariance=lambda: covariance, unseen=[], names=names,
+                                model=SimpleNamespace(effects=(touch,), beta=()), of_effect=lambda place: [1, 2, 3, 4])
+    assert of_no_size(done) == small
+    done.unseen = [2]  # of what logs do not show nobody knows that it is none
+    assert of_no_size(done) == []
 
 
 @pytest.mark.parametrize(("size", "least", "few"), [
