@@ -120,6 +120,13 @@ def test_responses_that_name_a_cause_are_drawn_first(told: bool) -> None:
             posture_words(one.posture, 1) for one in answers]
 
 
+@pytest.mark.parametrize(("log", "said"), [("excitation-11", ", 3.34 s into excitation-11"), (None, ", 3.34 s into every log")])
+def test_what_happened_once_is_told_with_its_moment(log: str | None, said: str) -> None:
+    touch = replace(finding("contact", None, {"start": 3.337846}), log=log)
+    assert where(touch) == said
+    assert where(replace(touch, parameters={})) == ""
+
+
 def test_the_other_joint_is_named() -> None:
     """In title and list: crosstalk comes from a joint, a coupled motor turns with one."""
     crossed, coupled = finding("torque_crosstalk", 2, {"from_joint": 1}), finding("transmission_coupling", 6, {"with_joint": 5.0})

@@ -140,6 +140,7 @@ class Finding:
     proof: Proof | None
     doubt: str = ""  # of what frequency responses name: why the extended model goes without it; empty where it has it
     answers: tuple[Answer, ...] = ()  # the responses that name it, one a posture; empty where others do, or none is drawn
+    log: str | None = None  # of what happened once, the log it happened in; None: it lasts, or comes in every log
 
 
 @dataclass(frozen=True)

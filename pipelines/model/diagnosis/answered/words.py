@@ -29,9 +29,13 @@ _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name an
 
 
 def where(one: Finding) -> str:
-    """Its joint, and the other one that it has to do with; empty where it belongs to the whole arm."""
-    other = other_joint(one.parameters)
-    return ("" if one.joint is None else f" at joint {one.joint}") + (f" ({other})" if other else "")
+    """Its joint, and the other one that it has to do with, and when it happened; empty where it belongs to the whole arm."""
+    other, start = other_joint(one.parameters), one.parameters.get("start")
+    at = "" if one.joint is None else f" at joint {one.joint}"
+    when = ""
+    if start is not None and isinstance(start.value, int | float):
+        when = f", {start.value:.2f} s into {one.log or 'every log'}"
+    return f"{at}{f' ({other})' if other else ''}{when}"
 
 
 def how_much(one: Finding) -> str:

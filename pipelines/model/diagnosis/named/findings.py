@@ -106,7 +106,7 @@ def _size(torque: Array, data: Data, joint: int | None, floor: Array) -> tuple[f
 
 def _finding(found: Found, step: Step, best: Tried, place: int, models: tuple[Refined, Refined], covariance: Array, taken: float,
              floor: Array, gain: Gain, draw: bool) -> Finding:
-    effect, data = best.effect, step.before.data
+    effect, data, log = best.effect, step.before.data, found.final.model.effects[place].log
     rivals = _rivals(step, best)
     torque = data.y - found.final.left - _without(found.final, place)
     size, _, of_rated = _size(torque, data, effect.joint, floor)
@@ -114,7 +114,8 @@ def _finding(found: Found, step: Step, best: Tried, place: int, models: tuple[Re
     origin: Literal["residual", "reversals"] = "reversals" if effect.evidence == "reversals" else "residual"
     return Finding(effect.name, effect.joint, effect.title, numbers, taken, best.visibility, rivals,
                    effect.experiment if rivals else None, gain, origin, size, of_rated,
-                   proof(*models, effect.joint) if draw else None)
+                   proof(*models, effect.joint) if draw else None,
+                   log=None if log is None else data.logs[log - data.first].log.name)
 
 
 def _without(done: Refined, place: int) -> Array:
