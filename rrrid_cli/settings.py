@@ -20,6 +20,7 @@ __all__ = ["known_options", "make_settings", "stage_of"]
 S = TypeVar("S")
 
 # What a stage's own reader needs; within `run` a stage gets its logs and models from the run.
+_KINDS: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
 _READ = ("identify", "validate", "reference", "model", "text", "via_points", "recipe")
 
 
@@ -139,7 +140,8 @@ def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
         if fits:
             return converted
     listed = typing.get_origin(options[0]) is tuple
-    raise UsageError("C02", f"{value!r} is not a {'list' if listed else getattr(options[0], '__name__', options[0])}", where=where,
+    what = "a list" if listed else _KINDS.get(options[0], f"a {getattr(options[0], '__name__', options[0])}")
+    raise UsageError("C02", f"{value!r} is not {what}", where=where,
                      remedy="correct the value")
 
 

@@ -25,3 +25,11 @@ def test_what_is_no_list_of_texts_is_refused(value: str) -> None:
     with pytest.raises(UsageError, match="is not a list") as refused:
         made(f"diagnose.without={value}")
     assert refused.value.code.endswith("C02")
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("diagnose.most=abc", "'abc' is not a whole number"), ("diagnose.most=1.5", "1.5 is not a whole number"),
+    ("diagnose.blocks=true", "is not a whole number")])
+def test_what_is_no_number_is_refused_in_words(text: str, words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        made(text)
