@@ -112,11 +112,14 @@ def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: 
 
 def _refuse_weak(text: str, kind: type[Effect], values: dict[str, float], numbers: str, where: str) -> None:
     """C02, only numbers that do nothing without an amplitude: an order, a frequency."""
-    linear = [q for q in kind.parameters if not q.shape and not q.derived]
+    linear = [q for q in kind.parameters if not q.shape and not q.derived and q.period is None]
     given = {part.partition("=")[0].strip() for part in numbers.split(",")}
-    if not given & {q.name for q in linear} and not any(values[q.name] for q in linear):
-        ranges = ", ".join(f"{q.name} {q.low:g} to {q.high:g} {q.unit}" for q in linear)
-        raise UsageError("C02", f"'{text}' does not say how strong it is", where=where, remedy=f"give {ranges}")
+    if given & {q.name for q in linear} or any(values[q.name] for q in linear):
+        return
+    ranges = ", ".join(f"{q.name} {q.low:g} to {q.high:g} {q.unit}" for q in linear)
+    follows = [q.name for q in kind.parameters if q.derived and q.name in given]
+    what = f"{', '.join(follows)} follows from other numbers" if follows else "does not say how strong it is"
+    raise UsageError("C02", f"'{text}': {what}" if follows else f"'{text}' {what}", where=where, remedy=f"give {ranges}")
 
 
 def _refuse_unfit(text: str, kind: type[Effect], values: dict[str, float], joint: int | None, joints: int, where: str) -> None:

@@ -93,7 +93,7 @@ def _said(result: Result) -> str:
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         beyond = f"{_untold(result)}; what they would have shown, the report lists"
-        doubt = loud_drives(result.noise, result.rated) or above_in_order(result)
+        doubt = loud_drives(result.noise, result.rated, units_in(result)) or above_in_order(result)
         return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}{doubt}"
     if result.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."

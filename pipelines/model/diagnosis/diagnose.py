@@ -19,7 +19,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.answered.told import diagnosis_of
-from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, only_held_out
+from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, of_those_held_out, only_held_out, share_held_out
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.believed.doubted import of_replicas, unlike_motion, unlike_noise, without_replay, without_twin
@@ -62,7 +62,7 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
         memory: of what was worked out of these logs, for an extension after it.
 
     Raises:
-        InputRejected: no log can be fitted (S01, T04, T08).
+        InputRejected: no log can be fitted (S01, T04, T08, D05).
         UsageError: C02, the calibration is not for these logs.
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
@@ -71,10 +71,14 @@ def diagnose(logs: Logs, settings: DiagnosisSettings | None = None, arm: Arm | N
     if calibration is not None or not _only_held_out(found):
         return found
     say("fitting the held-out logs too, which alone show what is wrong")
-    again = _asked(fitted_too(logs), chosen, arm, say, None, Memory())
+    try:
+        again = _asked(fitted_too(logs), chosen, arm, say, None, Memory())
+    except InputRejected:  # of the recipe of all logs together, nothing may be left: this look is one more
+        return found
+    left = of_those_held_out(again.after_rms.validate, found.residual_rms.identify, share_held_out(logs))
     # By the floors of before: a twin of logs that show it has its blows among its noise, as far as they were not found.
-    named = again.verdict == "cause" and at_floor(again.after_rms.validate, _floor(found))
-    return replace(again, held_out="blocks of all logs") if named else found
+    named = again.verdict == "cause" and at_floor(left, _floor(found))
+    return replace(again, held_out="blocks of all logs", calibration=found.calibration) if named else found
 
 
 def _floor(found: Diagnosis) -> Array:

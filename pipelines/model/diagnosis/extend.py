@@ -16,10 +16,19 @@ from functools import partial
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.answered.impossible import numbers_of
 from pipelines.model.diagnosis.answered.unbiased import unbiased
-from pipelines.model.diagnosis.asked.fitted_too import JudgedBy, at_floor, fitted_too, only_held_out
+from pipelines.model.diagnosis.asked.fitted_too import (
+    JudgedBy,
+    at_floor,
+    fitted_too,
+    of_those_held_out,
+    only_held_out,
+    share_held_out,
+)
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
@@ -41,22 +50,22 @@ from pipelines.model.diagnosis.named.carried import carried
 from pipelines.model.diagnosis.named.findings import extended_arm, findings, held_finding
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.reference.absorbed import Absorbed
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms, Trial
+from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.screened.candidates import place_of
 from pipelines.model.diagnosis.searched.beside import Held, acted, judged
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.ledger import IMPOSSIBLE, UNBELIEVABLE
-from pipelines.model.diagnosis.searched.search import Found, Step, search
+from pipelines.model.diagnosis.searched.search import Found, search
 from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
 from pipelines.model.diagnosis.worth.gains import gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
-from pipelines.model.words import plain_number
 
 __all__ = ["Extended", "extend"]
 
 _STANDS = "the reference logs show it too, so that it stands in the model already, as it was"
+_NOTHING = "it takes nothing off the held-out error"
 _NOT_MOVED = "since the reference logs the base parameters have not moved as it moves them"
 _REFUSED = {UNBELIEVABLE: UNBELIEVABLE, IMPOSSIBLE: "fitted exactly, its numbers are none that it can have"}
 _ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
@@ -89,20 +98,25 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
         memory: of what a diagnosis of these logs has worked out of them.
 
     Raises:
-        InputRejected: no log can be fitted (S01, T04, T08).
+        InputRejected: no log can be fitted (S01, T04, T08, D05).
         UsageError: C02, a cause that no model of these logs can take up.
     """
     chosen, say = settings or DiagnosisSettings(), tell or (lambda words: None)
     memory = memory or Memory()
     found = _by_curves(logs, wanted, chosen, arm, say, memory)
     before = found.before
-    if found.arm is not None or not logs.validate or logs.reference or not only_held_out(
+    unseen = found.arm is None and all(one.reason == _NOTHING for one in found.rejected)
+    # Nobody knows a floor here: what the model leaves of the logs it was fitted to stands for it.
+    if not unseen or not logs.validate or logs.reference or not only_held_out(
             before.identify, before.identify, before.validate, before.identify):
         return found
     say("fitting the held-out logs too, which alone show what is wrong")
-    again = _by_curves(fitted_too(logs), wanted, chosen, arm, say, Memory())
-    named = again.arm is not None and at_floor(again.after.validate, before.identify)
-    return replace(again, held_out="blocks of all logs") if named else found
+    try:
+        again = _by_curves(fitted_too(logs), wanted, chosen, arm, say, Memory())
+    except InputRejected:
+        return found
+    left = of_those_held_out(again.after.validate, before.identify, share_held_out(logs))
+    return replace(again, held_out="blocks of all logs") if again.arm is not None and at_floor(left, before.identify) else found
 
 
 def _by_curves(logs: Logs, wanted: Sequence[Wanted], chosen: DiagnosisSettings, arm: Arm | None, say: Callable[[str], None],
@@ -208,26 +222,11 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: boo
             why[step.best.effect.name, step.best.effect.joint] = doubt
         there |= {(step.best.effect.name, step.best.effect.joint)} if step.best is not None else set()
     taken = {(one.cause, one.joint) for one in told}
-    none_such = {(trial.cause, trial.joint): _REFUSED[trial.reason] + _numbers(step, trial) for step in found.steps
+    none_such = {(trial.cause, trial.joint): _REFUSED[trial.reason] + numbers_of(trial, step.rivals) for step in found.steps
                  for trial in step.trials if trial.reason in _REFUSED}
-    why |= {place: none_such.get(place, "it takes nothing off the held-out error")
+    why |= {place: none_such.get(place, _NOTHING)
             for place in ((f.cause, f.joint) for f in case.families) if place not in taken}
     return found, told, why
-
-
-def _numbers(step: Step, trial: Trial) -> str:
-    """What was fitted of a cause that it cannot be; nothing where the arm could have it, and could not have moved so."""
-    if trial.reason != IMPOSSIBLE:
-        return ""
-    tried = next((one for one in step.rivals if (one.effect.name, one.effect.joint) == (trial.cause, trial.joint)), None)
-    if tried is None:
-        return ""
-    last, revolute = tried.done.model.effects[-1], tried.done.model.arm.robot.revolute
-    turning = last.effect.joint is None or revolute[last.effect.joint - 1]
-    shown = last.effect.reported(last.values)
-    units = {q.name: "" if q.unit == "1" else f" {q.unit_at(turning)}" for q in last.effect.parameters if q.unit != "rad"}
-    told = [(name, value) for name, value in shown.items() if name in units and isinstance(value, float)]
-    return ": " + ", ".join(f"{name} = {plain_number(value, 3)}{units[name]}" for name, value in told)
 
 
 def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], first: Responding,

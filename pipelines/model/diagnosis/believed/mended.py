@@ -1,4 +1,4 @@
-"""Of causes at one joint, which only mends the shape of another: no law of the library is that of the machine to the last.
+"""Which causes only mend the shape of another at their joint, or of a gap: no law is that of the machine to the last.
 
     kept = not_mending(found, believed, case)           without what is the rest of a cause found before it
     kept = turned(found, kept, believed, case)          with one in place of the cause that was found before it
@@ -23,11 +23,11 @@ _ALIKE = 0.25  # of what a cause took away, that one for which it could be mista
 _REST = 0.5  # of what the later of two takes, the earlier takes as well in a looser form: then it is the rest of that
 _DECIDED = 0.9  # of what one of two leaves, the other leaves at most where it is decidedly better
 _TRACE = 0.01  # of the nominal residual's power, by which a law like one that stands at its joint is the rest of that
-_REST_OF_GAP = 0.05  # the same, by which what is found at the joint of a gap is what no law of that has
+_REST_OF_GAP = 0.05  # the same, by which what is found beside a gap is what no law of that has
 
 
 def not_mending(found: Found, kept: list[int], case: Case) -> list[int]:
-    """Without what only mends the shape of a cause found before at the same joint, for which it could be mistaken.
+    """Without what only mends the shape of a cause found before at the same joint, for which it could be mistaken, or of a gap.
 
     No law of the library is that of the machine to the last: the rest of a great Stribeck hump is no drag.
     """
@@ -50,8 +50,8 @@ def _rest_of_gap(effect: Effect, own: Effect, step: Step) -> bool:
     if effect.evidence != "reversals":
         return False
     gains = {(one.cause, one.joint): float(one.gain[0]) for one in step.screened}
-    again, here = (gains.get((one.name, one.joint), 0.0) for one in (effect, own))
-    return effect.joint == own.joint or again > here
+    again, here = (gains.get((one.name, one.joint)) for one in (effect, own))
+    return effect.joint == own.joint or (again is not None and here is not None and again > here)
 
 
 def _stands(own: Effect, case: Case) -> bool:

@@ -91,7 +91,7 @@ def provisional(case: Case, seen: Explored | None = None) -> tuple[Explored, ...
     first = seen or glance(case)
     now, screened, found = first.before, first.screened, list[Explored]()
     while True:
-        one = _explored(case, now, screened, screened)
+        one = _explored(case, now, screened, None)
         found.append(one)
         best = fewest(one.tried)
         if len(found) == _GREAT or best is None or _share(best.screened, now) < _LARGE:
@@ -123,9 +123,9 @@ def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable
         same = number <= len(rough) and rough[number - 1].before is now
         screened = rough[number - 1].screened if same else _screened(case, now)
         gate = gate_of(case, now, screened)
-        explored = rough[number - 1] if same else _explored(case, now, screened, gate.asked)
+        explored = rough[number - 1] if same else _explored(case, now, screened, gate)
         if same and (not case.floored or _others(case, explored, gate)):
-            explored = _explored(case, now, screened, gate.asked, explored.tried)
+            explored = _explored(case, now, screened, gate, explored.tried)
         found = different((one.effect.name, one.effect.joint) for one in now.model.effects)
         step = _step(case, explored, gate, number, found < most)
         steps.append(step)
@@ -212,26 +212,28 @@ def _screened(case: Case, now: Refined) -> tuple[Screened, ...]:
     return found
 
 
-def _explored(case: Case, now: Refined, screened: Sequence[Screened], wanted: Sequence[Screened],
-              there: Sequence[Tried] = ()) -> Explored:
+def _explored(case: Case, now: Refined, screened: Sequence[Screened], gate: Gate | None, there: Sequence[Tried] = ()) -> Explored:
     """The greatest causes fitted exactly, as far as they are wanted: what stays below its threshold need not be.
 
     Args:
+        gate: None: all are wanted.
         there: those that are fitted already.
     """
-    great = _great(case, now, screened, wanted)
+    great = _great(case, now, screened, screened if gate is None else gate.asked)
     error = HeldOut.of(now, case) if great else HeldOut(np.nan, now.weight)
     done = {id(one.screened): one for one in there}
     asked = [one for one in great if id(one) not in done]
     done |= {id(one.screened): one for one in each_fitted(case, now, asked, error)}
     tried = [done[id(one)] for one in great]
-    best = fewest(sorted(tried, key=lambda one: one.rank))
+    # What only its best law tells, where nothing else passes, is asked by that.
+    able = [one for one in tried if gate is None or gate.told(one, now)] or tried
+    best = fewest(sorted(able, key=lambda one: one.rank))
     plain = None if best is None else plainer(case, now, tried, best, error)
     if plain is not None:
         best, tried = plain, [plain if one.screened is plain.screened else one for one in tried]
     lasting = best
     if best is not None and best.log is not None:  # an event may be refused yet
-        lasting = fewest(sorted((one for one in tried if one.log is None), key=lambda one: one.rank))
+        lasting = fewest(sorted((one for one in able if one.log is None), key=lambda one: one.rank))
     tried = [best_form(case, now, one, error) if one in (best, lasting) else one for one in tried]
     return Explored(now, tuple(screened), tuple(sorted(tried, key=lambda one: one.rank)))
 

@@ -10,10 +10,11 @@ import pytest
 
 from benchmarks.hidden_effects.cases import SealedCase, campaign
 from benchmarks.hidden_effects.sessions import record_case
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis import diagnose as asking
 from pipelines.model.diagnosis import extend as extending
-from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, only_held_out
+from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, of_those_held_out, only_held_out, share_held_out
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.result import ResidualRms
@@ -21,7 +22,7 @@ from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects.torque_saturation import TorqueSaturation
 
 FLOOR, OWN = np.array([0.1, 0.2]), np.array([0.05, 0.25])  # [N m] of the fitted logs, of those held out
-FITTED, JUDGING = SimpleNamespace(name="fitted"), SimpleNamespace(name="judging")
+FITTED, JUDGING = (SimpleNamespace(name=name, n_samples=1000, sample_time=0.001) for name in ("fitted", "judging"))
 LOGS = Logs((FITTED,), (JUDGING,))  # type: ignore[arg-type]
 
 
@@ -55,16 +56,58 @@ def test_a_name_is_given_where_nothing_is_left_by_the_floors_of_before(left: Arr
                                                                        monkeypatch: pytest.MonkeyPatch) -> None:
     """A twin of logs that show a fault may be as loud as that, and everything in order beside it."""
     asked: list[Logs] = []
+    pooled = np.sqrt(0.5 * FLOOR**2 + 0.5 * left**2)  # of the fitted log, and as long a one that shows it
 
     def answer(logs: Logs, *_: Any) -> Any:
         asked.append(logs)
-        return found(verdict, rms(3.0 * FLOOR, 3.0 * OWN), left, held_out="blocks") if len(asked) > 1 else found(
+        return found(verdict, rms(3.0 * FLOOR, 3.0 * OWN), pooled, held_out="blocks") if len(asked) > 1 else found(
             "unknown", rms(FLOOR, 4.0 * OWN), 4.0 * OWN)
 
     monkeypatch.setattr(asking, "_asked", answer)
     told = asking.diagnose(LOGS)
     assert [logs.identify for logs in asked] == [(FITTED,), (JUDGING, FITTED)]
     assert (told.verdict, told.held_out) == (("cause", "blocks of all logs") if named else ("unknown", "logs"))
+
+
+def test_many_logs_in_order_do_not_hide_the_rest_of_one_that_is_not() -> None:
+    """Nine at their floor and one at 2.6 times it, pooled, are at 1.26 times."""
+    pooled = np.sqrt(0.9 * FLOOR**2 + 0.1 * (2.6 * FLOOR)**2)
+    assert at_floor(pooled, FLOOR)
+    np.testing.assert_allclose(of_those_held_out(pooled, FLOOR, 0.1), 2.6 * FLOOR)
+    assert (of_those_held_out(0.9 * FLOOR, FLOOR, 0.1) <= 0.9 * FLOOR + 1e-12).all()
+    long: Any = SimpleNamespace(n_samples=9000, sample_time=0.001)
+    assert share_held_out(Logs((long,), (JUDGING,))) == pytest.approx(0.1)  # type: ignore[arg-type]
+
+
+def test_an_answer_outlasts_a_second_question_that_cannot_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    def answer(logs: Logs, *_: Any) -> Any:
+        if not logs.validate:
+            raise InputRejected("T08", "too few equations are left")
+        return found("unknown", rms(FLOOR, 4.0 * OWN), 4.0 * OWN)
+
+    monkeypatch.setattr(asking, "_asked", answer)
+    assert asking.diagnose(LOGS).verdict == "unknown"
+
+
+def extension(before: ResidualRms, after: Array, accepted: bool, reason: str = "it takes nothing off the held-out error") -> Any:
+    rejected = () if accepted else (SimpleNamespace(reason=reason),)
+    return extending.Extended(SimpleNamespace() if accepted else None, (), rejected, None, before,  # type: ignore[arg-type]
+                              rms(FLOOR, after), "blocks" if accepted else "logs", (), (), 0)
+
+
+@pytest.mark.parametrize(("reason", "held", "left", "taken"), [
+    ("it takes nothing off the held-out error", 4.0, 1.2, True), ("it takes nothing off the held-out error", 4.0, 1.5, False),
+    ("it takes nothing off the held-out error", 2.0, 1.2, False), ("logs do not agree on its size: 0.1 of it", 4.0, 1.2, False)])
+def test_an_extension_is_asked_again_where_the_fitted_logs_show_nothing_of_it(reason: str, held: float, left: float, taken: bool,
+                                                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    def answer(logs: Logs, *_: Any) -> Any:
+        if logs.validate:
+            return extension(rms(FLOOR, held * FLOOR), held * FLOOR, False, reason)
+        return extension(rms(FLOOR, FLOOR), np.sqrt(0.5 + 0.5 * left**2) * FLOOR, True)
+
+    monkeypatch.setattr(extending, "_by_curves", answer)
+    told = extending.extend(LOGS, ())
+    assert (told.arm is not None, told.held_out) == ((True, "blocks of all logs") if taken else (False, "logs"))
 
 
 @pytest.mark.parametrize(("verdict", "fitted", "held", "origin"), [
