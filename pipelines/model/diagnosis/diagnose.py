@@ -89,9 +89,10 @@ def _floor(found: Diagnosis) -> Array:
 
 def _only_held_out(found: Diagnosis) -> bool:
     """Whether nobody knows what is wrong, for the fitted logs are those of an arm in order, as its twin is."""
-    own, rms = found.held_out_floor, found.residual_rms
-    return (found.verdict == "unknown" and found.held_out == "logs" and found.floor_origin == "twin" and own is not None
-            and only_held_out(rms.identify, rms.floor, rms.validate, own))
+    if found.verdict != "unknown" or found.held_out != "logs" or found.floor_origin != "twin" or found.held_out_floor is None:
+        return False
+    rms = found.residual_rms
+    return only_held_out(rms.identify, rms.floor, rms.validate, found.held_out_floor)
 
 
 def _asked(logs: Logs, chosen: DiagnosisSettings, arm: Arm | None, say: Tell, calibration: Calibration | None,

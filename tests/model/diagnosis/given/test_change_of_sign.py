@@ -120,7 +120,8 @@ def told(verdict: str, causes: Sequence[str], question: str = "what is wrong", t
                                for name, _, joint in (one.partition(":") for one in names)] for names in (causes, tried, left))
     end = SimpleNamespace(cause="spring", joint=1, accepted=False, gain=0.01, threshold=0.1, step=5)
     ledger = [*findings, *taken, *above, end]
-    return cast("Diagnosis", SimpleNamespace(verdict=verdict, findings=findings, question=question, nominal=None, ledger=ledger))
+    return cast("Diagnosis", SimpleNamespace(verdict=verdict, findings=findings, question=question, nominal=None, ledger=ledger,
+                                             held_out="blocks"))
 
 
 @pytest.mark.parametrize(("causes", "question", "asked"), [
