@@ -23,8 +23,8 @@ def numbers_of(trial: Trial, tried: Sequence[Tried]) -> str:
     last, revolute = found.done.model.effects[-1], found.done.model.arm.robot.revolute
     turning = last.effect.joint is None or revolute[last.effect.joint - 1]
     shown = last.effect.reported(last.values)
-    fixed = last.effect.fixed_amplitudes is not None
+    given = last.effect.fixed_amplitudes is not None  # amplitudes, by physics: they were not fitted
     units = {q.name: "" if q.unit == "1" else f" {q.unit_at(turning)}" for q in last.effect.parameters
-             if q.period is None and not (fixed and q.name == "coefficient")}
+             if q.period is None and (q.shape or q.derived or not given)}
     numbers = [(name, value) for name, value in shown.items() if name in units and isinstance(value, float) and np.isfinite(value)]
     return f": {', '.join(f'{name} = {plain_number(value, 3)}{units[name]}' for name, value in numbers)}" if numbers else ""
