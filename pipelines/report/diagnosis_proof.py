@@ -9,6 +9,7 @@ import numpy as np
 
 from pipelines.model.diagnosis.result import Finding, Proof
 from pipelines.report import style
+from pipelines.report.figures import broken_at_gaps
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure
 from pipelines.report.style import format_number, format_unit
@@ -67,12 +68,12 @@ def draw_proof(axes: Axes, proof: Proof, torque: str = "N m") -> None:
 
 
 def draw_proof_in_time(axes: Axes, proof: Proof, torque: str = "N m") -> None:
-    """A stretch of time."""
+    """A stretch of time; where nothing counts, for a drive was at its limit say, no line is drawn."""
     t = np.asarray(proof.t)
-    axes.plot(t, proof.before_in_time, color=style.SKY, linewidth=2.4, label="without the finding")
-    axes.plot(t, proof.predicted_in_time, color=style.ORANGE, linestyle=(0, (5, 1.5)), linewidth=1.2,
+    axes.plot(*broken_at_gaps(t, proof.before_in_time), color=style.SKY, linewidth=2.4, label="without the finding")
+    axes.plot(*broken_at_gaps(t, proof.predicted_in_time), color=style.ORANGE, linestyle=(0, (5, 1.5)), linewidth=1.2,
               label="what the finding predicts")
-    axes.plot(t, proof.after_in_time, color=style.VERMILLION, linewidth=0.9, label="left with it")
+    axes.plot(*broken_at_gaps(t, proof.after_in_time), color=style.VERMILLION, linewidth=0.9, label="left with it")
     _finish(axes, "time [s]", torque)
 
 

@@ -11,9 +11,10 @@ import pytest
 from matplotlib.figure import Figure as Drawing
 
 from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
-from pipelines.model.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, TorqueGain, Value
+from pipelines.model.diagnosis.result import Answer, Finding, Gain, Proof, Rejected, ResidualRms, TorqueGain, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
+from pipelines.report.diagnosis_proof import draw_proof_in_time
 from pipelines.report.diagnosis_words import above_in_order, loud_drives, together, what_stays
 from pipelines.report.frf_figures import posture_words
 
@@ -166,3 +167,18 @@ def test_a_small_joint_is_not_hidden_by_a_large_one() -> None:
     said = " ".join(finding_section(1, finding(), NOMINAL).text)
     assert "explains 0.05 % of what stands above the floor at all joints together, and 100 % of that of joint 3" in said
     assert "all joints together" not in " ".join(finding_section(1, replace(finding(), explained=0.9), NOMINAL).text)
+
+
+def test_no_line_is_drawn_over_a_gap_in_time() -> None:
+    """Of a drive at its limit a quarter of a second does not count: a straight line over it would be a residual nobody measured."""
+    from matplotlib.figure import Figure
+
+    t = np.r_[np.arange(0.0, 0.1, 0.003), np.arange(0.35, 0.5, 0.003)]
+    x = np.linspace(0.0, 1.0, 4)
+    axes = Figure().subplots()
+    draw_proof_in_time(axes, Proof(1, "position", "rad", x, x, x, x, x, t, np.ones_like(t), np.zeros_like(t), np.ones_like(t)))
+    for line in axes.get_lines():
+        at, y = (np.asarray(values, dtype=float) for values in line.get_data())
+        joined = np.isfinite(y[:-1]) & np.isfinite(y[1:])
+        assert np.diff(at)[joined].max() < 0.01
+        assert np.isfinite(y).sum() == len(t)
