@@ -8,6 +8,7 @@ By what an earlier diagnosis has stored; by a twin where the logs know a control
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.own_motion import following
+from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.calibrated import bounds_of, conditions_of, origin_of, refuse_calibration, thresholds_of
 from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.model.diagnosis.floor.drive_noise import drive_noise, white
@@ -26,7 +28,7 @@ from pipelines.model.diagnosis.floor.twin import Twin, make_twin, not_replayable
 from pipelines.model.diagnosis.given.clean import clean
 from pipelines.model.diagnosis.rows.imperfections import DriveNoise
 from pipelines.model.diagnosis.searched.case import Case
-from pipelines.model.diagnosis.searched.search import Explored
+from pipelines.model.diagnosis.searched.search import Explored, beside_another
 from pipelines.model.diagnosis.worth.evidence import floors_of
 
 __all__ = ["Floored", "floored_by"]
@@ -79,7 +81,7 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
     places = replayable([log for log, _ in prepared.motions])
     if not places or not chosen.replicas:
         return None, None
-    model, twin = _likely(prepared, rough, chosen, places[0])
+    model, twin = _likely(prepared, rough, beside_another(rough, case), chosen, places[0])
     weight = rough[0].before.weight
     weighted = twin.weighted(weight)
     found = Thresholds.of_twin(*weighted, case.families, model.nominal, replicas=twin.replicas)
@@ -91,17 +93,29 @@ def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], cho
     return made, twin
 
 
-def _likely(prepared: Prepared, rough: tuple[Explored, ...], chosen: DiagnosisSettings, place: int) -> tuple[Exact, Twin]:
+def _likely(prepared: Prepared, rough: tuple[Explored, ...], others: Iterator[Explored], chosen: DiagnosisSettings, place: int,
+            ) -> tuple[Exact, Twin]:
     """The twin of the arm beside the greatest causes; where that cannot be simulated, or leaves far more than the log itself does,
     which no floor is above, of the arm beside fewer of them, and the least of these twins where all do.
+
+    Where none of these can be simulated, a cause that is not among them may have bent the numbers, friction say that changes its
+    sign far more abruptly than the machine's: then the arm beside the first of `others` that can be.
 
     Raises:
         InputRejected: D15, D17, none of these arms can be simulated.
     """
-    left, usual = clean(rough[-1]), np.maximum(rough[0].before.rms, 1e-300)
+    usual = np.maximum(rough[0].before.rms, 1e-300)
     made: list[tuple[float, Exact, Twin]] = []
     refusals: list[InputRejected] = []
-    for done in dict.fromkeys(one.before for one in reversed(rough)):
+
+    def beside() -> Iterator[tuple[Refined, Array]]:
+        """Models, and the residual (rows,) [N m] in which noise is measured."""
+        cleanest = clean(rough[-1])
+        yield from ((done, cleanest) for done in dict.fromkeys(one.before for one in reversed(rough)))
+        while not made and (other := next(others, None)) is not None:
+            yield other.before, clean(other)
+
+    for done, left in beside():
         try:
             noise = drive_noise(done.model, prepared.data, left, prepared.motions, prepared.recipe, place, chosen.seed)
             twin = make_twin(done.model, done.weight, prepared.data, prepared.motions, prepared.recipe, noise, chosen.replicas,

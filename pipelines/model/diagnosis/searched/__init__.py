@@ -13,5 +13,6 @@
     elsewhere     the same cause at another joint
     unnameable    what explains the most and cannot be named
     curves        by which curve friction changes its sign, beside what was found
+    reweighted    the weights that follow from what was found
     ledger        every hypothesis, and why it was accepted or not
 """

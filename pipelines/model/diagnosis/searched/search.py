@@ -12,7 +12,7 @@ or with one more that is worth it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,24 +25,22 @@ from pipelines.model.diagnosis.screened.screen import Screened, screen
 from pipelines.model.diagnosis.searched.barred import better_than
 from pipelines.model.diagnosis.searched.borne_out import borne_out
 from pipelines.model.diagnosis.searched.case import Case, HeldOut, held_out
-from pipelines.model.diagnosis.searched.curves import with_curves_anew
 from pipelines.model.diagnosis.searched.elsewhere import at_its_joint
 from pipelines.model.diagnosis.searched.gate import CLOSE, Gate, gate_of, once_more
 from pipelines.model.diagnosis.searched.hypotheses import best_form, each_fitted, first_order_missed, plainer
 from pipelines.model.diagnosis.searched.ledger import Tried, ledger
 from pipelines.model.diagnosis.searched.parsimony import PARSIMONY, different, fewest
+from pipelines.model.diagnosis.searched.reweighted import reweighted
 from pipelines.model.diagnosis.searched.unnameable import unnameable
 
-__all__ = ["Explored", "Found", "Step", "gap_first", "gives_way", "glance", "greatest", "last_step", "provisional",
-           "search"]
+__all__ = ["Explored", "Found", "Step", "beside_another", "gap_first", "gives_way", "glance", "greatest", "last_step",
+           "provisional", "search"]
 
 _RIVALS = 6  # fitted exactly
 _LEAST, _LEAST_WHITE = 2e-3, 2e-4  # of the squared residual: no cause is fitted for less; of whitened rows
 _GREAT, _LARGE = 3, 0.3  # causes taken away before the noise is looked at; share of a joint's residual that makes one great
 _WORTH = 0.05  # of the squared residual of its joint
 _MISSED, _NEAR = 0.1, 0.5  # of what the second of two takes away: one in their place may miss so much; to first order
-_SETTLED = 0.02  # of a weight
-_ROUNDS = 3  # of weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +94,7 @@ def provisional(case: Case, seen: Explored | None = None) -> tuple[Explored, ...
         best = fewest(one.tried)
         if len(found) == _GREAT or best is None or _share(best.screened, now) < _LARGE:
             return tuple(found)
-        now = _reweighted(best.done, case)
+        now = reweighted(best.done, case)
         screened = _screened(case, now)
 
 
@@ -104,6 +102,17 @@ def greatest(rough: Sequence[Explored]) -> list[tuple[str, int | None]]:
     """Of what `provisional` found, the causes that explain much of what their joint leaves, and their joints."""
     found = [(one, best) for one in rough if (best := fewest(one.tried)) is not None]
     return [(best.effect.name, best.effect.joint) for one, best in found if _share(best.screened, one.before) >= _LARGE]
+
+
+def beside_another(rough: Sequence[Explored], case: Case) -> Iterator[Explored]:
+    """What shows beside what `provisional` took away and one more of its last look that explains much of what its joint leaves and
+    lasts, best first: a cause that ranks above it is no reason that it bends the numbers of the model less.
+    """
+    last = rough[-1]
+    for one in last.tried:
+        if one.log is None and one.possible and _share(one.screened, last.before) >= _LARGE:
+            now = reweighted(one.done, case)
+            yield Explored(now, _screened(case, now), ())
 
 
 def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable[[Refined], bool] | None = None) -> Found:
@@ -139,10 +148,10 @@ def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable
             del steps[place:], asked[place + 1:]
             steps.append(instead)
             joined.add(best.effect.name)
-            now, rough = _reweighted(best.done, case), ()
+            now, rough = reweighted(best.done, case), ()
             continue
         follows = number < len(rough) and same and step.best is fewest(rough[number - 1].tried)
-        now = rough[number].before if follows else _reweighted(step.best.done, case)
+        now = rough[number].before if follows else reweighted(step.best.done, case)
         if ends is not None and ends(now):
             break
     return Found(nominal, tuple(steps), now)
@@ -281,15 +290,3 @@ def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, c
     trials = ledger(screened, gate.judged, thresholds, fitted_there, best, now, number, refused,
                     [id(one) for one in gate.near])
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)
-
-
-def _reweighted(done: Refined, case: Case) -> Refined:
-    """Joints weighted by what this model leaves of them."""
-    done = with_curves_anew(done, case.model.columns.laws)
-    for _ in range(_ROUNDS):
-        weight = 1.0 / np.maximum(done.rms, 1e-12)
-        settled = np.abs(weight / done.weight - 1.0).max() < _SETTLED
-        done = refine(done.model, done.data, weight)
-        if settled:
-            break
-    return done
