@@ -10,7 +10,7 @@ import numpy as np
 
 from pipelines.model.diagnosis.result import Curve, Diagnosis, Evidence, Spectrum
 from pipelines.report import style
-from pipelines.report.diagnosis_words import floor_words
+from pipelines.report.diagnosis_floor import floor_words
 from pipelines.report.figures import broken_at_gaps, draw_measured, draw_modelled, envelope, joint_axes, joint_size
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure, Section, Table

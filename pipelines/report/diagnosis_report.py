@@ -15,20 +15,24 @@ from pipelines.model.diagnosis.searched.ledger import WEAKER
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
+from pipelines.report.diagnosis_floor import (
+    above_in_order,
+    floor_words,
+    held_out_floor,
+    held_out_words,
+    judge_words,
+    loud_drives,
+    what_stays,
+)
+from pipelines.report.diagnosis_floor import torque_errors as errors_table
 from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_moved import of_moved, unmoved_words
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
-    above_in_order,
     as_sentence,
     at_places,
-    floor_words,
-    held_out_floor,
-    held_out_words,
     in_order,
     is_cause,
-    judge_words,
-    loud_drives,
     named,
     per_joint,
     three_digits,
@@ -36,10 +40,8 @@ from pipelines.report.diagnosis_words import (
     together,
     told_values,
     torque_of,
-    what_stays,
     without_keys,
 )
-from pipelines.report.diagnosis_words import torque_errors as errors_table
 from pipelines.report.joint_units import units_in
 from pipelines.report.model_words import laws_words, threshold_words
 from pipelines.report.report import Report, Section, Table, Tone

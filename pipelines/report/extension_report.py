@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_words import held_out_words, judge_words, title_of, together, torque_errors, without_keys
+from pipelines.report.diagnosis_floor import held_out_words, judge_words, torque_errors
+from pipelines.report.diagnosis_words import title_of, together, without_keys
 from pipelines.report.joint_units import Units, units_in
 from pipelines.report.model_words import laws_words
 from pipelines.report.report import Report, Section, Table, Tone

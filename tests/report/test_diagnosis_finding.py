@@ -14,8 +14,9 @@ from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
 from pipelines.model.diagnosis.result import Answer, Finding, Gain, Proof, Rejected, ResidualRms, TorqueGain, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
+from pipelines.report.diagnosis_floor import above_in_order, loud_drives, what_stays
 from pipelines.report.diagnosis_proof import draw_proof_in_time
-from pipelines.report.diagnosis_words import above_in_order, loud_drives, together, what_stays
+from pipelines.report.diagnosis_words import together
 from pipelines.report.frf_figures import posture_words
 
 

@@ -28,19 +28,10 @@ from pipelines.model.diagnosis.result import (
 )
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
+from pipelines.report.diagnosis_floor import held_out_floor, torque_errors
 from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_report import diagnosis_report
-from pipelines.report.diagnosis_words import (
-    held_out_floor,
-    in_order,
-    meaning_of,
-    named,
-    spoken,
-    together,
-    told_values,
-    torque_errors,
-    without_keys,
-)
+from pipelines.report.diagnosis_words import in_order, meaning_of, named, spoken, together, told_values, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')

@@ -11,7 +11,7 @@ from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.result import BeforeAfter, Curve, Diagnosis, Evidence, Gain, ResidualRms, TorqueGain
 from pipelines.model.excitation.limits import Limit
 from pipelines.report.diagnosis_finding import gain_table
-from pipelines.report.diagnosis_words import torque_errors
+from pipelines.report.diagnosis_floor import torque_errors
 from pipelines.report.joint_units import Units, each, unit_of, units_in
 
 NOTHING: Any = {field.name: None for field in fields(Evidence)}
