@@ -50,7 +50,9 @@ WORDS: Final[dict[str, str]] = {
     "thresholds": "what each cause has to exceed", "evidence": "the picture of what is wrong, log by log, before any name",
     "Classified.evidence": "what it is seen by, in words", "Undecided.evidence": "what is seen, in words",
     "Diagnosis.findings": "accepted causes", "Extension.findings": "the causes that were named", "Diagnosis.floor_origin":
-    "where the floor comes from", "Diagnosis.after_rms": "[N m] torque error of the extended model",
+    "where the floor comes from", "Diagnosis.no_twin":
+    "why the floor is that of no twin, although the logs describe their controller; else empty", "Diagnosis.after_rms":
+    "[N m] torque error of the extended model",
     "Diagnosis.replicas": "simulated runs", "Extension.residual_rms": "[N m] torque error of the nominal model",
     "Extension.gain": "what it gains on held-out logs", "Finding.of_rated": "size of its torque", "Result.joints": "the joints",
     "rivals": "other causes that explain nearly as much of the same",

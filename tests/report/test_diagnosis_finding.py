@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.answered.words import how_much, taken_in, where
 from pipelines.model.diagnosis.result import Answer, Finding, Gain, Proof, Rejected, ResidualRms, TorqueGain, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_finding import finding_section
-from pipelines.report.diagnosis_floor import above_in_order, loud_drives, what_stays
+from pipelines.report.diagnosis_floor import above_in_order, floor_words, loud_drives, what_stays
 from pipelines.report.diagnosis_proof import draw_proof_in_time
 from pipelines.report.diagnosis_words import together
 from pipelines.report.frf_figures import posture_words
@@ -33,14 +33,27 @@ NOMINAL = ResidualRms(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.02]), np
 
 @pytest.mark.parametrize(("origin", "own", "said"), [
     ("twin", True, " Joint 1 stays at 2 times what an arm in order leaves, held out, without a name."),
-    ("blocks", False, " Joint 1 stays at 20 times its noise, held out, without a name."), ("twin", False, "")])
+    ("blocks", False, " Held out, joint 1 still leaves more than noise; whether more than an arm in order does is not known: there "
+     "are neither reference logs nor a known controller."), ("twin", False, "")])
 def test_what_stays_above_the_floor_is_said(origin: str, own: bool, said: str) -> None:
     left = np.array([0.1, 0.04, 0.02])
     floor = {"twin": np.array([0.09, 0.04, 0.02]), "blocks": np.full(3, 0.005)}[origin]
     rms = ResidualRms(left, left, floor)
-    there: Any = SimpleNamespace(floor_origin=origin, after_rms=rms, residual_rms=rms,
+    there: Any = SimpleNamespace(floor_origin=origin, after_rms=rms, residual_rms=rms, no_twin="",
                                  held_out_floor=np.array([0.05, 0.04, 0.02]) if own else None)
     assert what_stays(there) == said
+
+
+def test_a_twin_that_failed_is_no_unknown_controller() -> None:
+    """Nor is a multiple of the noise told, as an arm in order leaves many times as much."""
+    rms = ResidualRms(np.array([0.1, 0.1]), np.array([0.1, 0.1]), np.full(2, 0.005))
+    there: Any = SimpleNamespace(floor_origin="blocks", after_rms=rms, residual_rms=rms, held_out_floor=None,
+                                 no_twin="the arm as it was fitted cannot be simulated: it runs away")
+    assert what_stays(there) == (
+        " Held out, joint 1 and joint 2 still leave more than noise; whether more than an arm in order does is not known: these "
+        "logs describe their controller, but the arm as it was fitted cannot be simulated: it runs away.")
+    assert "a known controller" not in floor_words(there)
+    assert "cannot be simulated: it runs away" in floor_words(there)
 
 
 @pytest.mark.parametrize(("own", "left", "said"), [

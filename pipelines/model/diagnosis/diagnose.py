@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.answered.told import diagnosis_of
 from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, of_those_held_out, only_held_out, share_held_out
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.believed.doubted import of_replicas, unlike_motion, unlike_noise, without_replay, without_twin
+from pipelines.model.diagnosis.believed.doubted import of_replicas, told_why, unlike_motion, unlike_noise, without_twin
 from pipelines.model.diagnosis.believed.pruned import settled
 from pipelines.model.diagnosis.believed.second_look import looked_again
 from pipelines.model.diagnosis.changed import changed
@@ -173,7 +173,7 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
         rows = case.data if case.judge is None else case.judge
         left = held_out_left(done.found.nominal, case.judge, case.blocks)
         done = without_twin(done, rows.rms(left), floored.rms, floored.no_twin)
-    done = without_replay(done, floored.no_replay)
+    done = told_why(done, floored.untold)
     if floored.twin is not None:
         done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
         done = unlike_noise(done, partial(of_replicas, floored.twin))

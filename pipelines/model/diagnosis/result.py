@@ -297,3 +297,4 @@ class Diagnosis:
     unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
     without_limit: tuple[WithoutLimit, ...] = ()  # causes of the library that no other list has
     fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart
+    no_twin: str = ""  # why a floor "blocks" is that of no twin, although the logs describe their controller; else empty

@@ -116,7 +116,8 @@ def _told(first: Responding, case: Case, done: Settled, responded: Judged, floor
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
         0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise, own,
-        acted(plain.model.arm, standing), acted(arm, responded.acting), made)
+        acted(plain.model.arm, standing), acted(arm, responded.acting), made,
+        no_twin=floored.untold)
 
 
 def _own_floor(responded: Judged, first: Responding, case: Case, floored: Floored, chosen: DiagnosisSettings) -> Array | None:

@@ -3,7 +3,7 @@
     done = unlike_held_out(done, rms, floor, nominal)     held-out logs have a floor of their own
     done = above_in_both(done, rms, floor, fitted)        what has no name shows in both, in neither enough alone
     done = without_twin(done, rms, noise, why)           an arm in order can be simulated under its own controller
-    done = without_replay(done, why)                      who wants a floor is told what would give one
+    done = told_why(done, why)                            who wants a floor is told why there is none
     done = unlike_motion(done, usual)                     noise does not follow how a joint moves
     done = unlike_noise(done, usual)                      noise does not oscillate
     done = unnamed(done, floor)                           what has changed has a name that the residual does not show
@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.twin import Twin
 from pipelines.model.diagnosis.named.verdict import Ruling, at_floor, held_out_high, takes_most, without_steps
 
-__all__ = ["above_in_both", "of_replicas", "unlike_held_out", "unlike_motion", "unlike_noise", "unnamed", "without_replay",
+__all__ = ["above_in_both", "of_replicas", "told_why", "unlike_held_out", "unlike_motion", "unlike_noise", "unnamed",
            "without_twin"]
 
 # Times the floor of the held-out logs. The right cause, a spring turned farther than it was fitted, has been seen to leave 5.1, a
@@ -143,11 +143,11 @@ def without_twin(done: Settled, held_out: Array, noise: Array, why: str) -> Sett
     return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
 
 
-def without_replay(done: Settled, why: str) -> Settled:
-    """The same; where nothing was found and no floor is known, with `why` logs that describe a controller cannot be replayed."""
+def told_why(done: Settled, why: str) -> Settled:
+    """The same; where nothing was found and no floor is known, with `why` logs that describe a controller give none."""
     if not why or done.ruling.verdict != "nothing-wrong" or not done.ruling.reason:
         return done
-    reason = f"{done.ruling.reason}. These logs describe their controller, but cannot be replayed under it, {why}"
+    reason = f"{done.ruling.reason}. These logs describe their controller, but {why}"
     return replace(done, ruling=replace(done.ruling, reason=reason))
 
 

@@ -8,13 +8,13 @@ By what an earlier diagnosis has stored; by a twin where the logs know a control
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array
+from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
@@ -50,7 +50,7 @@ class Floored:
     judging: Array | float = 1.0  # (joints,) times as much power the reference logs leave at the speeds of the logs held out
     twin: Twin | None = None  # whose replicas it is, where it was made for these logs
     no_twin: str = ""  # why there is none although the logs know their controller: no model of the arm follows it
-    no_replay: str = ""  # or the logs cannot be replayed
+    untold: str = ""  # why the noise has to do although the logs describe their controller, whatever the reason, in words
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -58,17 +58,25 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
     """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
     if given is not None:
         refuse_calibration(given, prepared, case.families, "twin")
-    made, twin, why = given, None, ""
+    made, twin, why, untold = given, None, "", ""
     if given is None:
         try:
             made, twin = _calibrated(prepared, case, rough, chosen)
         except InputRejected as refused:
             why = refused.message if refused.code == _RUNS_AWAY else ""  # numbers of too poor a motion, D15, are no arm's fault
+            untold = f"the arm as it was fitted cannot be simulated: {refused.message}"
     if made is None:
         return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=why,
-                       no_replay="" if why or not chosen.replicas else not_replayable([log for log, _ in prepared.motions]))
+                       untold=untold or _not_asked([log for log, _ in prepared.motions], chosen))
     return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
                    twin=twin)
+
+
+def _not_asked(logs: Sequence[ExperimentLog], chosen: DiagnosisSettings) -> str:
+    """Why no twin was tried, in words; empty where no log describes its controller."""
+    if not chosen.replicas:
+        return "no twin was asked for" if any(log.controlled for log in logs) else ""
+    return f"they cannot be replayed under it, {why}" if (why := not_replayable(logs)) else ""
 
 
 def _calibrated(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,

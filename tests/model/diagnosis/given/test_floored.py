@@ -93,3 +93,28 @@ def test_where_no_arm_can_be_simulated_another_cause_is_taken_away(twins: dict[s
     assert (model, asked) == (taken, tried)
     assert measured == ["beside", "beside", *tried[2:]]
     assert [one.before.model for one in others] == [name for name in ("spring", "offset") if name not in tried]
+
+
+@pytest.mark.parametrize(("code", "unknown"), [("D17", True), ("D15", False)])
+def test_why_there_is_no_twin_is_told(code: str, unknown: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The logs describe their controller: that none is known is not why. Whether it may be a fault is another question."""
+    def refused(*_: Any) -> Any:
+        raise InputRejected(code, "the simulated arm runs away")
+
+    monkeypatch.setattr(floored, "_calibrated", refused)
+    monkeypatch.setattr(floored, "clean", lambda _: None)
+    monkeypatch.setattr(floored, "white", lambda *_: np.ones(1))
+    some: Any = SimpleNamespace(data=None, motions=(), families=(), replicas=1)
+    found = floored.floored_by(some, some, (explored("nominal"),), some, None)
+    assert found.untold == "the arm as it was fitted cannot be simulated: the simulated arm runs away"
+    assert bool(found.no_twin) == unknown
+
+
+@pytest.mark.parametrize(("replicas", "controlled", "said"), [(0, True, "no twin was asked for"), (0, False, ""), (1, False, "")])
+def test_who_asks_for_no_twin_is_told_so(replicas: int, controlled: bool, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(floored, "_calibrated", lambda *_: (None, None))
+    monkeypatch.setattr(floored, "clean", lambda _: None)
+    monkeypatch.setattr(floored, "white", lambda *_: np.ones(1))
+    log = SimpleNamespace(controlled=controlled)
+    some: Any = SimpleNamespace(data=None, motions=((log, None),), families=(), replicas=replicas)
+    assert floored.floored_by(some, some, (explored("nominal"),), some, None).untold == said
