@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screened.screen import Screened
 from pipelines.model.effects.base import Effect
 
-__all__ = ["ACCEPTED", "IMPOSSIBLE", "UNBELIEVABLE", "WEAKER", "Tried", "ledger", "line_of_moved"]
+__all__ = ["ACCEPTED", "ENOUGH", "GIVES_WAY", "IMPOSSIBLE", "UNBELIEVABLE", "WEAKER", "Tried", "ledger", "line_of_moved"]
 
 ACCEPTED = "accepted"
 WEAKER = "weaker than others"
@@ -22,6 +22,9 @@ BETTER = "below its threshold, and decidedly more than the best that is above it
 _BY_FIT = "below its threshold to first order, and most of what its joint leaves when fitted exactly"  # likewise
 UNBELIEVABLE = "the arm could not have moved so with it"
 IMPOSSIBLE = "impossible numbers"
+GIVES_WAY = "something that gives way explains more, and what does these logs do not tell"  # so that nothing is taken up
+ENOUGH = "as many causes as are looked for had been found"  # likewise
+_LESS = "explains less than the one that the search took up"  # be that named or not
 _REFUSED = "time held out does not bear it out"
 _THERE = "found there already, and not asked again"
 _TOO_LITTLE = "takes next to nothing"  # so that nobody has asked what it would have to
@@ -60,10 +63,10 @@ class Tried:
 
 def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds: Thresholds, tried: Sequence[Tried],
             best: Tried | None, now: Refined, number: int, refused: Collection[int] = (),
-            near: Collection[int] = ()) -> tuple[Trial, ...]:
+            near: Collection[int] = (), none: str = "") -> tuple[Trial, ...]:
     """The lines of step `number`, greatest gain first; `judged` holds the gains that `thresholds` are for, `refused` the ids of
-    those screened that time held out does not bear out, or, of an event, what is left when it is fitted exactly, and `near` those
-    that only an exact fit tells."""
+    those screened that time held out does not bear out, or, of an event, what is left when it is fitted exactly, `near` those that
+    only an exact fit tells, and `none` why nothing was taken up where there is no `best`."""
     exact = {id(one.screened): one for one in tried}
     there = {(one.effect.name, one.effect.joint) for one in now.model.effects}
     rows: list[Trial] = []
@@ -86,10 +89,12 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
                   UNBELIEVABLE if not fitted.believable else
                   IMPOSSIBLE if not fitted.possible else
                   "held-out error does not fall" if fitted.error >= 1.0 else
+                  "the error, held out and fitted on a par, does not fall" if fitted.rank >= 1.0 else
                   "fitted exactly it stays below its threshold" if fitted.log is not None and id(one) in refused else
                   _REFUSED if id(one) in refused else
                   "takes more numbers, or a second of its kind" if best is not None and fitted.rank < best.rank else
-                  "explains less than the one accepted")
+                  (none or _REFUSED) if best is None else
+                  _LESS)
         gained = np.nan if fitted is None else 1.0 - fitted.done.rss / now.rss
         rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
                           float(one.visibility[0]), gained, accepted, reason))

@@ -28,7 +28,7 @@ from pipelines.model.diagnosis.searched.case import Case, HeldOut, held_out
 from pipelines.model.diagnosis.searched.elsewhere import at_its_joint
 from pipelines.model.diagnosis.searched.gate import CLOSE, Gate, gate_of, once_more
 from pipelines.model.diagnosis.searched.hypotheses import best_form, each_fitted, first_order_missed, plainer
-from pipelines.model.diagnosis.searched.ledger import Tried, ledger
+from pipelines.model.diagnosis.searched.ledger import ENOUGH, GIVES_WAY, Tried, ledger
 from pipelines.model.diagnosis.searched.parsimony import PARSIMONY, different, fewest
 from pipelines.model.diagnosis.searched.reweighted import reweighted
 from pipelines.model.diagnosis.searched.unnameable import unnameable
@@ -288,5 +288,5 @@ def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, c
     best = None if other is not None else best
     fitted_there = explored.tried if better is None or best is not better else (better, *explored.tried)
     trials = ledger(screened, gate.judged, thresholds, fitted_there, best, now, number, refused,
-                    [id(one) for one in gate.near])
+                    [id(one) for one in gate.near], GIVES_WAY if other is not None else "" if more else ENOUGH)
     return Step(now, best, tuple(tried), screened, thresholds, trials, other)

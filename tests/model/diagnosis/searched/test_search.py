@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.searched import hypotheses
 from pipelines.model.diagnosis.searched import search as search_module
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.gate import Gate
-from pipelines.model.diagnosis.searched.ledger import Tried, ledger
+from pipelines.model.diagnosis.searched.ledger import ENOUGH, GIVES_WAY, Tried, ledger
 from pipelines.model.diagnosis.searched.search import provisional, search
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.rigid.body import Motion
@@ -183,6 +183,22 @@ def test_what_no_arm_could_have_moved_with_is_not_taken(waving: Case) -> None:
     trial = next(one for one in ledger([best.screened], [best.screened], without_twin([best.screened], 1e-9, np.ones(3)),
                                        [replace(best, believable=False)], None, best.done, 1))
     assert "could not have moved" in trial.reason
+
+
+def test_less_than_nothing_is_not_what_a_cause_explains(waving: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing was taken up it is told why: something explains more that nobody can name, or enough had been found. Where
+    something was, what lost to it is not told that it was accepted: whether it is named is another question."""
+    first = search(waving, 1).steps[0]
+    best = first.best
+    assert best is not None
+    bounds = without_twin([best.screened], 1e-9, np.ones(3))
+    (lost,) = ledger([best.screened], [best.screened], bounds, [replace(best, rank=best.rank + 0.01)], best, first.before, 1)
+    assert lost.reason == "explains less than the one that the search took up"
+    for reason, other, most in ((GIVES_WAY, first.screened[0], 1), (ENOUGH, None, 0)):
+        monkeypatch.setattr(search_module, "unnameable", lambda *_, other=other: other)
+        (step,) = search(waving, most).steps
+        told = {trial.reason for trial in step.trials if (trial.cause, trial.joint) == (best.effect.name, best.effect.joint)}
+        assert told == {reason}
 
 
 def test_what_was_found_at_a_joint_is_not_called_weaker_than_others(waving: Case) -> None:
