@@ -46,6 +46,7 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
     assert result.rejected[0].reason
     assert (result.accepted, outcome.exit_code) == (False, 1)
     assert "Stribeck friction at joint 2" in outcome.report.verdict
+    assert "Now: fitted without what it is extended by." in outcome.report.key_figures.caption
 
 
 def test_an_order_of_which_only_a_harmonic_is_there_is_refused_with_what_was_fitted(
