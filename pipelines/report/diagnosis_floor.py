@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.model.diagnosis.answered.loud import loud_joint
 from pipelines.model.diagnosis.result import Diagnosis, ResidualRms
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
@@ -30,7 +31,6 @@ _ORDER = 1.3  # times what an arm in order leaves: no further than that may an e
 # Times the floor, up to which the table calls an error in order, and times the noise, up to which nobody asks whether it is.
 _STAYS, _STAYS_ABOVE_NOISE = _ORDER, 10.0
 _LITTLE = 1.9  # the same: of 114 arms in order none left more
-_LOUD = 0.01  # of the rated torque: three times the noise of the test bench's drives at ten times their usual one
 _HELD_OUT_FLOOR = ("An arm in order is the fitted rigid body and friction, simulated in the held-out experiments with the noise of "
                    "these drives")
 _LEFT_IN_ORDER = "an arm in order leaves"
@@ -74,14 +74,11 @@ def above_in_order(found: Diagnosis) -> str:
 def loud_drives(noise: Array, rated: Sequence[float], units: Units = _TURNING) -> str:
     """" This holds only if its drives are as noisy as 0.35 N m at joint 3 …", where the noise that a twin was given, (joints,)
     [N m], is more than drives have: what shakes an arm, a gap say, is taken for noise, and raises the floor. Empty elsewhere."""
-    share = np.array([noise[j] / rated[j] if j < len(rated) and rated[j] > 0.0 else 0.0 for j in range(len(noise))])
-    share = np.nan_to_num(share, nan=0.0, posinf=0.0)
-    if not len(share) or share.max() <= _LOUD:
+    if (loud := loud_joint(noise, rated)) is None:
         return ""
-    j = int(share.argmax())
-    size = f"{format_number(float(noise[j]), 2)} {units.at(j + 1).torque}"
-    return (f" This holds only if its drives are as noisy as {size} at joint {j + 1}, "
-            f"{format_number(100.0 * float(share[j]), 2)} % of the rated torque: so much noise hides faults, and may be one; "
+    size = f"{format_number(loud.noise, 2)} {units.at(loud.joint).torque}"
+    return (f" This holds only if its drives are as noisy as {size} at joint {loud.joint}, "
+            f"{format_number(100.0 * loud.share, 2)} % of the rated torque: so much noise hides faults, and may be one; "
             "record reference logs while the arm is known to be in order, or frequency responses.")
 
 

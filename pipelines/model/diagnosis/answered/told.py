@@ -16,6 +16,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.log.shared_work import meanwhile
+from pipelines.model.diagnosis.answered.loud import only_if_loud
 from pipelines.model.diagnosis.answered.unbiased import unbiased
 from pipelines.model.diagnosis.answered.words import beside, how_much, taken_in, where
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
@@ -109,13 +110,15 @@ def _told(first: Responding, case: Case, done: Settled, responded: Judged, floor
     made = floored.calibration
     pictures = (evidence(plain, floored.rms, () if made is None else made.floors),) if chosen.evidence else ()
     arm = extended_arm(replace(found, final=responded.final), ruling)
+    robot, noise = arm.robot, np.full(len(floored.rms), np.nan) if made is None else made.noise
+    doubt = only_if_loud(noise, [joint.torque for joint in robot.joints], robot.revolute)
     standing = [one for one in case.beside if one not in first.held.acting]
     return Diagnosis(
-        ruling.verdict, sentence(ruling, named, arm.robot.revolute, plain.rms), named, (), rejected(found, ruling), (),
+        ruling.verdict, sentence(ruling, named, arm.robot.revolute, plain.rms, doubt), named, (), rejected(found, ruling), (),
         (*first.undecided, *hidden), rms[0], "what is wrong",
         "blocks" if judge is None else "logs", floored.origin, ruling.reason, rms[1],
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
-        0 if made is None else made.origin.replicas, np.full(len(floored.rms), np.nan) if made is None else made.noise, own,
+        0 if made is None else made.origin.replicas, noise, own,
         acted(plain.model.arm, standing), acted(arm, responded.acting), made,
         no_twin=floored.untold)
 
@@ -172,16 +175,18 @@ def limits_of(last: Step, case: Case, first: Responding, probed: Probed | None =
                       slight=case.thresholds is not None and case.changed is None)
 
 
-def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool], left: Array) -> str:
+def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool], left: Array,
+             doubt: str = "") -> str:
     """What a technician is told.
 
     Args:
         revolute: (joints,) which of them turn.
         left: (joints,) [N m] rms that the nominal model leaves of the logs it was fitted to.
+        doubt: on what "nothing wrong" hangs besides.
     """
     if ruling.verdict == "nothing-wrong":
         caveat = f": {ruling.reason}" if ruling.reason else ""
-        return f"Nothing is wrong with this arm, as far as these logs can tell{caveat}."
+        return f"Nothing is wrong with this arm, as far as these logs can tell{doubt}{caveat}."
     if ruling.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {ruling.reason}."
     first = named[0]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.model.diagnosis.answered.loud import only_if_loud
 from pipelines.model.diagnosis.answered.told import sentence
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.result import Value
@@ -45,3 +46,20 @@ def test_what_was_found_beside_is_named(others: int, words: str) -> None:
     named = (ripple, lag, hump, hump, hump)[:1 + others]
     assert sentence(Ruling("cause", (0,), ""), named, (True, True), np.array([0.3, 0.3])) == (
         f"Cogging at joint 1: 0.25 N m rms of torque{words}.")
+
+
+@pytest.mark.parametrize(("noise", "doubt"), [
+    (0.35, ", and if its drives are as noisy as 0.35 N m at joint 2 (2.3 % of the rated torque), which may be a fault"), (0.1, "")])
+def test_nothing_wrong_says_in_one_breath_where_only_loud_drives_would_leave_so_much(noise: float, doubt: str) -> None:
+    """A gap shakes its twin as well. Who reads the sentence alone is not told that all is well; nor is a healthy arm called ill."""
+    told = only_if_loud(np.array([0.1, noise]), (60.0, 15.0), (True, True))
+    assert told == doubt
+    assert sentence(Ruling("nothing-wrong", (), ""), (), (True, True), np.ones(2), told) == (
+        f"Nothing is wrong with this arm, as far as these logs can tell{doubt}.")
+
+
+def test_noise_that_nobody_knows_is_not_loud() -> None:
+    """Nor is any of a joint that is not rated; a slide's is a force."""
+    assert not only_if_loud(np.full(2, np.nan), (60.0, 15.0), (True, True))
+    assert not only_if_loud(np.full(2, 9.0), (np.inf, np.inf), (True, True))
+    assert " 9 N at joint 1 " in only_if_loud(np.full(1, 9.0), (60.0,), (False,))
