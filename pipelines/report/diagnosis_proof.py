@@ -31,7 +31,8 @@ def proof_figures(number: int, one: Finding, units: Units = _TURNING) -> Iterato
     if proof is None:
         return
     torque = units.at(proof.joint).torque
-    over = f"Residual of joint {proof.joint} over {proof.against}, {_DRAWN[_in_waves(proof)]}"
+    against = f"the time of {one.log}" if one.log else proof.against
+    over = f"Residual of joint {proof.joint} over {against}, {_DRAWN[_in_waves(proof)]}"
     yield Figure(f"proof-{number}", f"{over}: {_shown(proof, torque)}.",
                  lambda drawing: draw_proof(drawing.subplots(), proof, torque), (6.0, 3.2))
     yield Figure(f"proof-{number}-in-time", f"The same residual of joint {proof.joint} where the finding shows most, over time.",

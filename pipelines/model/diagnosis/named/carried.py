@@ -22,10 +22,10 @@ from pipelines.model.diagnosis.reference.absorbed import Absorbed
 from pipelines.model.diagnosis.result import Finding, ResidualRms
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.searched.beside import acted
-from pipelines.model.diagnosis.worth.evidence import proof
 from pipelines.model.diagnosis.worth.gains import Simulation, gain_of, no_nearer, simulation_errors, torque_gain_of, worse_log
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.diagnosis.worth.numbers import told
+from pipelines.model.diagnosis.worth.proof import proof
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["Carried", "carried", "unmoved"]

@@ -21,10 +21,10 @@ from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.searched.beside import Part
 from pipelines.model.diagnosis.searched.ledger import Tried
 from pipelines.model.diagnosis.searched.search import Found, Step
-from pipelines.model.diagnosis.worth.evidence import proof
 from pipelines.model.diagnosis.worth.gains import Simulation, worse_log
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.diagnosis.worth.numbers import acting, parameters, told
+from pipelines.model.diagnosis.worth.proof import proof
 
 __all__ = ["Causes", "agreement", "extended_arm", "findings", "held_finding", "rejected", "unlike"]
 
@@ -114,7 +114,7 @@ def _finding(found: Found, step: Step, best: Tried, place: int, models: tuple[Re
     origin: Literal["residual", "reversals"] = "reversals" if effect.evidence == "reversals" else "residual"
     return Finding(effect.name, effect.joint, effect.title, numbers, taken, best.visibility, rivals,
                    effect.experiment if rivals else None, gain, origin, size, of_rated,
-                   proof(*models, effect.joint) if draw else None,
+                   proof(*models, effect.joint, None if log is None else log - data.first) if draw else None,
                    log=None if log is None else data.logs[log - data.first].log.name)
 
 

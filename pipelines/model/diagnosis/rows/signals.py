@@ -68,10 +68,10 @@ def _travel(one: LogData, joint: int) -> Array:
     return np.asarray(one.at_rows(q - q[begin[which]]))
 
 
-def binned(x: Array, y: Array, bins: int = _BINS) -> Binned:
-    """`y` over `x`, in bins of equal count."""
+def binned(x: Array, y: Array, bins: int = _BINS, least: int = 4) -> Binned:
+    """`y` over `x`, in bins of equal count, of `least` rows or more."""
     order = np.argsort(x, kind="stable")
-    edges = np.linspace(0, len(x), min(bins, max(1, len(x) // 4)) + 1).astype(int)
+    edges = np.linspace(0, len(x), min(bins, max(1, len(x) // least)) + 1).astype(int)
     first, count = edges[:-1], np.diff(edges).astype(np.float64)
     mean_x, mean, square = (np.add.reduceat(values[order], first) / count for values in (x, y, y**2))
     return Binned(mean_x, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), count)

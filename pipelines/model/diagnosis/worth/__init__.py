@@ -1,7 +1,9 @@
 """Numbers and proof of a cause, and what it is worth on what was held out.
 
     numbers         its numbers and how sure they are
-    evidence        the picture of what is wrong, and the figure that proves a finding
+    evidence        the picture of what is wrong
+    orders          amplitudes over the orders of a joint's angle, as far as its range tells them apart
+    proof           the figure that proves a finding
     held_out        what a model leaves of rows that it was not fitted to
     extrapolated    what it may leave of other motion because its numbers are not known better
     gains           what a finding is worth: torque, simulated position, tip

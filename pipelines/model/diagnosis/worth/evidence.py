@@ -1,7 +1,6 @@
-"""The picture of what is wrong, before any name, and the figure that proves a finding.
+"""The picture of what is wrong, before any name.
 
     evidence(data, left, ...)       the residual over time, and against all that it may depend on
-    proof(before, after, joint)     before and after, over the signal that the cause depends on
 """
 
 from __future__ import annotations
@@ -13,18 +12,15 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.calibration import Floors
-from pipelines.model.diagnosis.result import Curve, Evidence, Proof, Spectrum
+from pipelines.model.diagnosis.result import Curve, Evidence, Spectrum
 from pipelines.model.diagnosis.rows.data import Data, LogData
 from pipelines.model.diagnosis.rows.signals import binned, signals
+from pipelines.model.diagnosis.worth.orders import amplitudes, least_order
 from pipelines.signal.spectra import welch
 
-__all__ = ["evidence", "floors_of", "proof"]
+__all__ = ["evidence", "floors_of", "over_frequency"]
 
 _POINTS = 3000  # of a series
-_AS_MUCH = 0.9  # of what a part tells over time
-_FINE = 96  # bins of a proof: a wave of order 18 over half a turn has ten of them a period
-_TELLS = 0.2  # of the predicted part, that it is in its means over a signal: what less tells, no signal does
-_STRETCH = 2.0  # [s] of a proof in time
 _SEGMENT = 512  # rows of a spectrum
 _MOST = 0.8  # of the excess that the band holds
 _ORDERS = np.arange(0.5, 80.25, 0.25)
@@ -81,19 +77,21 @@ def _spectra(data: Data, left: Array, joint: int, floor: Floors | None) -> list[
     if own is not None:
         beside = None if floor is None or floor.frequency is None or len(floor.frequency) != len(own[0]) else floor.frequency
         found.append(Spectrum(joint + 1, "frequency", "Hz", own[0], own[1], beside))
-    orders = _orders(data, left, joint)
-    below = None if floor is None else floor.orders
-    found.append(Spectrum(joint + 1, "order", "1/rev" if turning else "1/(2 pi m)", _ORDERS, orders, below))
+    told = least_order(_angle(data, joint)) <= _ORDERS
+    if told.any():
+        below = None if floor is None else floor.orders[told]
+        found.append(Spectrum(joint + 1, "order", "1/rev" if turning else "1/(2 pi m)", _ORDERS[told],
+                              _orders(data, left, joint)[told], below))
     return found
 
 
 def _frequency(data: Data, left: Array, joint: int) -> tuple[Array, Array] | None:
     """Frequencies [Hz] and amplitudes [N m] of bins, of the longest log."""
     parts = [(one, x[joint]) for one, x in zip(data.logs, data.split(left), strict=True)]
-    return _amplitudes(*max(parts, key=lambda part: len(part[1])))
+    return over_frequency(*max(parts, key=lambda part: len(part[1])))
 
 
-def _amplitudes(one: LogData, x: Array) -> tuple[Array, Array] | None:
+def over_frequency(one: LogData, x: Array) -> tuple[Array, Array] | None:
     """Frequencies [Hz] and amplitudes of bins, whose squares add up to the mean square of x (rows,); None of too short a log."""
     if len(x) < 64:
         return None
@@ -105,9 +103,12 @@ def _amplitudes(one: LogData, x: Array) -> tuple[Array, Array] | None:
 
 def _orders(data: Data, left: Array, joint: int) -> Array:
     """(orders,) [N m] amplitude of each wave along the turn."""
-    q = np.concatenate([one.at_rows(one.motion.q)[:, joint] for one in data.logs])
-    own = left[data.joint == joint]
-    return np.array([2.0 * abs(np.mean(own * np.exp(-1j * k * q))) for k in _ORDERS.tolist()])
+    return amplitudes(_angle(data, joint), left[data.joint == joint], _ORDERS)
+
+
+def _angle(data: Data, joint: int) -> Array:
+    """(rows of the joint,) [rad] or [m]"""
+    return np.concatenate([one.at_rows(one.motion.q)[:, joint] for one in data.logs])
 
 
 def _bands(spectra: list[Spectrum], joints: int) -> Array:
@@ -121,56 +122,3 @@ def _bands(spectra: list[Spectrum], joints: int) -> Array:
             low, high = np.searchsorted(total, (0.5 - 0.5 * _MOST, 0.5 + 0.5 * _MOST))
             out[one.joint - 1] = one.x[min(low, len(one.x) - 1)], one.x[min(high, len(one.x) - 1)]
     return out
-
-
-def proof(before: Refined, after: Refined, joint: int | None) -> Proof:
-    """Over the signal that tells the predicted part best, of the joint that shows most of it; over frequency where none does:
-    what a resonance adds is nowhere alike along an angle or a speed."""
-    data = before.data
-    predicted = before.left - after.left
-    shown = joint - 1 if joint is not None else int(np.argmax(data.rms(predicted) / before.rms))
-    own = data.joint == shown
-    parts = [x[own] for x in (before.left, after.left, predicted)]
-
-    def told(values: Array) -> float:
-        means = binned(values, parts[2])
-        return float(np.sum(means.count * means.mean**2))
-
-    every = {signal: told(signal.values) for signal in signals(data, shown, data.y - before.left)}
-    best = max(every, key=lambda signal: every[signal])
-    # In a log that goes once through its range anything is told over time, which says when and not by what.
-    other = max((signal for signal in every if signal.name != "time"), key=lambda signal: every[signal])
-    best = other if every[other] >= _AS_MUCH * every[best] else best
-    t, rows = _stretch(data, shown, parts[2])
-    if every[best] < _TELLS * float(parts[2] @ parts[2]):
-        lines = _lines(data, shown, (before.left, after.left, predicted))
-        if lines:
-            (hertz, without), (_, left), (_, alone) = lines
-            return Proof(shown + 1, "frequency", "Hz", hertz, without, left, alone, np.zeros(len(hertz)), t,
-                         *(part[rows] for part in parts))
-    b, a, p = (binned(best.values, x, _FINE) for x in parts)
-    return Proof(shown + 1, best.name, best.unit, b.x, b.mean, a.mean, p.mean, b.spread / np.sqrt(b.count), t,
-                 *(part[rows] for part in parts))
-
-
-def _lines(data: Data, joint: int, three: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
-    """Frequencies and amplitudes of each of the three, of the log that shows most of the last; empty of too short a one."""
-    split = [list(data.split(x)) for x in three]
-    place = max(range(len(data.logs)), key=lambda k: float(np.sum(np.square(split[2][k][joint]))))
-    found = [_amplitudes(data.logs[place], parts[place][joint]) for parts in split]
-    return [one for one in found if one is not None]
-
-
-def _stretch(data: Data, joint: int, predicted: Array) -> tuple[Array, slice]:
-    """Time and rows of the stretch in which the predicted part varies most."""
-    first, best, found = 0, -1.0, slice(0, 0)
-    times = np.concatenate([one.t for one in data.logs])
-    for one in data.logs:
-        step = float(np.median(np.diff(one.t))) if one.rows > 1 else 1.0
-        size = max(2, min(one.rows, round(_STRETCH / step)))
-        for start in range(first, first + one.rows - size + 1, max(1, size // 2)):
-            power = float(np.var(predicted[start:start + size]))  # a joint at rest shows a constant, which proves nothing
-            if power > best:
-                best, found = power, slice(start, start + size)
-        first += one.rows
-    return times[found], found

@@ -15,7 +15,8 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import refine
-from pipelines.model.diagnosis.worth.evidence import proof
+from pipelines.model.diagnosis.rows.signals import binned
+from pipelines.model.diagnosis.worth.proof import _fine_enough, proof
 from pipelines.report.diagnosis_proof import proof_figures
 from tests.model.diagnosis.screened.test_through import turned
 from tests.model.diagnosis.searched.test_whole_orders import searched
@@ -53,3 +54,41 @@ def test_what_rings_is_shown_over_frequency() -> None:
     size = re.search(r"amplitudes in the log .*: ([0-9.]+) N m rms without", caption)
     assert size is not None
     assert float(size[1]) == pytest.approx(float(before.rms[0]), rel=0.1)
+
+
+def test_a_wave_has_eight_bins_a_period() -> None:
+    """Of 15 periods in 300 rows, at uneven angles: bins of four rows are five a period, and cut its peaks."""
+    rng = np.random.default_rng(20261127)
+    q = np.sort(rng.uniform(0.0, 5.2, 300))
+    wave = np.sin(18.0 * q)
+    assert _fine_enough(q, wave) >= 8 * 15
+    assert np.abs(binned(q, wave, _fine_enough(q, wave), 2).mean).max() > 0.95
+    assert _fine_enough(np.sort(rng.uniform(0.0, 5.2, 6000)), np.sin(36.0 * q.repeat(20))) >= 8 * 30
+
+
+def test_what_scatters_makes_no_bins_finer() -> None:
+    """Nor does what is alike all over: fewer rows a bin would show chance."""
+    rng = np.random.default_rng(20261128)
+    q = np.sort(rng.uniform(0.0, 5.2, 4000))
+    assert _fine_enough(q, np.sin(q) + rng.standard_normal(len(q))) == 96
+    assert _fine_enough(q[:300], np.ones(300)) == 75
+
+
+def test_what_happened_once_is_shown_over_the_time_of_its_log() -> None:
+    """A blow of a tenth of a second in one of two logs, as high as it was and when it was: other logs say nothing of it, and an
+    angle even less."""
+    log = turned(1, {}, 0.0)
+    prepared = prepare(Logs((log, replace(log, name="again"))), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    before = refine(Exact.start(columns, fit), prepared.data, fit.weight)
+    first, second = prepared.data.logs
+    when = float(second.t[second.rows // 3])
+    blow = np.where(np.abs(second.t - when) < 0.05, 3.0, 0.0)
+    after: Any = SimpleNamespace(left=before.left - np.concatenate([np.zeros(first.rows), blow]))
+    shown = proof(before, after, 1, 1)
+    assert (shown.against, shown.unit) == ("time", "s")
+    assert shown.predicted.max() > 2.7
+    assert abs(shown.x[np.argmax(shown.predicted)] - when) < 0.1
+    assert shown.x[-1] <= second.t[-1]
+    caption = next(proof_figures(1, replace(found("contact"), proof=shown, log="again"))).caption
+    assert caption.startswith("Residual of joint 1 over the time of again, means in bins: ")
