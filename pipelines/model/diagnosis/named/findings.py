@@ -114,7 +114,8 @@ def _finding(found: Found, step: Step, best: Tried, place: int, models: tuple[Re
     origin: Literal["residual", "reversals"] = "reversals" if effect.evidence == "reversals" else "residual"
     return Finding(effect.name, effect.joint, effect.title, numbers, taken, best.visibility, rivals,
                    effect.experiment if rivals else None, gain, origin, size, of_rated,
-                   proof(*models, effect.joint, None if log is None else log - data.first) if draw else None,
+                   proof(*models, effect.joint, None if log is None else log - data.first, best.screened.family.event)
+                   if draw else None,
                    log=None if log is None else data.logs[log - data.first].log.name)
 
 

@@ -1,6 +1,6 @@
 """The figure that proves a finding: the residual before and after, over the signal that the cause depends on.
 
-    proof(before, after, joint, log)     of the joint that shows most of it; `log`: in which it happened, where it happened once
+    proof(before, after, joint, …)     of the joint that shows most of it
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ _TELLS = 0.2  # of the predicted part, that it is in its means over a signal: wh
 _STRETCH = 2.0  # [s] of a proof in time
 
 
-def proof(before: Refined, after: Refined, joint: int | None, log: int | None = None) -> Proof:
+def proof(before: Refined, after: Refined, joint: int | None, log: int | None = None, event: bool = False) -> Proof:
     """Over the signal that tells the predicted part best, of the joint that shows most of it; over frequency where none does:
-    what a resonance adds is nowhere alike along an angle or a speed. What happened once is over the time of its log.
+    what a resonance adds is nowhere alike along an angle or a speed. What happened once is over the time of its log, an event that
+    comes in every log over that of all.
 
     Args:
-        log: place of the log it happened in, among those of the rows.
+        log: place of the log it happened in, among those of the rows; `event`: whether it happened.
     """
     data = before.data
     predicted = before.left - after.left
@@ -51,7 +52,9 @@ def proof(before: Refined, after: Refined, joint: int | None, log: int | None = 
     # In a log that goes once through its range anything is told over time, which says when and not by what.
     other = max((signal for signal in every if signal.name != "time"), key=lambda signal: every[signal])
     best = other if every[other] >= _AS_MUCH * every[best] else best
-    if every[best] < _TELLS * float(parts[2] @ parts[2]):
+    if event:
+        best = next(signal for signal in every if signal.name == "time")
+    elif every[best] < _TELLS * float(parts[2] @ parts[2]):
         lines = _lines(data, shown, (before.left, after.left, predicted))
         if lines:
             (hertz, without), (_, left), (_, alone) = lines

@@ -92,3 +92,6 @@ def test_what_happened_once_is_shown_over_the_time_of_its_log() -> None:
     assert shown.x[-1] <= second.t[-1]
     caption = next(proof_figures(1, replace(found("contact"), proof=shown, log="again"))).caption
     assert caption.startswith("Residual of joint 1 over the time of again, means in bins: ")
+    angle: Any = SimpleNamespace(left=before.left - np.tile(np.where(first.at_rows(first.motion.q)[:, 0] > 9.0, 1.0, 0.0), 2))
+    assert proof(before, angle, 1).against == "position"
+    assert proof(before, angle, 1, event=True).against == "time"
