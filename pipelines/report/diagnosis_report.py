@@ -209,9 +209,11 @@ def _others(result: Result) -> list[Section]:
         more = len(result.ledger) - len(rows)
         text = (f"{more} more, all weaker, stand in result.json.",) if more > 0 else ()
         sections.append(Section("Ledger of hypotheses", text, (Table(
-            ("search", "cause", "joint", "gain [%]", "threshold [%]", "gain, fitted exactly [%]", "visibility", "outcome"), rows,
-            "Share of the squared residual that each takes away on held-out time; what does not exceed its threshold is not "
-            f"believed. {_OUT_OF_REACH} So is that of a cause that takes next to nothing: none was worked out."
+            ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]", "visibility",
+             "outcome"), rows,
+            "Gain in square: share of the squared residual of the fitted logs that each takes away; what does not exceed its "
+            f"threshold is not believed, nor what time held out does not bear out. {_OUT_OF_REACH} "
+            "So is that of a cause that takes next to nothing: none was worked out."
             f"{_alike(len(result.residual_rms.identify))}{of_moved(shown)}", tones),)))
     return sections
 

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 
 from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
+from pipelines.model.diagnosis.floor.thresholds import OF_THE_RESIDUAL, SHARE
+from pipelines.model.diagnosis.floor.wide import TIMES
 from pipelines.model.effects import find_effect
 from pipelines.model.estimation.result import Result as Estimated
 
@@ -49,7 +51,18 @@ def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
 
 def threshold_words(result: Diagnosed) -> str:
     """Of diagnose: what says how much of a cause an arm in order shows, and whether an earlier diagnosis had found it."""
-    origins = " and ".join(sorted({one.origin for one in result.thresholds})) or "nothing"
+    origins = sorted({one.origin for one in result.thresholds})
+    told = "; ".join(map(_by, origins)) or "none, for no cause was looked for"
     if result.calibrated_with:
-        return f"Thresholds: {origins}. An earlier diagnosis has stored them, of {', '.join(result.calibrated_with)}."
-    return f"Thresholds: {origins}, made here; --calibration DIR takes those of an earlier diagnosis."
+        return f"Thresholds: {told}. An earlier diagnosis has stored them, of {', '.join(result.calibrated_with)}."
+    return f"Thresholds: {told}. They were made here; --calibration DIR takes those of an earlier diagnosis."
+
+
+def _by(origin: str) -> str:
+    """What a cause has to take off, by where that comes from."""
+    if origin == OF_THE_RESIDUAL:
+        return (f"a cause has to take {100.0 * SHARE:g} % off the mean square of the residual, all joints together, each in units "
+                "of its own rms: a fixed number, for nothing here tells what an arm in order would show; and time that it was not "
+                "chosen by has to bear it out")
+    return (f"a cause has to take off {TIMES:g} times what it, or its like, takes off by chance where nothing is wrong, by "
+            f"{origin}")

@@ -143,10 +143,11 @@ def ledger_section(groups: Sequence[tuple[str, tuple[Line, ...]]]) -> Section | 
             errors = [next(rounded) if j < len(line.rms) else None for j in range(joints)]
             rows.append((*((name,) if several else ()), line.step, *errors, _rounded(line.gain), _judged(line), _tip(line)))
             tones.append("attention" if line.sure is False else "good" if line.sure else "neutral")
-    heads = (*(("logs",) if several else ()), "step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain [%]", "beyond chance",
-             "simulated tip [mm]")
-    text = ("Torque error on what nothing was fitted to, root mean square, with each step of the model. A gain is that of all "
-            "joints together over the line it builds on.", _compared(told), *_simulated(told))
+    heads = (*(("logs",) if several else ()), "step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain in rms [%]",
+             "beyond chance", "simulated tip [mm]")
+    text = ("Torque error on what nothing was fitted to, root mean square, with each step of the model. A gain is the "
+            "share of that error, all joints together, that a step takes off the line it builds on. The ledger of hypotheses tells "
+            "it in the square, of the fitted logs: half the error is 50 % here and 75 % there.", _compared(told), *_simulated(told))
     return Section("Ledger: what every step brings on held-out logs", text, (Table(heads, tuple(rows), tones=tuple(tones)),),
                    tuple(_picture(name, lines, several) for name, lines in told))
 

@@ -159,6 +159,9 @@ def test_a_threshold_that_nothing_can_exceed_is_no_figure() -> None:
         table = tables[title]
         assert [row[table.columns.index(heading)] for row in table.rows] == [5.0, None]
         assert "above 100 % is told as a dash" in table.caption
+    ledger = tables["Ledger of hypotheses"]
+    assert {"gain in square [%]", "gain in square, fitted exactly [%]"} <= set(ledger.columns)
+    assert "squared residual of the fitted logs" in ledger.caption
 
 
 def test_any_number_of_waves_has_words() -> None:

@@ -112,6 +112,14 @@ def test_no_line_joins_the_steps_of_two_stages() -> None:
         assert joined == [(k - 1, k) for k in range(1, len(lines)) if lines[k].stage == lines[k - 1].stage]
 
 
+def test_what_a_gain_is_a_share_of_stands_above_it() -> None:
+    """Of the error here, of its square in the ledger of hypotheses: a reader lays the two side by side."""
+    section = ledger_section([("", ledger_lines(told(RIPPLE)))])
+    assert section is not None
+    assert "gain in rms [%]" in section.tables[0].columns
+    assert "in the square" in section.text[0]
+
+
 def test_the_ledger_writes_the_tip_as_the_verdict_does() -> None:
     """0.125 mm is 0.125 mm in every line, not 0.13 in one and 0.12 in the next."""
     tips = dataclasses.replace(RIPPLE.gain, tip_error_rms=TipError(1.2509e-4, 1.86e-5))

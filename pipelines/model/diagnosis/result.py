@@ -202,7 +202,7 @@ class Trial:
     step: int  # from 1: the search for the first, second … finding
     cause: str
     joint: int | None
-    gain: float  # share of the squared weighted residual that it takes away, held out; of base parameters that have moved, of
+    gain: float  # share of the squared weighted residual that it takes away, fitted; of base parameters that have moved, of
     # what one set of them for before and after leaves more
     threshold: float  # that it had to exceed
     visibility: float

@@ -20,9 +20,10 @@ from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.candidates import Family, lay_family
 from pipelines.model.diagnosis.screened.screen import Screened, screen
 
-__all__ = ["Thresholds", "without_twin"]
+__all__ = ["OF_THE_RESIDUAL", "SHARE", "Thresholds", "without_twin"]
 
-_SHARE = 0.02  # of the squared weighted residual of one joint: what is less is no finding, whatever the twin says
+OF_THE_RESIDUAL = "a share of the residual"  # an origin: nobody knows what an arm in order shows
+SHARE = 0.02  # of the squared residual of all joints together, each in units of its own: what is less is no finding then
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,5 +80,5 @@ def _on_several(data: Data, families: Sequence[Family], arm: Arm) -> Iterator[in
 
 def without_twin(found: Sequence[Screened], power: float, weight: Array) -> Thresholds:
     """Where nothing can be simulated: a share of the residual."""
-    gain = np.full(len(found), _SHARE * power)
-    return Thresholds(gain, np.zeros(len(found)), "a share of the residual", weight, tuple(one.joint for one in found))
+    gain = np.full(len(found), SHARE * power)
+    return Thresholds(gain, np.zeros(len(found)), OF_THE_RESIDUAL, weight, tuple(one.joint for one in found))
