@@ -22,13 +22,13 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, RrridError, clean
-from pipelines.log.atomic import environment_faults, remove_folder, replace_folder, staging_place, write_file
+from pipelines.log.atomic import environment_faults, remove_folder, staging_place, write_file
+from pipelines.log.earlier import Coming, put_in_place
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, expanded, hash_file
 from pipelines.log.inputs import Inputs, Rejected, Request, read_by_role, read_logs
 from pipelines.log.mixed import check_alike, of_one_session
 from pipelines.log.places import (
-    free_name,
     given_names,
     holds_apart,
     keep_apart,
@@ -189,26 +189,14 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
             _fill(staging, stage, result, report, object_, series, request, hashes)
             _unchanged(hashes)
             _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
-            moved = _replaced(staging, out, stage.spare(result, out), request)
+            moved = put_in_place(staging, out, Coming(stage.name, request.out is not None, request.force,
+                                                      _data_of(inputs, hashes), stage.spare(result, out)))
     except EnvironmentFault as problem:
         problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
         raise
     finally:
         remove_folder(staging)
     return Outcome(result, object_, report, out, stage.exit_code(result, request.check), (*moved, *renamed(checks, names)))
-
-
-def _replaced(staging: Path, out: Path, of: tuple[str, ...], request: Request) -> tuple[Check, ...]:
-    """`staging` takes the place of `out`. C05: an earlier output `of` something that this one does not make anew is not lost: by
-    default it is moved beside `out` as a whole. Where the user has named the folder, it is replaced as asked, and that is said."""
-    if not of or request.out is not None:
-        replace_folder(staging, out)
-        return (Check.of("C05", "warn", f"the earlier model there, with {', '.join(of)}, was replaced", where=out,
-                         remedy="give every model an --out of its own to keep them all"),) if of else ()
-    aside = free_name(out.with_name(slug(f"{out.name}-{'-'.join(of).replace(':', '-')}")))
-    replace_folder(staging, out, aside)
-    return (Check.of("C05", "warn", f"the earlier model there, with {', '.join(of)}, is kept: its whole output was moved to "
-                     f"{aside}", where=out, remedy="look there for it, or choose folders with --out"),)
 
 
 def _remade(changed: Iterable[str]) -> Iterable[Check]:
@@ -249,6 +237,12 @@ def _hashes(sources: Iterable[Path], known: Mapping[Path, str]) -> dict[Path, st
     """The hash of every readable source: of the very bytes that were read, where the reader took it."""
     readable = [path for path in sources if path in known or (path.is_file() and os.access(path, os.R_OK))]
     return {path: known[path] if path in known else hash_file(path) for path in readable}
+
+
+def _data_of(inputs: Inputs, hashes: Mapping[Path, str]) -> frozenset[str]:
+    """The hashes of the logs; of who reads none, an import say, those of all that it reads."""
+    logs = [*(opened.path for opened in inputs.logs), *(rejected.path for rejected in inputs.rejected)]
+    return frozenset(hashes[path] for path in logs or inputs.sources if path in hashes)
 
 
 def _unchanged(hashes: dict[Path, str]) -> None:

@@ -73,6 +73,7 @@ def test_each_has_the_result_that_it_has_alone(two_arms: Path, tmp_path: Path) -
     for _ in range(2):
         done = rrrid("estimate-bps", "logs", "--out", "out", *QUICK, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
+        assert "C05" not in done.stdout
         assert "Logs of several robots: arm-a (arm-a-excitation-1.h5, arm-a-excitation-2.h5); arm-b" in done.stdout
         for arm in ("arm-a", "arm-b"):
             there, alone = (json.loads((tmp_path / place / "result.json").read_text()) for place in (f"out/{arm}", f"alone-{arm}"))

@@ -17,8 +17,8 @@ from typing import Any
 from pipelines.errors import EnvironmentFault, UsageError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 
-__all__ = ["free_name", "given_names", "holds_apart", "keep_apart", "refuse_foreign", "refuse_unwritable", "renamed",
-           "short_names", "slug", "tilde", "told_apart", "written_by"]
+__all__ = ["free_name", "given_names", "holds_apart", "keep_apart", "provenance_of", "refuse_foreign", "refuse_unwritable",
+           "renamed", "short_names", "slug", "tilde", "told_apart", "written_by"]
 
 _MOST_APART = 1000  # outputs in one folder
 _ELSEWHERE = "choose another folder with --out"
@@ -58,7 +58,7 @@ def refuse_foreign(out: Path, force: bool = False, remade: Callable[[str], bool]
     if not out.exists() or not any(out.iterdir()):
         return ()
     try:
-        ours: dict[str, object] = dict(_provenance(out)["outputs"])
+        ours: dict[str, object] = dict(provenance_of(out)["outputs"])
     except (KeyError, TypeError, ValueError):
         ours = {}
     if ours and force:
@@ -119,10 +119,10 @@ def holds_apart(folder: Path, command: str) -> bool:
 
 def written_by(folder: Path) -> str:
     """The command of rrrid whose output `folder` is; "" where it is none."""
-    return str(_provenance(folder).get("command", ""))
+    return str(provenance_of(folder).get("command", ""))
 
 
-def _provenance(folder: Path) -> dict[str, Any]:
+def provenance_of(folder: Path) -> dict[str, Any]:
     """The provenance.json of rrrid's own output in `folder`; empty where there is none."""
     try:
         about = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
