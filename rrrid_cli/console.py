@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pipelines.report.report import Report, Table
     from pipelines.stage import Outcome
 
-__all__ = ["Teller", "say_error", "say_outcome", "say_table", "say_verdict"]
+__all__ = ["Teller", "say_checks", "say_error", "say_outcome", "say_table", "say_verdict"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
 _MOST = 12  # remarks
@@ -108,7 +108,7 @@ def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: b
         _say_table(outcome.report.key_figures, stream)
     for line in outcome.report.basis:
         print(f"  {clean(line, 400)}", file=stream)
-    _say_checks(outcome.checks, verbose, stream)
+    say_checks(outcome.checks, verbose, stream)
     report = outcome.folder / "report.html"
     print(f"→ {report if report.exists() else outcome.folder}", file=stream)
 
@@ -168,12 +168,15 @@ def _heading(words: str, width: int, tight: bool) -> list[str]:
     return [*textwrap.wrap(name, width, break_long_words=False), *units]
 
 
-def _say_checks(checks: Iterable[Check], verbose: bool, stream: Any) -> None:
-    """What was found, what explains the most first; what differs in numbers alone, of several joints or logs, once."""
+def say_checks(checks: Iterable[Check], verbose: bool = False, stream: Any = None) -> None:
+    """What was found, what explains the most first; what differs in numbers alone, of several joints or logs, once.
+
+    Before all of it where an earlier result lies now: no report has that.
+    """
     from pipelines.log.codes import first_to_read
 
     alike: dict[tuple[str, str], list[Check]] = {}
-    for check in sorted(dict.fromkeys(checks), key=first_to_read):
+    for check in sorted(dict.fromkeys(checks), key=lambda check: (check.code != "RRID-C05", *first_to_read(check))):
         if verbose or check.level != "ok":
             alike.setdefault((check.code, _NUMBERS.sub("#", check.message)), []).append(check)
     for group in list(alike.values())[:_MOST]:

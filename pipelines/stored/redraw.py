@@ -14,8 +14,9 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from pipelines import __version__
-from pipelines.errors import InputRejected, RrridError, UsageError
+from pipelines.errors import Check, InputRejected, RrridError, UsageError
 from pipelines.log.atomic import environment_faults, replace_folder, staging_folder
+from pipelines.log.earlier import Coming, put_in_place
 from pipelines.log.files import PROVENANCE, hash_file
 from pipelines.log.places import keep_apart, refuse_foreign, tilde
 from pipelines.log.results import decode, json_text, read_foreign_series
@@ -31,8 +32,8 @@ __all__ = ["redraw"]
 _AGAIN = "run the command again"
 
 
-def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[Report, Path]:
-    """Draw the report of the result in `folder`, there or in `out`; the report, and where it lies.
+def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[Report, Path, tuple[Check, ...]]:
+    """Draw the report of the result in `folder`, there or in `out`; the report, where it lies, and what was moved aside for it.
 
     Raises:
         UsageError: C04, no result there; C02, a result that has no report of its own; C05, files that rrrid did not write.
@@ -61,10 +62,12 @@ def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[
             "outputs": outputs}
         with environment_faults(staging):
             (staging / PROVENANCE).write_text(json_text(tilde(told)), encoding="utf-8")
-        replace_folder(staging, target)
+        if out is not None:
+            return report, out, put_in_place(staging, out, Coming("report", named=True, force=force))
+        replace_folder(staging, home)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-    return report, target
+    return report, home, ()
 
 
 def _report(stored: StoredResult) -> Report:

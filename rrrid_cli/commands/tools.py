@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.errors import EnvironmentFault, UsageError, did_you_mean
+from pipelines.errors import Check, EnvironmentFault, UsageError, did_you_mean
 from rrrid_cli.commands.application import STAGES, app, go
 from rrrid_cli.options import Common, StageCommand, with_common_but
 
@@ -37,8 +37,9 @@ def compare(
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a command has left.", show_default=False,
                                            readable=False)],
-    out: Annotated[Path | None, typer.Option(readable=False, help="Folder for the report. [DIR itself]")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the report even where it was changed.")] = False,
+    out: Annotated[Path | None, typer.Option(
+        readable=False, help="Folder for the report; another command's result there is kept beside it. [DIR itself]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the report even where it was changed; keep nothing in --out.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
 ) -> None:
@@ -47,17 +48,19 @@ def report(
     from pipelines.stored.redraw import redraw
 
     del debug  # `entry` looks for it
+    checks: tuple[Check, ...] = ()
     home, target = folder.absolute(), None if out is None else out.absolute()
     if home.is_dir() and read_result(home).command == "batch":
         from pipelines.batch.redraw import redraw_batch
 
         drawn = redraw_batch(home, target)
     else:
-        drawn, _ = redraw(home, target, force)
+        drawn, _, checks = redraw(home, target, force)
     if not quiet:
-        from rrrid_cli.console import say_verdict
+        from rrrid_cli.console import say_checks, say_verdict
 
         say_verdict(drawn)
+        say_checks(checks)
         print(f"→ {(out or folder) / 'report.html'}")
 
 

@@ -67,6 +67,7 @@ def demo(
     from pipelines import demo as recording
     from pipelines import run as workflow
     from pipelines.stage import refuse_foreign, run_stage
+    from rrrid_cli.console import say_checks
 
     out = common.out or Path("demo")
     refuse_foreign(out / "run", common.force, workflow.STAGE.remakes)  # before the arm is simulated
@@ -78,6 +79,7 @@ def demo(
     if not common.quiet:
         print(f"Simulated {len(recorded.result.logs)} logs into {out / 'recording/logs'}; now: rrrid run {out / 'recording'}",
               file=sys.stderr)
+        say_checks((check for check in recorded.checks if check.code == "RRID-C05"), stream=sys.stderr)
     hidden, stream = recording.hidden(recorded.result), sys.stderr if common.json else sys.stdout
     try:
         outcome = done(workflow.STAGE, (out / "recording",), replace(common, out=out / "run"), {})

@@ -10,7 +10,7 @@ import pytest
 from pipelines.errors import Check
 from pipelines.report.report import Report, Table
 from pipelines.stage import Outcome
-from rrrid_cli.console import Teller, _say_checks, say_outcome, say_table
+from rrrid_cli.console import Teller, say_checks, say_outcome, say_table
 
 TABLE = Table(("joint", "held-out torque error now [N m]", "cause"),
               ((1, 0.08783, "cogging"), (2, 1.2, "–"), (3, None, "no cause")))
@@ -84,7 +84,7 @@ def test_one_finding_of_several_logs_is_told_once(capsys: pytest.CaptureFixture[
     wide = [Check.of("S07", "reject", f"q of joint {j} is in degrees", where=f"{name}.h5, signal q, joint {j}", remedy="do it")
             for name in "ab" for j in (1, 2)]
     lost = [Check.of("D09", "warn", f"p{j} cannot be told", where="a.h5") for j in (1, 2)]
-    _say_checks([Check.of("F05", "warn", "no integrity data", where="a.h5"), *late, *lost, *wide], False, None)
+    say_checks([Check.of("F05", "warn", "no integrity data", where="a.h5"), *late, *lost, *wide], False, None)
     assert capsys.readouterr().out.splitlines() == [
         "  x RRID-S07 a.h5, signal q, joint 1: q of joint 1 is in degrees (do it)",
         "      alike 4 times in all, in a.h5, b.h5; joints 1, 2",

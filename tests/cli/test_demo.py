@@ -15,10 +15,12 @@ import numpy as np
 import pytest
 
 from pipelines import demo
+from pipelines.log.files import write_log
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Value
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.simulation.example import FAULT, example_arm, example_session
 from tests.cli.commands import REPO, rrrid
+from tests.log.logs import small_log
 
 QUICK = ("--no-report", "--set", 'run.skip=["fit-friction", "estimate-bps", "validate-writing", "frf", "diagnose", "extend"]')
 
@@ -47,6 +49,19 @@ def test_logs_and_what_was_hidden(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "demo/run/result.json").read_text())["stages"][0]["name"] == "inspect"
     refused = rrrid("demo", *QUICK, "--fault", "quadratic_dog:3", cwd=tmp_path)
     assert (refused.returncode, "quadratic_drag" in refused.stderr) == (2, True)
+
+
+@pytest.mark.row("C05")
+def test_what_was_put_in_its_place_is_kept(tmp_path: Path) -> None:
+    """Another command's result lies where the logs shall: it is moved aside, and that is said, though recording has no page."""
+    write_log(tmp_path / "a.h5", small_log())
+    assert rrrid("convert", "a.h5", "--out", "demo/recording", "--no-report", cwd=tmp_path).returncode == 0
+    done = rrrid("demo", *QUICK, cwd=tmp_path)
+    assert "the earlier result of convert is kept: its whole output was moved to demo/recording-convert" in done.stderr
+    assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == ["recording", "recording-convert", "run"]
+    again = rrrid("convert", "a.h5", "--out", "demo/recording", "--no-report", cwd=tmp_path)
+    assert "moved to demo/recording-demo" in again.stdout
+    assert len(list((tmp_path / "demo/recording-demo/logs").iterdir())) == 3
 
 
 def test_a_checkout_stays_clean(tmp_path: Path) -> None:

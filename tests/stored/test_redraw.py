@@ -77,6 +77,19 @@ def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path,
     assert all(before[name] == content for name, content in contents(tmp_path / "b").items() if name.startswith("figures/"))
 
 
+@pytest.mark.row("C05")
+def test_no_result_is_lost_to_a_report(results: Path, tmp_path: Path) -> None:
+    """C05: drawn into a folder with another command's result, which is kept; a report that lay there is replaced."""
+    shutil.copytree(results / "inspect", tmp_path / "there")
+    checks = redraw(results / "run", tmp_path / "there")[2]
+    assert [(c.code, str(tmp_path / "there-inspect") in c.message) for c in checks] == [("RRID-C05", True)]
+    assert contents(tmp_path / "there-inspect") == contents(results / "inspect")
+    assert redraw(results / "inspect", tmp_path / "there")[2] == ()
+    shutil.copytree(results / "inspect", tmp_path / "here")
+    said = rrrid("report", results / "run", "--out", "here", cwd=tmp_path).stdout
+    assert f"moved to {tmp_path / 'here-inspect'}" in said
+
+
 def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) -> None:
     """Derived logs deleted to save room: the report needs none of them."""
     shutil.copytree(results / "run", tmp_path / "a")
