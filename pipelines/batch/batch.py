@@ -19,6 +19,7 @@ from typing import Literal
 
 from pipelines.batch.baseline import against, unheld
 from pipelines.batch.drift import drift_of
+from pipelines.batch.earlier import make_way
 from pipelines.batch.folder import BatchFolder
 from pipelines.batch.items import Item, find_items, shard
 from pipelines.batch.lock import locked
@@ -75,10 +76,12 @@ def run_batch(plan: Plan, wanted: Wanted) -> Outcome[Summary]:
     keep_apart(out, (), (root,))
     folder = BatchFolder(out)
     folder.claim()
+    moved = make_way(folder, plan.stage, everything, wanted.out is not None, plan.options.force)
     plan = dataclasses.replace(plan, root=str(root), out=str(folder.items), folder=os.getcwd())
     with locked(out), Listener() as listener:
         folder.begin(plan, {item.slug for item in everything})
         done = _Done(plan, plan_key(plan), folder, wanted, listener)
+        done.notices += moved
         done.go(items)
         records = _judged([done.records.get(item.slug) or done.missing(item) for item in items], baseline)
         unmet = () if baseline is None else unheld(plan.stage, records, baseline, wanted.shard[1] > 1)

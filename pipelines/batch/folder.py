@@ -60,12 +60,20 @@ class BatchFolder:
             there = {path.name for path in out.iterdir() if not path.name.startswith(_DRAFT)}
         if not there - {LOCK}:
             return
-        if not _marked(out / _MARK):
+        if not self.about():
             words = f"holds the result of '{command}'" if (command := written_by(out)) else "holds files that no batch wrote there"
             raise UsageError("C05", words, where=out, remedy=elsewhere)
         if foreign := sorted(there - _OURS):
             raise UsageError("C05", f"holds files that rrrid did not write there: {', '.join(foreign[:3])}", where=out,
                              remedy=f"{elsewhere}, or move them")
+
+    def about(self) -> dict[str, Any]:
+        """What the batch here says of itself; empty where none is."""
+        try:
+            about = json.loads((self.out / _MARK).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return about if isinstance(about, dict) and about.get("tool") == "rrrid" and about.get("command") == "batch" else {}
 
     def begin(self, plan: Plan, slugs: Collection[str]) -> None:
         """Mark the folder as one that is being worked on, and drop what belongs to no item of `slugs` any more."""
@@ -132,14 +140,6 @@ class BatchFolder:
                  "outputs": {path.relative_to(out).as_posix(): hash_file(path) for path in files},
                  "items": {record.slug: record.provenance for record in summary.records if record.provenance}}
         write_file(out / PROVENANCE, lambda draft: _text(draft, json_text(tilde(whole))))
-
-
-def _marked(path: Path) -> bool:
-    try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(about, dict) and about.get("tool") == "rrrid" and about.get("command") == "batch"
 
 
 def _text(path: Path, text: str) -> None:

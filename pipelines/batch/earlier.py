@@ -1,0 +1,73 @@
+"""Move an earlier batch aside, as a whole, where this one would lose it: of another stage, or in a default folder of other data."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from pipelines.batch.folder import BatchFolder
+from pipelines.batch.items import Item
+from pipelines.batch.lock import LOCK, locked
+from pipelines.errors import Check, RrridError, clean
+from pipelines.log.atomic import environment_faults
+from pipelines.log.earlier import beside, data_of, kept, replaced
+from pipelines.log.files import hash_file
+
+__all__ = ["make_way"]
+
+
+def make_way(folder: BatchFolder, stage: str, items: Iterable[Item], named: bool, force: bool) -> tuple[Check, ...]:
+    """C05: what lies in the claimed `folder` is moved beside it where it is lost else; what was done is said.
+
+    Args:
+        items: all of the batch, whatever shard of them is done.
+        named: the user has chosen the folder; then a batch of the same stage is replaced, as asked.
+        force: nothing is kept.
+
+    Raises:
+        EnvironmentFault: P08, a batch is at work there.
+    """
+    about, out = folder.about(), folder.out
+    if not about:
+        return ()
+    earlier = clean(str(about.get("stage") or ""), 40)
+    with locked(out), environment_faults(out):
+        if about.get("stage") != stage:
+            what, ending = f"the earlier batch of {earlier or 'another command'}", earlier or "earlier"
+        elif not named and _of_other_data(_inputs(folder.ledger.folder), items):
+            what, ending = f"the earlier batch of {earlier}, of other data,", ""
+        else:
+            return ()
+        if force:
+            return (replaced(out, what, forced=True),)
+        aside = beside(out, ending)
+        os.replace(out, aside)
+        (aside / LOCK).unlink(missing_ok=True)
+        out.mkdir()
+    return (kept(out, what, aside),)
+
+
+def _inputs(ledger: Path) -> dict[str, str]:
+    """What the items of the earlier batch were of, as far as they were done: path -> SHA-256."""
+    found: dict[str, str] = {}
+    for path in ledger.glob("*.json"):
+        try:
+            found |= json.loads(path.read_text(encoding="utf-8"))["inputs"]
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # torn by a power cut
+    return found
+
+
+def _of_other_data(inputs: Mapping[str, str], items: Iterable[Item]) -> bool:
+    """Whether no log of the items is among the inputs; as a rule the very first one is."""
+    earlier = set(map(str, data_of(inputs).values()))
+    return bool(earlier) and not any(_hash(log) in earlier for item in items for log in item.logs)
+
+
+def _hash(log: Path) -> str:
+    try:
+        return hash_file(log)
+    except RrridError:
+        return ""  # the item will say why
