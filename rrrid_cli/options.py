@@ -143,9 +143,10 @@ class CauseCommand(StageCommand):
                 formatter.write_dl([(effect.name, effect.title) for effect in all_effects() if effect.scope == scope])
 
 
-_OUT = "Folder for everything the command leaves."
+_OUT = "Folder for everything the command leaves"
+_KEPT = "another command's result there is kept beside it"
 _SHARED: tuple[tuple[str, Any, Any], ...] = (
-    ("out", Annotated[Path | None, _path(f"{_OUT} [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
+    ("out", Annotated[Path | None, _path(f"{_OUT}; {_KEPT}. [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
     ("json", Annotated[bool, _flag("Print result.json on standard output, and nothing else there.", "--json")], False),
     ("strict", Annotated[bool, _flag("A repair of the data is an error (exit 3).", "--strict")], False),
     ("check", Annotated[bool, _flag("Exit 1 where a gate failed or something was found.", "--check")], False),
@@ -155,7 +156,8 @@ _SHARED: tuple[tuple[str, Any, Any], ...] = (
     ("config", Annotated[Path | None, _path("TOML file of settings, one table a stage.", "--config")], None),
     ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable; the names stand below.", "--set")], []),
     ("no_report", Annotated[bool, _flag("Leave report and figures out.", "--no-report")], False),
-    ("force", Annotated[bool, _flag("Replace rrrid's own earlier output even where files were changed.", "--force")], False),
+    ("force", Annotated[bool, _flag("Replace rrrid's own earlier output, files that were changed as well, and keep none.",
+                                     "--force")], False),
     ("quiet", Annotated[bool, _flag("Print nothing but errors.", "-q", "--quiet")], False),
     ("verbose", Annotated[bool, _flag("Say every step.", "-v", "--verbose")], False),
     ("debug", Annotated[bool, _flag("Show the traceback of an internal error.", "--debug")], False),
@@ -201,7 +203,7 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
 def _with_common(command: Callable[..., None], idle: tuple[str, ...], out: str) -> Callable[..., None]:
     words: dict[str, dict[str, Any]] = {name: {"hidden": True} for name in idle}
     if out:
-        words["out"] = {"help": f"{_OUT} [{out}]"}
+        words["out"] = {"help": f"{_OUT}. [{out}]"}
     own = inspect.signature(command, eval_str=True)
     by_role = _ROLES if "roles" in own.parameters else ()
     options = (*by_role, *((_SESSION,) if by_role else ()), *_SHARED, *((_JOINTS,) if "logs" in own.parameters else ()))

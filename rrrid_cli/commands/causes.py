@@ -62,7 +62,8 @@ def extend(
     """Extend the model by named causes, refit everything, and judge it on held-out logs.
 
     Takes some 10 s for three joints and two minutes of motion; no twin is simulated. Without --out an earlier model that this one
-    does not make anew, refused or with another cause, is kept beside the output folder, and that is said; --out DIR is replaced.
+    does not make anew, refused or with another cause, is kept beside the output folder, and that is said; an earlier
+    extension in --out DIR is replaced.
     """
     from pipelines.extend import STAGE
 
