@@ -39,7 +39,7 @@ def report(
                                            readable=False)],
     out: Annotated[Path | None, typer.Option(
         readable=False, help="Folder for the report; another command's result there is kept beside it. [DIR itself]")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the report even where it was changed; keep nothing in --out.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace what was changed as well, and keep none.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
 ) -> None:
