@@ -67,10 +67,13 @@ def of_amplitudes(effect: Effect, amplitudes: Array, covariance: Array, revolute
 
 
 def of_no_size(done: Refined) -> list[int]:
-    """Places of effects of one number alone that is not told from zero, in the model with all of them; and of what happened once,
-    if its numbers together are not: a touch so short, or so near the end of its log, that any force would do."""
-    once = [place for place, one in enumerate(done.model.effects) if one.log is not None and _from_none(done, place) < _STDS]
-    return [*(place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std and place not in once), *once]
+    """Places of effects that are not told from none, in the model with all of them: of one number alone, by that; of several
+    amplitudes, by all of them together; and of what happened once, a touch so short, or so near the end of its log, that any force
+    would do."""
+    effects = done.model.effects
+    several = {place for place, one in enumerate(effects) if one.log is not None or len(one.amplitudes) > 1}
+    alone = [place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std and place not in several]
+    return sorted([*alone, *(place for place in several if _from_none(done, place) < _STDS)])
 
 
 def _from_none(done: Refined, place: int) -> float:

@@ -58,11 +58,26 @@ def test_an_inertia_that_is_a_part_of_the_links_is_not_known(joint: int, told: b
 
 @pytest.mark.parametrize(("size", "small"), [(4.9e-5, [0]), (5.1e-5, []), (-4.9e-5, [0]), (-5.1e-5, [])])
 def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, small: list[int]) -> None:
-    """A delay of some microseconds, as sampling leaves it in an arm in order; a spring has more numbers, each of them poor."""
+    """A delay of some microseconds, as sampling leaves it in an arm in order."""
     delay = SimpleNamespace(free_amplitudes=True, amplitudes=(size,), log=None)
-    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5), log=None)
-    done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(3), model=SimpleNamespace(effects=(delay, spring)),
-                                of_effect=lambda place: [0] if place == 0 else [1, 2])
+    done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(1), model=SimpleNamespace(effects=(delay,)),
+                                of_effect=lambda place: [0])
+    assert of_no_size(done) == small
+
+
+@pytest.mark.parametrize(("ripple", "together", "small"), [
+    ((1.0, 0.3), 0.0, [1]), ((5.1, 0.0), 0.0, []), ((3.6, 3.6), 0.0, []), ((2.0, -2.0), 0.0, [1]), ((2.0, -2.0), 0.95, [])])
+def test_amplitudes_that_are_not_told_from_none_together_are_no_cause(ripple: tuple[float, float], together: float,
+                                                                     small: list[int]) -> None:
+    """A cosine and a sine known to 1 mN m each: each may be poor, and what they make sure for all that. Its order is no amplitude."""
+    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(80.0,), log=None)
+    cogging = SimpleNamespace(free_amplitudes=True, amplitudes=ripple, log=None)
+    covariance = np.eye(4)
+    covariance[2, 3] = covariance[3, 2] = together
+    names = ((0, 0, "0"), (0, 1, "order"), (0, 1, "0"), (0, 1, "1"))
+    done: Any = SimpleNamespace(covariance=lambda: covariance, unseen=[], names=names,
+                                model=SimpleNamespace(effects=(spring, cogging), beta=()),
+                                of_effect=lambda place: [0] if place == 0 else [1, 2, 3])
     assert of_no_size(done) == small
 
 
