@@ -34,7 +34,7 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.believed.chance import BY_CHANCE
 from pipelines.model.diagnosis.believed.fewer import all_but
-from pipelines.model.diagnosis.believed.pruned import at_odds, vague
+from pipelines.model.diagnosis.believed.repeated import at_odds, vague
 from pipelines.model.diagnosis.believed.steadied import steadied, steady
 from pipelines.model.diagnosis.believed.straying import strays
 from pipelines.model.diagnosis.fitted.exact import Exact

@@ -4,7 +4,8 @@
     fewer          models with some of the causes only
     chance         a gain that may be chance
     straying       the simulated arm does not come nearer
-    momentary      it acts only while something that happened once lasts
+    momentary      it acts only while something that happened once lasts, or that alone is no explanation
+    repeated       logs do not agree on it, or beside the others it is no more than chance
     mistaken       for what it could have been mistaken
     mended         it only mends the shape of another
     which_joint    logs do not tell at which joint it is

@@ -14,16 +14,16 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.believed.chance import BY_CHANCE, no_gain, no_name
+from pipelines.model.diagnosis.believed.chance import BY_CHANCE, no_name
 from pipelines.model.diagnosis.believed.fewer import all_but, family_of, possible, without
 from pipelines.model.diagnosis.believed.mended import not_mending, turned
-from pipelines.model.diagnosis.believed.momentary import ONLY_THEN, only_then
+from pipelines.model.diagnosis.believed.momentary import AT_OTHER_TIMES, ONLY_THEN, at_other_times, only_then
+from pipelines.model.diagnosis.believed.repeated import at_odds
 from pipelines.model.diagnosis.believed.steadied import steadied
 from pipelines.model.diagnosis.believed.straying import simulated_steps, strays
 from pipelines.model.diagnosis.believed.unchanged import near_other_motion, no_change
 from pipelines.model.diagnosis.believed.which_joint import at_which
 from pipelines.model.diagnosis.fitted.refit import Refined
-from pipelines.model.diagnosis.named.findings import unlike
 from pipelines.model.diagnosis.named.verdict import (
     REST_UNKNOWN,
     Ruling,
@@ -43,7 +43,7 @@ from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.diagnosis.worth.numbers import of_no_size, too_slight
 from pipelines.model.effects.base import Effect
 
-__all__ = ["NEAR_THE_FLOOR", "TOO_SLIGHT", "Settled", "at_odds", "settled", "vague"]
+__all__ = ["NEAR_THE_FLOOR", "TOO_SLIGHT", "Settled", "settled"]
 
 _PAYS = 0.005  # of the held-out squared error, that a cause takes away at least beside all others
 _LEAST = 0.002  # of the squared residual, where nothing else says what a cause has to take away
@@ -89,6 +89,8 @@ def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor:
     last.drop_harmful()
     if not known:
         last.drop_unseen(floor)
+    elif any(one.log is not None for one in found.final.model.effects):
+        last.drop_momentary(floor)
     few = NEAR_THE_FLOOR if known and last.explains_little(floor) else ""
     if few:  # what keeps all the rules is no noise: something is wrong, and not this alone
         last.drop(last.kept, _BESIDE)
@@ -161,6 +163,11 @@ class _Last:
         if self.kept and explained(before, self.final.rms, before, floor) < _NEXT_TO_NOTHING:
             self.drop(self.kept, _BESIDE)
 
+    def drop_momentary(self, floor: Array) -> None:
+        """What happened once, where nothing else is left, and other times show as much of something."""
+        if self.kept and at_other_times(self.final, floor):
+            self.drop(self.kept, AT_OTHER_TIMES)
+
     def explains_little(self, floor: Array) -> bool:
         """Whether less was kept than found, and most of what stands above the floor is left."""
         less = 0 < len(self.kept) < len(self._found.final.model.effects) and not at_floor(self.final.rms, floor)
@@ -224,31 +231,6 @@ def _not_told(step: Step, simulated: Sequence[Simulation], case: Case, late: boo
         return False
     lone, place = len(simulated) == 2 and nearer(*simulated, late=late), len(best.done.model.effects) - 1
     return no_name(step, step.before, best.done, place, case.judge, case.blocks, case.white, lone)
-
-
-def vague(found: Found, k: int, prepared: Prepared, case: Case) -> bool:
-    """Whether step `k` gained no more than chance when it was found, nor does beside all the others."""
-    step, others = found.steps[k], [j for j, one in enumerate(found.steps) if one.best is not None and j != k]
-    if step.best is None or step.best.log is not None:
-        return False
-    done = step.best.done
-    if not no_gain(step.before, done, len(done.model.effects) - 1, prepared.judge, case.blocks):
-        return False
-    return not others or no_gain(without(found, others, case), found.final, k, case.judge, case.blocks)
-
-
-def at_odds(found: Found, k: int, prepared: Prepared, case: Case) -> str:
-    """Why step `k` does not do the same in every log, neither when it was found nor beside all the others; empty where it does.
-
-    What was found after it stood in the residual then, and one log may have more of that than another.
-    """
-    step, last = found.steps[k], max(j for j, one in enumerate(found.steps) if one.best is not None)
-    if step.best is None or step.best.log is not None:
-        return ""
-    why = unlike(step.before, step.best.done, k, prepared, case.blocks)
-    if not why or k == last:
-        return why
-    return unlike(all_but(found, k, case), found.final, k, prepared, case.blocks)
 
 
 def _asked_again(found: Found, kept: list[int], doubted: list[int], case: Case) -> tuple[list[int], Refined]:

@@ -1,13 +1,15 @@
-"""What acts only while a touch lasts is not told from it; what acts at other times as well is."""
+"""What acts only while a touch lasts is not told from it; what acts at other times as well is, and a touch is no name for it."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.believed.momentary import only_then
+from pipelines.model.diagnosis.believed.momentary import at_other_times, only_then
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
@@ -56,3 +58,17 @@ def test_a_drive_that_is_clipped_only_while_the_tip_is_pushed(touched: Touched) 
 def test_what_acts_at_other_times_as_well(touched: Touched) -> None:
     assert not only_then(touched.beside(TorqueSaturation(2, limit=0.5 * touched.otherwise), np.ones(1)), 1)
     assert not only_then(touched.beside(Cogging(2, order=11.0, harmonics=1), WAVE), 1)
+
+
+def test_a_touch_is_no_name_for_what_shows_at_other_times(touched: Touched) -> None:
+    """Its moment alone is 50 floors high: that is the touch's. Half a second of it at another time is not, unless it has a name."""
+    data = touched.prepared.data
+    floor = np.full(data.n_joints, 0.05)
+    push = touched.plain.with_effect(Contact(start=touched.start, duration=LASTING), PUSH, log=touched.log)
+    done = refine(push, data, touched.weight, steps=0)
+    then = (data.log_of == touched.log) & (np.abs(data.t - touched.start - 0.5 * LASTING) < 0.4 * LASTING)
+    assert not at_other_times(replace(done, left=np.where(then, 2.5, 0.0)), floor)
+    elsewhere = (data.log_of != touched.log) & (data.t < data.t.min() + 1.0)
+    assert at_other_times(replace(done, left=np.where(elsewhere, 2.5, 0.0)), floor)
+    named = touched.beside(Cogging(2, order=11.0, harmonics=1), WAVE)
+    assert not at_other_times(replace(named, left=np.where(elsewhere, 2.5, 0.0)), floor)

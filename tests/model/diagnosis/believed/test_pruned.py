@@ -216,21 +216,6 @@ def test_what_arms_in_order_have_as_much_of_has_no_name(much: float, slight: lis
     assert (done.ruling.reason == pruned.TOO_SLIGHT) is (slight == [0, 1] and changed is None)
 
 
-@pytest.mark.parametrize(("beside", "odd"), [("", False), ("worse in free-1", True)])
-def test_what_did_harm_in_a_log_when_it_was_found_is_asked_again_beside_what_was_found_after_it(
-        beside: str, odd: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second cause stood in the residual when the first was found, and one held-out log had more of it than the others."""
-    found = searched(left(0.5, 0.5, 0.01), (effect("spring", 1), left(0.4, 0.5, 0.01)),
-                     (effect("spring", 2), left(0.01, 0.01, 0.01)))
-    for step in found.steps:
-        step.best.log = None
-    monkeypatch.setattr(pruned, "all_but", lambda *args: left(0.05, 0.01, 0.01))
-    monkeypatch.setattr(pruned, "unlike", lambda before, after, *args: beside if after is found.final else "worse in free-1")
-    case = SimpleNamespace(blocks=10)
-    assert bool(pruned.at_odds(found, 0, SimpleNamespace(), case)) is odd
-    assert pruned.at_odds(found, 1, SimpleNamespace(), case) == "worse in free-1"  # nothing was found after it
-
-
 @pytest.mark.parametrize(("after", "unseen"), [(0.1, []), (0.17, []), (0.185, [0])])
 def test_without_a_floor_a_cause_is_seen_in_what_was_held_out(after: float, unseen: list[int],
                                                               monkeypatch: pytest.MonkeyPatch) -> None:

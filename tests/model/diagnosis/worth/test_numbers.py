@@ -69,7 +69,7 @@ def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, smal
     ((1.0, 0.3), 0.0, [1]), ((5.1, 0.0), 0.0, []), ((3.6, 3.6), 0.0, []), ((2.0, -2.0), 0.0, [1]), ((2.0, -2.0), 0.95, [])])
 def test_amplitudes_that_are_not_told_from_none_together_are_no_cause(ripple: tuple[float, float], together: float,
                                                                      small: list[int]) -> None:
-    """A cosine and a sine known to 1 mN m each: each may be poor, and what they make sure for all that. Its order is no amplitude."""
+    """A cosine and a sine known to 1 mN m each: each may be poor, and both sure for all that. Its order is no amplitude."""
     spring = SimpleNamespace(free_amplitudes=True, amplitudes=(80.0,), log=None)
     cogging = SimpleNamespace(free_amplitudes=True, amplitudes=ripple, log=None)
     covariance = np.eye(4)
