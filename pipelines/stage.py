@@ -240,9 +240,10 @@ def _hashes(sources: Iterable[Path], known: Mapping[Path, str]) -> dict[Path, st
 
 
 def _data_of(inputs: Inputs, hashes: Mapping[Path, str]) -> frozenset[str]:
-    """The hashes of the logs; of who reads none, an import say, those of all that it reads."""
+    """The hashes and places of the logs; of who reads none, an import say, those of all that it reads."""
     logs = [*(opened.path for opened in inputs.logs), *(rejected.path for rejected in inputs.rejected)]
-    return frozenset(hashes[path] for path in logs or inputs.sources if path in hashes)
+    read = {str(path): hashes[path] for path in logs or inputs.sources if path in hashes}
+    return frozenset((*tilde(read), *read.values()))
 
 
 def _unchanged(hashes: dict[Path, str]) -> None:

@@ -96,6 +96,14 @@ def test_a_default_folder_keeps_what_is_of_other_data(days: Path) -> None:
     assert [_said(_converted(day, out=Path("out"))) for day in ("monday", "tuesday")] == [[], []]
 
 
+def test_logs_made_anew_in_their_place_are_no_other_data(days: Path) -> None:
+    """Imported again, say, with another recipe: every byte differs, and the result is of the same recordings."""
+    place = _converted("monday").folder
+    write_log(days / "monday/logs/a.h5", small_log(name="a", seed=1))
+    assert _said(_converted("monday")) == []
+    assert [path.name for path in place.parent.iterdir()] == ["convert"]
+
+
 def test_a_description_is_no_data(days: Path) -> None:
     """The robot that both days are given does not make them one."""
     (days / "arm.toml").write_text(ROBOT_TEXT)

@@ -14,6 +14,7 @@ from pipelines.errors import Check, RrridError, clean
 from pipelines.log.atomic import environment_faults
 from pipelines.log.earlier import beside, data_of, kept, replaced
 from pipelines.log.files import hash_file
+from pipelines.log.places import tilde
 
 __all__ = ["make_way"]
 
@@ -61,9 +62,11 @@ def _inputs(ledger: Path) -> dict[str, str]:
 
 
 def _of_other_data(inputs: Mapping[str, str], items: Iterable[Item]) -> bool:
-    """Whether no log of the items is among the inputs; as a rule the very first one is."""
-    earlier = set(map(str, data_of(inputs).values()))
-    return bool(earlier) and not any(_hash(log) in earlier for item in items for log in item.logs)
+    """Whether no log of the items is among the inputs, nor in the place of one; as a rule the very first one is."""
+    earlier = data_of(inputs)
+    known = {*earlier, *map(str, earlier.values())}
+    logs = (log for item in items for log in item.logs)
+    return bool(known) and not any(tilde(str(log.absolute())) in known or _hash(log) in known for log in logs)
 
 
 def _hash(log: Path) -> str:

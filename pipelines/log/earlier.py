@@ -31,7 +31,7 @@ class Coming:
     command: str
     named: bool  # the folder, with --out
     force: bool = False
-    read: frozenset[str] = frozenset()  # SHA-256 of the logs, or recordings, that it is of
+    read: frozenset[str] = frozenset()  # SHA-256 and, as in provenance.json, places of the logs or recordings that it is of
     spare: tuple[str, ...] = ()  # causes of a model that lies there, where it does not make that anew
 
 
@@ -76,11 +76,14 @@ def _loss(out: Path, coming: Coming) -> _Loss | None:
 
 
 def of_other_data(inputs: object, read: Collection[str]) -> bool:
-    """Whether an output of `inputs` (path -> SHA-256) is of logs, and none of them was `read`; also where it says nothing."""
+    """Whether an output of `inputs` (path -> SHA-256) is of logs, and none of them was `read`; also where it says nothing.
+
+    What was made anew in its old place, imported again say, is no other data.
+    """
     if not isinstance(inputs, Mapping):
         return True
-    earlier = set(map(str, data_of(inputs).values()))
-    return bool(earlier) and earlier.isdisjoint(read)
+    earlier = data_of(inputs)
+    return bool(earlier) and {*earlier, *map(str, earlier.values())}.isdisjoint(read)
 
 
 def data_of(inputs: Mapping[str, str]) -> dict[str, str]:
