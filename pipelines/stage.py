@@ -47,6 +47,7 @@ from pipelines.report.report import Report
 __all__ = ["Beside", "Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "footer_of", "read_by_role",
            "read_logs", "refuse_foreign", "result_type", "run_stage", "slug", "tilde"]
 
+_SHARED = ("validate", "reference")  # roles of logs that results of other data may have as well
 _LISTED = 40  # inputs, at the foot of a report
 
 S = TypeVar("S")
@@ -240,8 +241,10 @@ def _hashes(sources: Iterable[Path], known: Mapping[Path, str]) -> dict[Path, st
 
 
 def _data_of(inputs: Inputs, hashes: Mapping[Path, str]) -> frozenset[str]:
-    """The hashes and places of the logs; of who reads none, an import say, those of all that it reads."""
-    logs = [*(opened.path for opened in inputs.logs), *(rejected.path for rejected in inputs.rejected)]
+    """The hashes and places of the logs, without those that sessions share: what judges, and what the arm was. Of who reads none,
+    an import say, those of all that it reads."""
+    own = [opened.path for opened in inputs.logs if opened.log.role not in _SHARED] or [opened.path for opened in inputs.logs]
+    logs = [*own, *(rejected.path for rejected in inputs.rejected)]
     read = {str(path): hashes[path] for path in logs or inputs.sources if path in hashes}
     return frozenset((*tilde(read), *read.values()))
 

@@ -111,6 +111,15 @@ def test_a_description_is_no_data(days: Path) -> None:
     assert len(_said(_converted("tuesday", robot="arm.toml"))) == 1
 
 
+def test_reference_logs_that_two_days_share_are_not_the_data(days: Path) -> None:
+    """What the arm was, and what judges, is the same; what is asked about is not."""
+    write_log(days / "before/ref.h5", small_log(name="ref", role="reference"))
+    roles = {"reference": ("before",)}
+    assert _said(_converted("monday", roles=roles)) == []
+    assert len(_said(_converted("tuesday", roles=roles))) == 1
+    assert _said(_converted("tuesday", roles=roles)) == []
+
+
 @dataclass(frozen=True)
 class _Nothing:
     pass
@@ -129,6 +138,20 @@ def test_recordings_are_data_and_their_recipe_is_none(days: Path) -> None:
     for recording, recipe in (("1.csv", "first"), ("1.csv", "second"), ("2.csv", "second")):
         (days / "recipe.toml").write_text(recipe)
         said.append(len(_said(run_stage(stage, Request((days / "recipe.toml", days / recording)), _Nothing()))))
+    assert said == [0, 0, 1]
+
+
+def test_results_that_are_compared_are_the_data_of_a_comparison(days: Path) -> None:
+    """January against February, then March against April: two comparisons of one name."""
+    def read(request: Request, settings: object) -> Inputs:
+        return Inputs(sources=request.paths, label="results", robot_name="arm")
+
+    stage = Stage("compare", "A stage to test with", _Nothing, lambda inputs, settings: settings,
+                  lambda result: Report("Test", "done"), read)
+    for month in ("jan", "feb", "mar", "apr"):
+        (days / f"{month}.json").write_text(json.dumps({"of": month}))
+    said = [len(_said(run_stage(stage, Request((days / f"{one}.json", days / f"{other}.json")), _Nothing())))
+            for one, other in (("jan", "feb"), ("jan", "feb"), ("mar", "apr"))]
     assert said == [0, 0, 1]
 
 

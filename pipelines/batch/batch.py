@@ -76,7 +76,9 @@ def run_batch(plan: Plan, wanted: Wanted) -> Outcome[Summary]:
     keep_apart(out, (), (root,))
     folder = BatchFolder(out)
     folder.claim()
-    moved = make_way(folder, plan.stage, everything, wanted.out is not None, plan.options.force)
+    moved = make_way(folder, plan.stage, root, everything, wanted.out is not None, plan.options.force)
+    for check in moved:  # whatever becomes of this batch
+        wanted.tell(f"{check.where}: {check.message}")
     plan = dataclasses.replace(plan, root=str(root), out=str(folder.items), folder=os.getcwd())
     with locked(out), Listener() as listener:
         folder.begin(plan, {item.slug for item in everything})
@@ -133,7 +135,8 @@ def _about(done: _Done, started: float) -> dict[str, object]:
     """What provenance.json says beside the outputs: all that may differ from one run to the next."""
     plan, wanted = done.plan, done.wanted
     return {
-        "command": "batch", "stage": plan.stage, "key": done.key, "seconds": {r.name: r.seconds for r in done.records.values()},
+        "command": "batch", "stage": plan.stage, "root": plan.root, "key": done.key,
+        "seconds": {r.name: r.seconds for r in done.records.values()},
         "options": {"jobs": wanted.jobs, "backend": wanted.backend, "shard": list(wanted.shard), "resume": wanted.resume,
                     "on_error": wanted.on_error, "each_log": wanted.each_log, **dataclasses.asdict(plan.options)},
         "inputs": {name: value for r in done.records.values() for name, value in r.inputs.items()},

@@ -14,15 +14,16 @@ from pipelines.errors import Check, RrridError, clean
 from pipelines.log.atomic import environment_faults
 from pipelines.log.earlier import beside, data_of, kept, replaced
 from pipelines.log.files import hash_file
-from pipelines.log.places import tilde
+from pipelines.log.places import provenance_of, tilde
 
 __all__ = ["make_way"]
 
 
-def make_way(folder: BatchFolder, stage: str, items: Iterable[Item], named: bool, force: bool) -> tuple[Check, ...]:
+def make_way(folder: BatchFolder, stage: str, root: Path, items: Iterable[Item], named: bool, force: bool) -> tuple[Check, ...]:
     """C05: what lies in the claimed `folder` is moved beside it where it is lost else; what was done is said.
 
     Args:
+        root: of the logs: what was made anew in its old place, imported again say, is no other data.
         items: all of the batch, whatever shard of them is done.
         named: the user has chosen the folder; then a batch of the same stage is replaced, as asked.
         force: nothing is kept.
@@ -30,14 +31,16 @@ def make_way(folder: BatchFolder, stage: str, items: Iterable[Item], named: bool
     Raises:
         EnvironmentFault: P08, a batch is at work there.
     """
-    about, out = folder.about(), folder.out
-    if not about:
-        return ()
-    earlier = clean(str(about.get("stage") or ""), 40)
+    out = folder.out
     with locked(out), environment_faults(out):
+        about = folder.about()
+        if not about:
+            return ()
+        earlier = clean(str(about.get("stage") or ""), 40)
         if about.get("stage") != stage:
             what, ending = f"the earlier batch of {earlier or 'another command'}", earlier or "earlier"
-        elif not named and _of_other_data(_inputs(folder.ledger.folder), items):
+        elif not named and provenance_of(out).get("root") != tilde(str(root)) and _of_other_data(
+                _inputs(folder.ledger.folder), items):
             what, ending = f"the earlier batch of {earlier}, of other data,", ""
         else:
             return ()
@@ -46,7 +49,7 @@ def make_way(folder: BatchFolder, stage: str, items: Iterable[Item], named: bool
         aside = beside(out, ending)
         os.replace(out, aside)
         (aside / LOCK).unlink(missing_ok=True)
-        out.mkdir()
+        out.mkdir(exist_ok=True)  # another batch may have claimed it meanwhile
     return (kept(out, what, aside),)
 
 
@@ -62,11 +65,9 @@ def _inputs(ledger: Path) -> dict[str, str]:
 
 
 def _of_other_data(inputs: Mapping[str, str], items: Iterable[Item]) -> bool:
-    """Whether no log of the items is among the inputs, nor in the place of one; as a rule the very first one is."""
-    earlier = data_of(inputs)
-    known = {*earlier, *map(str, earlier.values())}
-    logs = (log for item in items for log in item.logs)
-    return bool(known) and not any(tilde(str(log.absolute())) in known or _hash(log) in known for log in logs)
+    """Whether no log of the items is among the inputs; as a rule the very first one is."""
+    earlier = set(map(str, data_of(inputs).values()))
+    return bool(earlier) and not any(_hash(log) in earlier for item in items for log in item.logs)
 
 
 def _hash(log: Path) -> str:

@@ -76,7 +76,8 @@ class BatchFolder:
         return about if isinstance(about, dict) and about.get("tool") == "rrrid" and about.get("command") == "batch" else {}
 
     def begin(self, plan: Plan, slugs: Collection[str]) -> None:
-        """Mark the folder as one that is being worked on, and drop what belongs to no item of `slugs` any more."""
+        """Mark the folder as one that is being worked on, and drop what belongs to no item of `slugs`, or to another stage."""
+        slugs = slugs if self.about().get("stage", plan.stage) == plan.stage else ()
         about = {"tool": "rrrid", "command": "batch", "version": __version__, "stage": plan.stage}
         write_file(self.out / _MARK, lambda draft: _text(draft, json_text(about)))
         with environment_faults(self.out):

@@ -40,7 +40,9 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)  # while it is held: whoever opened it meanwhile sees that it is gone, and opens anew
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(handle), path.stat()):  # the folder may have been moved, and another stand in its place
+                path.unlink()  # while it is held: whoever opened it meanwhile sees that it is gone, and opens anew
         os.close(handle)
 
 

@@ -87,8 +87,8 @@ def of_other_data(inputs: object, read: Collection[str]) -> bool:
 
 
 def data_of(inputs: Mapping[str, str]) -> dict[str, str]:
-    """Those of the inputs that are measured."""
-    return {path: value for path, value in inputs.items() if PurePath(path).suffix.lower() not in _DESCRIBES}
+    """Those of the inputs that are measured; all where none is: results that are compared."""
+    return {path: value for path, value in inputs.items() if PurePath(path).suffix.lower() not in _DESCRIBES} or dict(inputs)
 
 
 def _whose(inputs: object) -> str:

@@ -169,11 +169,11 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     usual = None if floored.calibration is None else following_of(floored.calibration, prepared, calibration is not None)
     mended = usual is not None and put_right(found.nominal.fit, found.final.fit, usual)
     done = settled(found, rule(found, floored.rms, known, mended), case, prepared, floored.rms, known)
-    if floored.no_twin:
+    if floored.runs_away:
         rows = case.data if case.judge is None else case.judge
         left = held_out_left(done.found.nominal, case.judge, case.blocks)
-        done = without_twin(done, rows.rms(left), floored.rms, floored.no_twin)
-    done = told_why(done, floored.untold)
+        done = without_twin(done, rows.rms(left), floored.rms, floored.runs_away)
+    done = told_why(done, floored.no_twin)
     if floored.twin is not None:
         done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
         done = unlike_noise(done, partial(of_replicas, floored.twin))

@@ -41,9 +41,9 @@ def loud_joint(noise: Array, rated: Sequence[float]) -> Loud | None:
 
 
 def only_if_loud(noise: Array, rated: Sequence[float], revolute: Sequence[bool]) -> str:
-    """", and if its drives are as noisy as 0.35 N m at joint 3 (2.3 % of the rated torque)"; empty where they need not be."""
+    """", and only if its drives are as noisy as 0.35 N m at joint 3 (2.3 % of the rated torque)"; empty where they need not be."""
     if (loud := loud_joint(noise, rated)) is None:
         return ""
     unit = "N m" if revolute[loud.joint - 1] else "N"
-    return (f", and if its drives are as noisy as {plain_number(loud.noise, 2)} {unit} at joint {loud.joint} "
+    return (f", and only if its drives are as noisy as {plain_number(loud.noise, 2)} {unit} at joint {loud.joint} "
             f"({plain_number(100.0 * loud.share, 2)} % of the rated torque), which may be a fault")

@@ -120,7 +120,7 @@ def _told(first: Responding, case: Case, done: Settled, responded: Judged, floor
         tuple(trial for step in found.steps for trial in step.trials), bounds, pictures,
         0 if made is None else made.origin.replicas, noise, own,
         acted(plain.model.arm, standing), acted(arm, responded.acting), made,
-        no_twin=floored.untold)
+        no_twin=floored.no_twin)
 
 
 def _own_floor(responded: Judged, first: Responding, case: Case, floored: Floored, chosen: DiagnosisSettings) -> Array | None:

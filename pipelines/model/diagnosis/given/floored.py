@@ -49,8 +49,8 @@ class Floored:
     reference: Array | None = None  # (joints,) [N m] what all the reference logs leave, whatever their speeds
     judging: Array | float = 1.0  # (joints,) times as much power the reference logs leave at the speeds of the logs held out
     twin: Twin | None = None  # whose replicas it is, where it was made for these logs
-    no_twin: str = ""  # why there is none although the logs know their controller: no model of the arm follows it
-    untold: str = ""  # why the noise has to do although the logs describe their controller, whatever the reason, in words
+    runs_away: str = ""  # why there is none although the logs know their controller: no model of the arm follows it
+    no_twin: str = ""  # why the noise has to do although the logs describe their controller, whatever the reason, in words
 
 
 def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chosen: DiagnosisSettings,
@@ -58,16 +58,16 @@ def floored_by(prepared: Prepared, case: Case, rough: tuple[Explored, ...], chos
     """By what was stored; by the twin where a controller is known; else by the noise in the residual."""
     if given is not None:
         refuse_calibration(given, prepared, case.families, "twin")
-    made, twin, why, untold = given, None, "", ""
+    made, twin, why, no_twin = given, None, "", ""
     if given is None:
         try:
             made, twin = _calibrated(prepared, case, rough, chosen)
         except InputRejected as refused:
             why = refused.message if refused.code == _RUNS_AWAY else ""  # numbers of too poor a motion, D15, are no arm's fault
-            untold = f"the arm as it was fitted cannot be simulated: {refused.message}"
+            no_twin = f"the arm as it was fitted cannot be simulated: {refused.message}"
     if made is None:
-        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, no_twin=why,
-                       untold=untold or _not_asked([log for log, _ in prepared.motions], chosen))
+        return Floored(white(prepared.data, clean(rough[-1])), "blocks", None, None, None, runs_away=why,
+                       no_twin=no_twin or _not_asked([log for log, _ in prepared.motions], chosen))
     return Floored(made.floor, "twin", thresholds_of(made, case.families, prepared, given is not None), made, made.drives,
                    twin=twin)
 

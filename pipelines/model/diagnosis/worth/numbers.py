@@ -32,6 +32,7 @@ _STEP = 1e-4  # of an amplitude or of its deviation, whichever is larger: an ang
 # Deviations from zero: of 410 named causes of the test bench the least true one of one number was 6.9, a false gain 4.9; delays of
 # two arms in order 2.3 and 3.5.
 _STDS = 5.0
+_ONE_SIDED = 4.87  # what a normal number exceeds as seldom as its size exceeds `_STDS`
 _SURE = 2.0  # deviations by which it is less
 
 
@@ -73,7 +74,14 @@ def of_no_size(done: Refined) -> list[int]:
     effects = done.model.effects
     several = {place for place, one in enumerate(effects) if one.log is not None or len(one.amplitudes) > 1}
     alone = [place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std and place not in several]
-    return sorted([*alone, *(place for place in several if _from_none(done, place) < _STDS)])
+    return sorted([*alone, *(place for place in several if _from_none(done, place) < _limit(len(effects[place].amplitudes)))])
+
+
+def _limit(count: int) -> float:
+    """Deviations from none of so many numbers together that chance gives as seldom as `_STDS` of one: of χ², whose third root is
+    nearly normal (Wilson & Hilferty 1931)."""
+    part = 2.0 / (9.0 * count)
+    return _STDS if count == 1 else float(np.sqrt(count * (1.0 - part + _ONE_SIDED * np.sqrt(part)) ** 3))
 
 
 def _from_none(done: Refined, place: int) -> float:

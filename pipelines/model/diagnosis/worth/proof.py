@@ -19,7 +19,8 @@ __all__ = ["proof"]
 _AS_MUCH = 0.9  # of what a part tells over time
 _BINS, _MOST_BINS = 96, 768  # a figure is six inches wide
 _FOUR, _PAIR = 4, 2  # rows of a bin, at least; where finer ones show more: of a narrow low-pass there are few a period
-_MORE = 1.02  # times the power that the means of the predicted part have, and twice as many bins are worth it: eleven in a period
+_MORE = 0.02  # of the power that is predicted, that twice as many bins have to show: eleven in a period do
+_BY_CHANCE = 4.0  # deviations of what they show of mere scatter
 _TELLS = 0.2  # of the predicted part, that it is in its means over a signal: what less tells, no signal does
 _STRETCH = 2.0  # [s] of a proof in time
 
@@ -73,18 +74,22 @@ def _over(signal: Signal, parts: list[Array], joint: int, t: Array, stretch: lis
 def _fine_enough(x: Array, predicted: Array) -> int:
     """As many bins as show what a cause predicts over x, as far as there are rows: a wave has several of them a period, and a touch
     of a tenth of a second is as high as it was. What scatters within a bin, and not along x, makes none of them finer."""
-    bins = min(_BINS, max(1, len(x) // _FOUR))
-    here = _told_surely(x, predicted, bins)
-    while bins < _MOST_BINS and (finer := _told_surely(x, predicted, 2 * bins)) > _MORE * here:
+    bins, least = min(_BINS, max(1, len(x) // _FOUR)), _MORE * float(predicted @ predicted)
+    here, _ = _told_surely(x, predicted, bins)
+    while bins < _MOST_BINS:
+        finer, chance = _told_surely(x, predicted, 2 * bins)
+        if finer - here <= max(least, _BY_CHANCE * chance):
+            break
         bins, here = 2 * bins, finer
     return bins
 
 
-def _told_surely(x: Array, y: Array, bins: int) -> float:
-    """Power of the means of y in bins of x, less what they have by chance."""
+def _told_surely(x: Array, y: Array, bins: int) -> tuple[float, float]:
+    """Power of the means of y in bins of x, less what they have by chance; and how far chance alone scatters it."""
     means = binned(x, y, bins, _PAIR)
     chance = means.spread**2 * means.count / np.maximum(means.count - 1.0, 1.0)
-    return float(np.sum(means.count * means.mean**2 - chance))
+    # of pairs of rows one squared deviation is far from its mean, and so the mean of all bins is taken
+    return float(np.sum(means.count * means.mean**2 - chance)), float(np.sqrt(2.0 * len(chance)) * np.mean(chance))
 
 
 def _lines(data: Data, joint: int, three: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:

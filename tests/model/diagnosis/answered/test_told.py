@@ -49,7 +49,8 @@ def test_what_was_found_beside_is_named(others: int, words: str) -> None:
 
 
 @pytest.mark.parametrize(("noise", "doubt"), [
-    (0.35, ", and if its drives are as noisy as 0.35 N m at joint 2 (2.3 % of the rated torque), which may be a fault"), (0.1, "")])
+    (0.35,
+     ", and only if its drives are as noisy as 0.35 N m at joint 2 (2.3 % of the rated torque), which may be a fault"), (0.1, "")])
 def test_nothing_wrong_says_in_one_breath_where_only_loud_drives_would_leave_so_much(noise: float, doubt: str) -> None:
     """A gap shakes its twin as well. Who reads the sentence alone is not told that all is well; nor is a healthy arm called ill."""
     told = only_if_loud(np.array([0.1, noise]), (60.0, 15.0), (True, True))

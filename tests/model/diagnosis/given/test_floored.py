@@ -106,8 +106,8 @@ def test_why_there_is_no_twin_is_told(code: str, unknown: bool, monkeypatch: pyt
     monkeypatch.setattr(floored, "white", lambda *_: np.ones(1))
     some: Any = SimpleNamespace(data=None, motions=(), families=(), replicas=1)
     found = floored.floored_by(some, some, (explored("nominal"),), some, None)
-    assert found.untold == "the arm as it was fitted cannot be simulated: the simulated arm runs away"
-    assert bool(found.no_twin) == unknown
+    assert found.no_twin == "the arm as it was fitted cannot be simulated: the simulated arm runs away"
+    assert bool(found.runs_away) == unknown
 
 
 @pytest.mark.parametrize(("replicas", "controlled", "said"), [(0, True, "no twin was asked for"), (0, False, ""), (1, False, "")])
@@ -117,4 +117,4 @@ def test_who_asks_for_no_twin_is_told_so(replicas: int, controlled: bool, said: 
     monkeypatch.setattr(floored, "white", lambda *_: np.ones(1))
     log = SimpleNamespace(controlled=controlled)
     some: Any = SimpleNamespace(data=None, motions=((log, None),), families=(), replicas=replicas)
-    assert floored.floored_by(some, some, (explored("nominal"),), some, None).untold == said
+    assert floored.floored_by(some, some, (explored("nominal"),), some, None).no_twin == said
