@@ -28,15 +28,16 @@ from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.log.text import read_small_text
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.allowed import refuse_strange
-from pipelines.model.excitation.apart import Pair, judged_again, refuse_hidden, refuse_one, told_apart
+from pipelines.model.excitation.apart import Pair, refuse_hidden, refuse_one
 from pipelines.model.excitation.bounds import parse_bounds
-from pipelines.model.excitation.design import Design, Effort, design
+from pipelines.model.excitation.design import Design, Effort
 from pipelines.model.excitation.doubts import doubts
 from pipelines.model.excitation.earlier import USED, first_mode, information_of
+from pipelines.model.excitation.found import best
 from pipelines.model.excitation.others import frf_plans, friction_plans, hold_plans
 from pipelines.model.excitation.outcome import excitation
 from pipelines.model.excitation.outputs import coefficients, joint_motion, log_of_plan
-from pipelines.model.excitation.rehearse import rehearsed, rehearsed_design
+from pipelines.model.excitation.rehearse import rehearsed
 from pipelines.model.excitation.result import CostOfLimit, Result
 from pipelines.model.excitation.task import Task, Wishes, plan_task
 from pipelines.model.named_cause import wanted_cause
@@ -204,16 +205,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         return replace(_plans(task, settings, given), robot_from=given.why)
     if pair is not None:
         refuse_hidden(task, pair, settings.seed)
-    after, apart = tuple(log.name for log in logs), None
-    share = 1.0 if pair is None else 0.5
-    found = design(task, Effort(share * settings.seconds, settings.evaluations, given.tell), settings.seed)
-    if pair is not None and not found.stopped:
-        found, apart = told_apart(task, found, pair, share * settings.seconds, settings.evaluations, settings.seed, given.tell)
-    kept, rehearsal, failed = rehearsed_design(task, found, settings.seed, given.tell) if settings.rehearse else (found, None, "")
-    if pair is not None and apart is not None and kept.trajectory is not found.trajectory:
-        apart = judged_again(task, kept, pair, apart)
-    result = _result(task, kept, settings, given, after, mode)
-    return replace(result, rehearsal=rehearsal, rehearsal_failed=failed, apart=apart, robot_from=given.why)
+    found = best(task, pair, Effort(settings.seconds, settings.evaluations, given.tell), settings.seed, settings.rehearse)
+    result = _result(task, found.design, settings, given, tuple(log.name for log in logs), mode)
+    return replace(result, rehearsal=found.rehearsal, rehearsal_failed=found.failed, apart=found.apart, robot_from=given.why)
 
 
 def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
@@ -236,7 +230,6 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
     given.tell("judging the design")
     judged = excitation(task, found, settings.seed)
     goal = task.problem.goal
-    reached = goal.ceiling is None or judged.condition_number <= goal.ceiling or found.reached
     trajectory = found.trajectory
     t, motion = trajectory.sampled(settings.sample_time)
     log = planned_log(f"{task.robot.name} {settings.criterion} excitation", task.robot, joint_motion(t, motion), "excitation",
@@ -250,7 +243,8 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
         smallest_singular_value=judged.smallest_singular_value, log_determinant=judged.log_determinant,
         limits=tuple(CostOfLimit(p.joint, p.quantity, p.peak, p.limit, p.unit, p.share, p.cost) for p in found.peaks),
         evaluations=found.evaluations, found_at=found.found_at, seed=settings.seed,
-        interrupted=found.stopped > 0, stopped=found.stopped, reached=reached, shrunk=found.shrunk,
+        interrupted=found.stopped > 0, stopped=found.stopped, reached=goal.meets(judged.condition_number),
+        shrunk=found.shrunk, shrunk_for=found.shrunk_for,
         singular_values=judged.singular_values, parameters=judged.parameters,
         random=judged.random, course=judged.course, period=trajectory.series.period, periods=trajectory.periods,
         run_in=trajectory.run_in, duration=trajectory.duration, sample_time=settings.sample_time,

@@ -99,7 +99,7 @@ def test_what_is_said_of_them_is_of_the_motion_that_is_left(tmp_path: Path, monk
     def halved(task: Task, found: Design, *given: object) -> tuple[Design, None, str]:
         finish = landscape(task, 1, FINISH)
         x = finish.space.shrunk(finish.space.point(found.trajectory.series), 0.5)
-        return finished(task, finish, x, 1, 1, 0, False), None, ""
+        return finished(task, finish, x, 1, 1, 0), None, ""
 
     monkeypatch.setattr(design_excitation, "rehearsed_design", halved)
     result = designed(tmp_path / "out", "spring:2", "torque_offset:2", rehearse=True).result

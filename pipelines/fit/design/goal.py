@@ -32,6 +32,7 @@ __all__ = ["FAR", "Figures", "Goal"]
 Array = npt.NDArray[np.float64]
 
 _STEEP = 10.0  # of the penalty, far above the ceiling: it outweighs what A or D could gain
+_ROUNDED = 1e-6  # beyond the ceiling: what a motion that lies on it has on another number of samples
 FAR = 1e6  # a design above the ceiling is worse than any below it: its figure is this and the logarithm of its condition number
 
 
@@ -122,6 +123,10 @@ class Goal:
         variance = float(self._shares @ np.diag(weighed.covariance)) / self.samples
         return Figures(plain.condition, math.exp(frobenius(plain)[0]), math.sqrt(plain.values[0]),
                        float(np.log(weighed.values).sum()), math.sqrt(variance))
+
+    def meets(self, condition_number: float) -> bool:
+        """Whether that is below the ceiling, if there is one."""
+        return self.ceiling is None or condition_number <= self.ceiling * (1.0 + _ROUNDED)
 
     def singular_values(self, grams: Array) -> Array:
         """Of Φ/√n, largest first."""

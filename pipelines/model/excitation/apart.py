@@ -2,7 +2,7 @@
 
     pair = Pair(a, b)
     refuse_hidden(task, pair, seed)
-    found = told_apart(task, designed, pair, seed, evaluations or seconds)
+    design, found = told_apart(task, designed, pair, seconds, evaluations, seed, tell)
     found.before.similarity, found.after.similarity
 
 With c⊥ = c - Q Qᵀ c the part of a cause's columns that rigid body and friction cannot imitate, weighted by the noise, cause A is as
@@ -34,6 +34,8 @@ _SHARPNESS = 200.0  # [s/rad] of Coulomb friction
 _SHAPES = 4  # of a cause
 _HIDDEN = 0.1  # a cause of which less shows has to show more first
 _RANK = 1e-8
+_ROOM = 0.999  # of the ceiling: what is left for the way back to limits that the search does not see
+_PASSED = 0.97  # of the score of the motion noted last: such a one is noted on the way
 _FIRST, _LEAST, _GROWS, _SHRINKS = 0.3, 1e-3, 1.5, 0.93  # size of a step: the success rule of Rechenberg 1973, about one in five
 
 
@@ -67,6 +69,14 @@ class Apart:
     before: Alike  # the plain design
     after: Alike
     evaluations: int
+    changed: bool = True  # False: nothing better was found that keeps limits and ceiling, so the plain design it is
+
+    def gained(self, task: Task) -> bool:
+        """Whether the causes are less alike than in the plain design, and the condition number as good as was asked for, or no
+        worse."""
+        after, before = self.after, self.before
+        return after.score < before.score and (task.problem.goal.meets(after.condition_number)
+                                               or after.condition_number <= before.condition_number)
 
 
 def refuse_one(pair: Pair, written: Sequence[str]) -> None:
@@ -107,16 +117,20 @@ def _names(pair: Pair) -> tuple[str, str]:
 
 def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluations: int | None, seed: int,
                tell: Callable[[str], None]) -> tuple[Design, Apart]:
-    """`designed`, changed step by step for the better, its ceiling on the condition number kept."""
+    """`designed`, changed step by step for the better, its ceiling on the condition number kept; itself where nothing is better.
+
+    The search looks between a few samples; what keeps its limits between all of them is another motion, if by a little, and is
+    judged as such. Where that took away what was gained, motions are tried that the search had passed on its way.
+    """
     arm = task.arm
     assert arm is not None  # `refuse_hidden`
     problem = landscape(task)
     x = problem.space.point(designed.trajectory.series)
     now = before = _judged(task, arm, problem, x, pair)
-    wanted = task.problem.goal.ceiling or np.inf
-    ceiling = max(wanted, before.condition_number)  # where the plain design did not reach it, this one is no worse
+    # where the plain design did not reach it, this one is no worse
+    ceiling = max(_ROOM * (task.problem.goal.ceiling or np.inf), before.condition_number)
     rng, size, done, until = np.random.default_rng([seed, 9]), _FIRST, 0, time.process_time() + seconds
-    stopped = designed.stopped
+    stopped, passed = designed.stopped, [(x, now)]
     try:
         while (done < evaluations) if evaluations is not None else (time.process_time() < until):
             done += 1
@@ -126,21 +140,27 @@ def told_apart(task: Task, designed: Design, pair: Pair, seconds: float, evaluat
             size = min(size * _GROWS, 1.0) if better else max(size * _SHRINKS, _LEAST)
             if better:
                 x, now = other, seen
+                passed += [(x, now)] if now.score < _PASSED * passed[-1][1].score else []
             if done % 20 == 0:
                 tell(f"evaluation {done}: similarity {now.similarity:.3f}")
     except Interrupted as signal:  # whoever stops the search wants what it has found by then
         stopped = signal.exit_code
-    after = finished(task, landscape(task, 1, FINISH), x, designed.evaluations + done, designed.evaluations + done, stopped,
-                     now.condition_number <= wanted)
-    last = alike(task, arm, after.trajectory.series.samples(problem.samples), pair)
-    return after, Apart(_names(pair), before, last, done)
+    count, finish = designed.evaluations + done, landscape(task, 1, FINISH)
+    for each in (x, *(point for point, _ in reversed(passed[1:]))):
+        after = finished(task, finish, each, count, count, stopped)
+        apart = Apart(_names(pair), before, _seen(task, arm, after, pair), done)
+        if apart.gained(task):
+            return after, apart
+    return replace(designed, evaluations=count, stopped=stopped), Apart(_names(pair), before, before, done, changed=False)
 
 
 def judged_again(task: Task, found: Design, pair: Pair, apart: Apart) -> Apart:
     """`apart` of a motion that was changed after it was told apart."""
-    if task.arm is None:
-        return apart
-    return replace(apart, after=alike(task, task.arm, found.trajectory.series.samples(landscape(task).samples), pair))
+    return apart if task.arm is None else replace(apart, after=_seen(task, task.arm, found, pair))
+
+
+def _seen(task: Task, arm: Arm, found: Design, pair: Pair) -> Alike:
+    return alike(task, arm, found.trajectory.series.samples(landscape(task).samples), pair)
 
 
 def _judged(task: Task, arm: Arm, problem: DesignProblem, x: Array, pair: Pair) -> Alike:

@@ -28,6 +28,8 @@ __all__ = ["ROOMY", "ArmProblem", "DesignProblem", "grams_of"]
 ROOMY = 0.7  # of the limits: where a start begins
 _INSIDE = 0.999  # of the limits: a motion that is drawn back keeps them
 _STEPS = 12  # of bisection
+_PROJECTIONS = 400  # at most: a motion that is a little beyond its limits takes some ten
+_PAST = 0.9998  # of the room: peaks side by side are then not touched in turn for ever
 
 
 def _sign(tau: Array) -> Array:
@@ -157,14 +159,19 @@ class DesignProblem:
         if walls is None:
             return np.inf, x, np.inf
         value, on_grams, score = arm.goal.value(grams_of(arm.columns.columns, rows, len(arm.columns.names)), sharpness)
-        by_motion, on_torque = arm.signals_adjoint(motion, tip, weight * walls[1])
         bars = [(2.0 / self.samples) * (on_grams[j][np.ix_(own, own)] @ row)
                 for j, (own, row) in enumerate(zip(arm.columns.columns, rows, strict=True))]
+        return value + weight * walls[0], self._gradient(motion, rows, tip, weight * walls[1], bars), score
+
+    def _gradient(self, motion: Array, rows: tuple[Array, ...], tip: TipMotion | None, on_signals: Array, on_rows: list[Array],
+                  ) -> Array:
+        """Derivative by x from those by the signals (limits, samples) and by the rows of every joint, which it adds to."""
+        arm = self.arm
+        by_motion, on_torque = arm.signals_adjoint(motion, tip, on_signals)
         if len(arm.watched[3]):
-            for bar, more in zip(bars, arm.torque_adjoint(rows, motion[1], on_torque), strict=True):
+            for bar, more in zip(on_rows, arm.torque_adjoint(rows, motion[1], on_torque), strict=True):
                 bar += more
-        by_motion += arm.columns.adjoint(motion, tuple(bars))
-        return value + weight * walls[0], self.space.gradient(by_motion), score
+        return self.space.gradient(by_motion + arm.columns.adjoint(motion, tuple(on_rows)))
 
     def _moves_within(self, motion: Array) -> bool:
         middle, half = self.arm.bounds
@@ -182,6 +189,31 @@ class DesignProblem:
         middle, half = self.arm.bounds
         signals, _ = self.arm.signals(motion, self.arm.columns.rows(motion))
         return np.asarray((np.abs(signals - middle[:, None]) / half[:, None]).max(axis=1, initial=0.0))
+
+    def moved_within(self, x: Array, room: Array) -> Array | None:
+        """x moved as little as keeps its signals below `room` (limits,) of their limits; None where that does not end.
+
+        Each step goes to the plane s(x) + ∇sᵀ Δx = room of the sample that is farthest beyond: Kaczmarz' projections, on
+        signals that are nearly linear over so small a way.
+        """
+        middle, half = (each[:, None] for each in self.arm.bounds)
+        for _ in range(_PROJECTIONS):
+            motion = self.space.motion(x, self.samples)
+            rows = self.arm.columns.rows(motion)
+            signals, tip = self.arm.signals(motion, rows)
+            share = (signals - middle) / half
+            beyond = np.abs(share) / room[:, None]
+            at = np.unravel_index(int(beyond.argmax()), beyond.shape)
+            if beyond[at] <= 1.0:
+                return x
+            bars = np.zeros_like(share)
+            bars[at] = np.sign(share[at]) / half[at[0], 0]
+            slope = self._gradient(motion, rows, tip, bars, [np.zeros_like(row) for row in rows])
+            steep = float(slope @ slope)
+            if steep == 0.0:  # a standstill, or a signal that nothing here changes
+                return None
+            x = self.space.project(x - (np.abs(share[at]) - _PAST * room[at[0]]) / steep * slope)
+        return None
 
     def cost(self, x: Array) -> Array:
         """What each limit costs, (limits,), as a share of what all of them cost."""

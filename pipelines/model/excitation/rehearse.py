@@ -161,10 +161,11 @@ def rehearsed_design(task: Task, found: Design, seed: int, tell: Callable[[str],
     return (found, first, "") if smaller is None else (*smaller, "")
 
 
-def _alone(task: Task, found: Design, seed: int, tell: Callable[[str], None]) -> Rehearsal | None:
+def _alone(task: Task, found: Design, seed: int, tell: Callable[[str], None], size: float = 1.0) -> Rehearsal | None:
+    """`size`: how much smaller its rehearsals have made it by now; not what its limits asked for before."""
     if task.arm is None:
         return None
-    tell("rehearsing in simulation" if found.shrunk == 1.0 else f"rehearsing in simulation, {found.shrunk:.3f} times as large")
+    tell("rehearsing in simulation" if size == 1.0 else f"rehearsing in simulation, {size:.3f} times as large")
     _, motion = replace(found.trajectory, periods=1).sampled(task.sample_time)
     return rehearse(task.arm, task.sample_time, motion, task.problem.goal.noise, seed, np.inf)
 
@@ -172,17 +173,19 @@ def _alone(task: Task, found: Design, seed: int, tell: Callable[[str], None]) ->
 def _smaller(task: Task, found: Design, last: Rehearsal, seed: int, tell: Callable[[str], None]) -> tuple[Design, Rehearsal] | None:
     """The largest motion like `found` that keeps its limits in its rehearsal; None where making it smaller does not help."""
     finish = landscape(task, 1, FINISH)
-    x = finish.space.point(found.trajectory.series)
+    whole = 1.0
     for _ in range(_REHEARSALS - 1):
         centre = found.trajectory.series.offset if task.home is None else task.home
         size = _INSIDE * last.size(centre)
         if size <= 0.0:  # even at a standstill it is beyond
             return None
-        x = finish.space.shrunk(x, size)
-        # whether it still reaches what was asked for is to be judged anew
-        made = finished(task, finish, x, found.evaluations, found.found_at, found.stopped, False)
-        found = replace(made, shrunk=found.shrunk * size * made.shrunk)
-        now = _alone(task, found, seed, tell)
+        x = finish.space.shrunk(finish.space.point(found.trajectory.series), size)
+        made = finished(task, finish, x, found.evaluations, found.found_at, found.stopped)
+        asked = (f"{one.quantity} of joint {one.joint + 1} in the rehearsal" for one in last.beyond)
+        why = dict.fromkeys((*found.shrunk_for, *asked, *made.shrunk_for))
+        found = replace(made, shrunk=found.shrunk * size * made.shrunk, shrunk_for=tuple(why))
+        whole *= size * made.shrunk
+        now = _alone(task, found, seed, tell, whole)
         if now is None or now.safe:
             return None if now is None else (found, now)
         if not _nearer(now, last):

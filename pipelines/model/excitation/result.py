@@ -77,6 +77,7 @@ class Result:
     stopped: int = field(default=0, metadata=NOT_STORED)  # exit code of the signal that interrupted
     reached: bool = True
     shrunk: float = 1.0
+    shrunk_for: tuple[str, ...] = ()  # the limits, in words, that asked for it
     singular_values: tuple[float, ...] = ()
     parameters: tuple[ParameterStd, ...] = ()
     random: Compared | None = None
