@@ -128,7 +128,6 @@ WORDS: Final[dict[str, str]] = {
     "evaluations": "number of motions that were tried", "found_at": "number of the motion that was taken",
     "interrupted": "whether the search was stopped before its end", "reached": "whether what was asked for was reached",
     "shrunk": "factor by which the motion was made smaller to stay within limits",
-    "shrunk_for": "the limits that asked for it", "changed": "false: nothing better was found, this is the plain design",
     "singular_values": "singular values of the columns", "Result.parameters": "the parameters, one entry each",
     "random": "random motions within the same limits, for comparison", "periods": "number of periods",
     "friction_columns": "whether friction is estimated with the rest",

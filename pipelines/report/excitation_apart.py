@@ -17,12 +17,13 @@ def are_rivals(found: Apart | None) -> bool:
 
 
 def alike_words(found: Apart) -> str:
-    """How alike two causes look, and on which side of what diagnose calls rivals that is."""
+    """How alike two causes look, on which side of what diagnose calls rivals that is, and whether the plain design was kept."""
     before, after = (_on_its_side(one.similarity) for one in (found.before, found.after))
     judged = (f"more than {RIVALS:g}: diagnose would still call them rivals, and a longer search or wider limits may "
               "tell them apart" if are_rivals(found) else f"no more than {RIVALS:g}: diagnose would not call them rivals")
-    return (f"{' and '.join(map(without_keys, found.causes))} look alike by {after} (1: the same; in a design for the parameters "
-            f"alone {before}), {judged}")
+    beside = (f"in a design for the parameters alone {before}" if found.changed else
+              "this is the design for the parameters alone, for no better one was found that keeps what it keeps")
+    return f"{' and '.join(map(without_keys, found.causes))} look alike by {after} (1: the same; {beside}), {judged}"
 
 
 def _on_its_side(similarity: float) -> str:
@@ -38,8 +39,8 @@ def apart_section(found: Apart | None) -> Section | None:
     """How well two causes can be told apart in it."""
     if found is None:
         return None
-    rows = tuple((name, one.similarity, *one.visibility, one.condition_number)
-                 for name, one in (("design for the parameters alone", found.before), ("this design", found.after)))
+    judged = (("design for the parameters alone", found.before), ("this design", found.after))[0 if found.changed else 1:]
+    rows = tuple((name, one.similarity, *one.visibility, one.condition_number) for name, one in judged)
     a, b = map(without_keys, found.causes)
     words = ("Similarity: how much of one cause the other can imitate, when base parameters and friction are fitted beside both; "
              f"above {RIVALS:g} diagnose calls them rivals. Visible: what base parameters and friction cannot take up.")

@@ -10,6 +10,7 @@ from pipelines.model.excitation.doubts import beyond_words
 from pipelines.model.excitation.result import DrawnPlan, Result
 from pipelines.report.excitation_apart import alike_words, apart_section, are_rivals
 from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
+from pipelines.report.excitation_smaller import much_smaller, smaller_words
 from pipelines.report.joint_units import unit_of
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import joint_signal_figure
@@ -52,6 +53,8 @@ def _verdict(result: Result) -> str:
     text = " ".join(said)
     if result.apart is not None:
         text += f"; {alike_words(result.apart)}"
+    if much_smaller(result):
+        text += f"; {smaller_words(result)}"
     if not result.reached and result.ceiling is not None:
         dear = result.dearest
         text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"
@@ -165,6 +168,8 @@ def _limits(result: Result) -> Section:
     text = ["Limits hold between samples too: positions, speeds and accelerations are trigonometric polynomials, and on a grid of "
             "0.1 ms these exceed their largest sample by a known factor at most; of torque and tip half a step between samples is "
             "added."]
+    if smaller := smaller_words(result):
+        text.append(f"{smaller[0].upper()}{smaller[1:]}.")
     if named:
         text.append(f"What limits the design most: {named}. The cost is the share of what the criterion would gain, were that "
                     "limit a little wider.")

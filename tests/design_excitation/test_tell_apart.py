@@ -12,6 +12,7 @@ from pipelines import design_excitation
 from pipelines.errors import UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
+from pipelines.model.excitation import found as found_module
 from pipelines.model.excitation.design import FINISH, Design, finished, landscape
 from pipelines.model.excitation.task import Task
 from pipelines.model.rigid.choose import rigid_body
@@ -95,16 +96,43 @@ def test_what_one_leaves_of_the_other_stands_above_the_noise(both: dict[str, Out
 
 
 def test_what_is_said_of_them_is_of_the_motion_that_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A motion made smaller by its rehearsal tells less: similarity and condition number are its own."""
+    """Motions made smaller by their rehearsal tell less: similarity and condition number are their own; the ceiling is missed."""
     def halved(task: Task, found: Design, *given: object) -> tuple[Design, None, str]:
         finish = landscape(task, 1, FINISH)
         x = finish.space.shrunk(finish.space.point(found.trajectory.series), 0.5)
-        return finished(task, finish, x, 1, 1, 0), None, ""
+        return replace(finished(task, finish, x, 1, 1, 0), shrunk=0.5, shrunk_for=("speed of joint 1 in the rehearsal",)), None, ""
 
-    monkeypatch.setattr(design_excitation, "rehearsed_design", halved)
-    result = designed(tmp_path / "out", "spring:2", "torque_offset:2", rehearse=True).result
+    monkeypatch.setattr(found_module, "rehearsed_design", halved)
+    outcome = designed(tmp_path / "out", "spring:2", "torque_offset:2", rehearse=True)
+    result = outcome.result
     assert result.apart is not None
     assert result.apart.after.condition_number == pytest.approx(result.condition_number, rel=1e-3)
+    assert not result.reached
+    assert [check.code for check in outcome.checks] == ["RRID-C08"]
+    assert "50 % smaller than the search left it, to keep the limits of speed of joint 1 in the rehearsal" in outcome.report.verdict
+    assert "a condition number of 3 was not reached" in outcome.report.verdict
+
+
+@pytest.mark.parametrize(("shrunk", "verdict", "limits"), [(1.0, False, False), (0.9987, False, True), (0.792, True, True)])
+def test_how_much_smaller_a_motion_was_made_is_said(both: dict[str, Outcome[Result]], shrunk: float, verdict: bool,
+                                                    limits: bool) -> None:
+    """By how much, and for which limit: beside the limits wherever it was; in the verdict where it is more than a trifle."""
+    result = replace(both["apart"].result, shrunk=shrunk, shrunk_for=("torque of joint 2",) if limits else ())
+    report = excitation_report(result)
+    (section,) = [one for one in report.sections if one.title == "Limits"]
+    words = "smaller than the search left it, to keep the limits of torque of joint 2"
+    assert (words in report.verdict) == verdict
+    assert (words in " ".join(section.text)) == limits
+
+
+def test_a_plain_design_that_was_kept_is_called_so(both: dict[str, Outcome[Result]]) -> None:
+    result = both["apart"].result
+    assert result.apart is not None
+    kept = replace(result, apart=replace(result.apart, after=result.apart.before, changed=False))
+    report = excitation_report(kept)
+    assert "this is the design for the parameters alone" in report.verdict
+    (section,) = [one for one in report.sections if one.title.startswith("Telling")]
+    assert [row[0] for row in section.tables[0].rows] == ["this design"]
 
 
 def test_a_wave_is_told_from_a_spring(tmp_path: Path) -> None:
@@ -117,7 +145,7 @@ def test_a_wave_is_told_from_a_spring(tmp_path: Path) -> None:
 
 def test_what_shows_in_no_motion_is_named_before_the_search(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rotor inertia at joint 1 of this arm is a part of its base parameters, however it moves."""
-    monkeypatch.setattr(design_excitation, "design", None)
+    monkeypatch.setattr(design_excitation, "best", None)
     with pytest.raises(UsageError, match=": rotor_inertia:1 shows in no motion") as told:
         designed(tmp_path / "out", "spring:2", "rotor_inertia:1")
     assert "'What these logs cannot tell'" in told.value.remedy  # the section's name, not the field's
