@@ -50,7 +50,8 @@ def best(task: Task, pair: Pair | None, effort: Effort, seed: int, rehearse: boo
     if found.design.trajectory is not changed.trajectory:  # made smaller
         apart = judged_again(task, found.design, pair, apart)
         found = replace(found, apart=apart if apart.changed else replace(apart, before=apart.after))
-    if not apart.changed or found.design.stopped or (found.safe and apart.gained(task)):
+    stopped = found.design.stopped != changed.stopped  # in its rehearsal: no further one is wanted
+    if not apart.changed or stopped or (found.safe and apart.gained(task)):
         return found
     return _better(task, found, _rehearsed(task, plain, effort, seed, rehearse), pair, apart)
 
@@ -65,5 +66,5 @@ def _better(task: Task, found: Found, plain: Found, pair: Pair, apart: Apart) ->
     apart = replace(apart, before=before)
     if apart.gained(task) and (found.safe or not plain.safe):
         return replace(found, apart=apart)
-    kept = replace(plain.design, evaluations=found.design.evaluations)
+    kept = replace(plain.design, evaluations=found.design.evaluations, stopped=found.design.stopped or plain.design.stopped)
     return replace(plain, design=kept, apart=replace(apart, after=before, changed=False))

@@ -11,7 +11,7 @@ from pipelines.model.effects.spring import Spring
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.excitation import apart as telling
 from pipelines.model.excitation import found as finding
-from pipelines.model.excitation.apart import Pair
+from pipelines.model.excitation.apart import Apart, Pair
 from pipelines.model.excitation.design import FINISH, Design, Effort, design, finished, landscape
 from pipelines.model.excitation.found import Found, best
 from pipelines.model.excitation.rehearse import Rehearsal
@@ -35,7 +35,7 @@ def plain(task: Task) -> Design:
 
 def halved(task: Task, found: Design) -> Design:
     finish = landscape(task, 1, FINISH)
-    return finished(task, finish, finish.space.shrunk(finish.space.point(found.trajectory.series), 0.5), 1, 1, 0)
+    return finished(task, finish, finish.space.shrunk(finish.space.point(found.trajectory.series), 0.5), 1, 1, found.stopped)
 
 
 def sought(task: Task, monkeypatch: pytest.MonkeyPatch, rehearsal: Rehearse) -> Found:
@@ -68,6 +68,32 @@ def test_a_design_that_its_rehearsal_spoils_gives_way_to_the_plain_one(task: Tas
     assert found.apart is not None
     assert not found.apart.changed
     assert found.apart.after == found.apart.before
+
+
+@pytest.mark.parametrize("nth", [1, 2])
+def test_who_stops_keeps_the_best_by_then(task: Task, plain: Design, nth: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped while causes are told apart, and spoilt by its rehearsal: the plain design; stopped in its rehearsal: as it was. The
+    exit code is the signal's either way, and nothing is rehearsed after the second."""
+    count = 0
+
+    def rehearsal(task: Task, found: Design, *given: object) -> tuple[Design, Rehearsal | None, str]:
+        nonlocal count
+        count += 1
+        if nth == 2:
+            return replace(found, stopped=130), None, ""
+        return (halved(task, found) if count == 1 else found), None, ""
+
+    def stopped(task: Task, *given: object) -> tuple[Design, Apart]:
+        after, apart = telling.told_apart(task, *given)  # type: ignore[arg-type]
+        return (replace(after, stopped=130) if nth == 1 else after), apart
+
+    monkeypatch.setattr(finding, "told_apart", stopped)
+    found = sought(task, monkeypatch, rehearsal)
+    assert found.design.stopped == 130
+    assert found.apart is not None
+    assert (found.apart.changed, count) == ((False, 2) if nth == 1 else (True, 1))
+    same = found.design.trajectory.series.cosine.tobytes() == plain.trajectory.series.cosine.tobytes()
+    assert same == (nth == 1)
 
 
 def test_both_are_compared_as_their_rehearsals_leave_them(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
