@@ -21,5 +21,5 @@ def smaller_words(result: Result) -> str:
     less = 1.0 - result.shrunk
     if less < _SHOWN:
         return ""
-    why = f", to keep the limits of {', '.join(result.shrunk_for)}" if result.shrunk_for else ""
+    why = f", to keep within its limits ({', '.join(result.shrunk_for)})" if result.shrunk_for else ""
     return f"the motion was made {format_number(100.0 * less, 2)} % smaller than the search left it{why}"

@@ -109,7 +109,8 @@ def test_what_is_said_of_them_is_of_the_motion_that_is_left(tmp_path: Path, monk
     assert result.apart.after.condition_number == pytest.approx(result.condition_number, rel=1e-3)
     assert not result.reached
     assert [check.code for check in outcome.checks] == ["RRID-C08"]
-    assert "50 % smaller than the search left it, to keep the limits of speed of joint 1 in the rehearsal" in outcome.report.verdict
+    words = "50 % smaller than the search left it, to keep within its limits (speed of joint 1 in the rehearsal)"
+    assert words in outcome.report.verdict
     assert "a condition number of 3 was not reached" in outcome.report.verdict
 
 
@@ -120,7 +121,7 @@ def test_how_much_smaller_a_motion_was_made_is_said(both: dict[str, Outcome[Resu
     result = replace(both["apart"].result, shrunk=shrunk, shrunk_for=("torque of joint 2",) if limits else ())
     report = excitation_report(result)
     (section,) = [one for one in report.sections if one.title == "Limits"]
-    words = "smaller than the search left it, to keep the limits of torque of joint 2"
+    words = "smaller than the search left it, to keep within its limits (torque of joint 2)"
     assert (words in report.verdict) == verdict
     assert (words in " ".join(section.text)) == limits
 
