@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.errors import Check, NothingMatched, RrridError, UsageError
+from pipelines.errors import Check, RrridError, UsageError
 from pipelines.log.atomic import fault_of
-from pipelines.log.files import entries, regular_file
+from pipelines.log.files import entries, nothing_there, regular_file
 from pipelines.log.places import slug
 
 __all__ = ["Item", "find_items", "read_shard", "shard"]
@@ -59,7 +59,7 @@ def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tu
     checks: list[Check] = []
     _walk(root, root.resolve(), folders, faults, checks)
     if not folders and not faults:
-        raise NothingMatched("C06", "no log there", where=root, remedy="logs end in .h5 or .parquet")
+        raise nothing_there(root, checks)
     items = [Item(_name(folder, root), (folder,), (), fault) for folder, fault in faults.items()]
     for folder, logs in folders.items():
         if each_log:

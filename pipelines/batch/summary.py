@@ -20,7 +20,7 @@ from pipelines.report.drift_figures import Panel, drift_figure
 from pipelines.report.figure_words import figure_in_words
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number
+from pipelines.report.style import Rounded, format_number
 
 __all__ = ["KINDS", "Summary", "rows_of", "summary_report"]
 
@@ -200,7 +200,7 @@ def _tenths(x: float | None) -> float | None:
 
 
 def _digits(x: float | None) -> float | None:
-    return None if x is None else float(f"{x:.2g}")
+    return None if x is None else Rounded(x, 2)
 
 
 def _figures(drift: Drift, ranked: Sequence[Course], baseline: ModelFile | None) -> tuple[Figure, ...]:

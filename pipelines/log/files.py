@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import stat
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,8 +25,8 @@ from pipelines.log.log_reader import read_guarded
 from pipelines.log.robot import RobotDescription
 from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_format
 
-__all__ = ["ENDINGS", "PROVENANCE", "Opened", "entries", "expanded", "find_logs", "hash_file", "open_log", "regular_file",
-           "write_log"]
+__all__ = ["ENDINGS", "PROVENANCE", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there", "open_log",
+           "regular_file", "write_log"]
 
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
@@ -255,8 +255,18 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
         found += sorted(_below(root, root.resolve(), checks))
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
-        raise NothingMatched("C06", "no log there", where=", ".join(map(str, inputs)), remedy="logs end in .h5 or .parquet")
+        raise nothing_there(", ".join(map(str, inputs)), checks)
     return tuple(dict.fromkeys(found)), tuple(checks)
+
+
+def nothing_there(where: object, checks: Sequence[Check]) -> NothingMatched:
+    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie."""
+    links = [str(check.where) for check in checks if check.code == "RRID-X11"]
+    passed, remedy = "", "logs end in .h5 or .parquet"
+    if links:
+        passed = f"; {len(links)} link{'s' * (len(links) > 1)} passed over, {'first ' * (len(links) > 1)}{links[0]}"
+        remedy = "give what a link leads to by its own path"
+    return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
 
 
 def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:

@@ -11,7 +11,7 @@ from pipelines.report.diagnosis_words import at_places, without_keys
 from pipelines.report.figure_words import figure_in_words
 from pipelines.report.report import Figure as Picture
 from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.style import BLUE, VERMILLION, format_number, format_unit, with_std
+from pipelines.report.style import BLUE, VERMILLION, format_number, format_unit, three_digits, with_std
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -196,8 +196,8 @@ def _residuals(result: Comparison) -> Section | None:
     if not result.residuals:
         return None
     changed = sorted(result.residuals, key=lambda one: -abs(_change(one) or 0.0))[:_SHOWN]
-    rows = tuple((figure_in_words(one.name), _rounded(one.a), _rounded(one.b), format_unit(one.unit), _rounded(_change(one)))
-                 for one in changed)
+    rows = tuple((figure_in_words(one.name), three_digits(one.a), three_digits(one.b), format_unit(one.unit),
+                  three_digits(_change(one))) for one in changed)
     more = len(result.residuals) - len(changed)
     text = ("No standard deviation is known of these, so that they are not judged.",
             *((_MODELS,) if any("extended model" in one.name for one in changed) else ()),
@@ -208,10 +208,6 @@ def _residuals(result: Comparison) -> Section | None:
 
 def _change(one: Residual) -> float | None:
     return 100.0 * (one.b / one.a - 1.0) if one.a > 0.0 else None
-
-
-def _rounded(x: float | None) -> float | None:
-    return float(f"{x:.3g}") if x is not None and math.isfinite(x) else None
 
 
 def _alone(result: Comparison) -> Section | None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.answered.words import of_any_size, taken_in, where
 from pipelines.model.diagnosis.given.responding import BELOW
 from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
@@ -21,7 +22,6 @@ from pipelines.report.diagnosis_words import (
     meaning_of,
     named,
     spoken,
-    three_digits,
     told_value,
     torque_of,
     unit_or_dash,
@@ -29,7 +29,7 @@ from pipelines.report.diagnosis_words import (
 )
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Section, Table
-from pipelines.report.style import format_decimals, format_number, to_one_place
+from pipelines.report.style import format_decimals, format_number, three_digits, to_one_place
 from pipelines.report.tip_words import span_words, tip_worth
 
 __all__ = ["finding_section", "gain_table", "numbers_section"]
@@ -39,7 +39,7 @@ _HIDDEN = 2.0  # times the share of the whole, from which the share at its own j
 
 
 def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool = True, floor: str = "the floor",
-                    units: Units = _TURNING, beside: Sequence[Finding] = ()) -> Section:
+                    units: Units = _TURNING, beside: Sequence[Finding] = (), left: Array | None = None) -> Section:
     """What it is, what to check, what it is worth, and the figure that proves it.
 
     Args:
@@ -47,6 +47,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         offer: say how to extend the model by it.
         floor: what its share is counted from.
         beside: every finding, this one among them.
+        left: held-out torque error of each joint with all findings.
     """
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
@@ -58,7 +59,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     elif math.isfinite(one.torque_rms):
         text.append(f"Over the logs that were fitted its torque is {torque_of(one, units)} rms{taken_in(one, nominal.identify)}; "
                     "over other motion it may be more or less")
-    text += _larger(one, units)
+    text += _larger(one, units, left)
     if one.origin == "frequency responses":
         text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
                     f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
@@ -76,11 +77,15 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
                    figures=(*answer_figures(number, one), *proof_figures(number, one, units)))
 
 
-def _larger(one: Finding, units: Units) -> list[str]:
-    """Which joints' held-out error is larger with it, beyond its interval: there it is not what the arm does."""
+def _larger(one: Finding, units: Units, left: Array | None) -> list[str]:
+    """At which joints the held-out error is larger with it, beyond its interval, and stays so with all findings: what another takes
+    away again, the two share, and it is no doubt of this one."""
     torque = one.gain.validate_torque_rms
-    told = [f"of joint {j + 1}, {format_number(float(torque.after[j]), 3)} instead of {format_number(float(torque.before[j]), 3)} "
-            f"{units.at(j + 1).torque} rms" for j in np.flatnonzero(torque.ci95[:, 0] > 0.0).tolist()]
+    grown = torque.after - torque.before
+    stays = grown if left is None else left - torque.before
+    larger = (torque.ci95[:, 0] > 0.0) & (stays > grown - torque.ci95[:, 0])  # more than the interval is wide
+    told = [f"at joint {j + 1}, {format_number(float(torque.after[j]), 3)} instead of {format_number(float(torque.before[j]), 3)} "
+            f"{units.at(j + 1).torque} rms" for j in np.flatnonzero(larger).tolist()]
     where_not = "; ".join(told)
     return [f"With it the held-out torque error is larger {where_not}: not all of it is what the arm does there"] if told else []
 

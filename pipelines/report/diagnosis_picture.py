@@ -15,7 +15,7 @@ from pipelines.report.figures import broken_at_gaps, draw_measured, draw_modelle
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Figure, Section, Table
 from pipelines.report.sections import joint_signal_figure
-from pipelines.report.style import format_number, format_unit, to_one_place
+from pipelines.report.style import format_number, format_unit, three_digits, to_one_place
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,15 +46,11 @@ def _above(found: Diagnosis, one: Evidence, rated: Sequence[float], units: Units
         share = 100.0 * residual / rated[j] if j < len(rated) and math.isfinite(rated[j]) else None
         low, high = one.band[j]
         band = f"{format_number(float(low), 2)} to {format_number(float(high), 2)}" if np.isfinite([low, high]).all() else None
-        rows.append((j + 1, torques[j], _digits(share), torques[joints + j],
-                     _digits(100.0 * float(one.above_floor[j])), band))
+        rows.append((j + 1, torques[j], three_digits(share), torques[joints + j],
+                     three_digits(100.0 * float(one.above_floor[j])), band))
     columns = ("joint", f"residual, rms [{units.torque}]", "residual [% of rated]", f"floor [{units.torque}]",
                "power above the floor [%]", "mostly at [Hz]")
     return Table(columns, tuple(rows), "Of the nominal model, refitted to these logs.")
-
-
-def _digits(x: float | None) -> float | None:
-    return None if x is None or not math.isfinite(x) else float(f"{x:.3g}")
 
 
 def _tells(one: Evidence) -> Table:

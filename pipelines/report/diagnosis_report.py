@@ -35,7 +35,6 @@ from pipelines.report.diagnosis_words import (
     is_cause,
     named,
     per_joint,
-    three_digits,
     title_of,
     together,
     told_values,
@@ -46,7 +45,7 @@ from pipelines.report.joint_units import units_in
 from pipelines.report.model_words import laws_words, threshold_words
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number
+from pipelines.report.style import format_number, three_digits
 from pipelines.report.tip_words import all_together, tip_change
 
 __all__ = ["diagnosis_report"]
@@ -62,7 +61,8 @@ def diagnosis_report(result: Result) -> Report:
     units, (floor, name, floor_from) = units_in(result), held_out_floor(result)
     nominal, now = replace(result.residual_rms, floor=floor), result.unmoved_rms or result.residual_rms
     found = [section for number, one in enumerate(result.findings, 1)
-             for section in (finding_section(number, one, nominal, units=units, beside=result.findings),
+             for section in (finding_section(number, one, nominal, units=units, beside=result.findings,
+                                             left=result.after_rms.validate),
                              numbers_section(number, one, units, result.findings))]
     sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -18,7 +17,7 @@ from pipelines.report.joint_units import Units
 from pipelines.report.style import format_number, format_unit, unit_in_words, with_std
 
 __all__ = ["as_sentence", "at_places", "cause_at", "in_order", "is_cause", "meaning_of", "named", "per_joint", "spoken",
-           "three_digits", "title_of", "together", "told_value", "told_values", "torque_of", "unit_or_dash", "without_keys"]
+           "title_of", "together", "told_value", "told_values", "torque_of", "unit_or_dash", "without_keys"]
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?::(\d+)(?::([a-z]+(?:_[a-z]+)*))?)?\b")
@@ -61,10 +60,11 @@ def at_places(places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
 
 
 def _at_joints(cause: str, joints: Sequence[str]) -> str:
-    *first, last = joints
-    if not first:
-        return f"{named(cause, None)} at joint {last}" if last else named(cause, None)
-    return f"{named(cause, None)} at joints {', '.join(first)} and {last}"
+    *first, last = [joint for joint in joints if joint] or [""]
+    if not last:
+        return named(cause, None)
+    at = f"at joints {', '.join(first)} and {last}" if first else f"at joint {last}"
+    return f"{named(cause, None)} {at}{' and at all joints together' if '' in joints else ''}"
 
 
 def torque_of(one: Finding, units: Units) -> str:
@@ -76,11 +76,6 @@ def as_sentence(text: str) -> str:
     """It begins large and ends in a full stop."""
     text = text.strip()
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
-
-
-def three_digits(x: float) -> float | None:
-    """For a cell of a table."""
-    return float(f"{x:.3g}") if math.isfinite(x) else None
 
 
 def spoken(parameter: str) -> str:

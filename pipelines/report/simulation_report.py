@@ -13,7 +13,7 @@ from pipelines.report.figures import Array, draw_measured, draw_modelled, joint_
 from pipelines.report.motion_figures import colour, draw_density
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.sections import joint_signal_figure
-from pipelines.report.style import format_number, format_unit
+from pipelines.report.style import format_number, format_unit, three_digits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +90,7 @@ def _key_figures(logs: Sequence[Imitation], tracking: Sequence[Array | None]) ->
     for one, reference in zip(logs, tracking, strict=True):
         for j, unit in enumerate(one.units):
             figures = (one.position_rms, one.position_max, reference, one.speed_rms, one.torque_rms)
-            values = [None if x is None else float(f"{x[j]:.3g}") for x in figures]
+            values = [None if x is None else three_digits(x[j]) for x in figures]
             rows.append((one.name, j + 1, unit, *values, _how(one)))
     return Table(("log", "joint", "unit", "position, rms", "position, largest", "tracking error, rms", "speed, rms [unit/s]",
                   "torque, rms [N m]", "simulated in"), tuple(rows),

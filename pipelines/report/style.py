@@ -79,9 +79,11 @@ def unit_in_words(unit: str) -> str:
 
 
 def format_number(value: float | None, digits: int = 4) -> str:
-    """`value` with `digits` significant digits and no empty zeros; a dash where there is none."""
+    """`value` with `digits` significant digits and no empty zeros, fewer where it is `Rounded`; a dash where there is none."""
     if value is None or math.isnan(value):
         return "–"
+    if isinstance(value, Rounded):
+        digits = min(digits, value.digits)
     if item := getattr(value, "item", None):  # NumPy's integers and truth values are no int and no bool
         value = item()
     if isinstance(value, bool):
@@ -94,6 +96,23 @@ def format_number(value: float | None, digits: int = 4) -> str:
     if value != 0.0 and not -3 <= exponent <= 5:
         return f"{_trimmed(mantissa)} × 10{_raised(exponent)}"
     return _grouped(_trimmed(f"{float(value):.{max(0, digits - 1 - exponent)}f}"))
+
+
+class Rounded(float):
+    """A number for a cell, shown with so many significant digits: a column of equally many decimals fills it up with digits of its
+    own, where a number rounded before would get zeros that are none."""
+
+    digits: int
+
+    def __new__(cls, value: float, digits: int = 3) -> Rounded:
+        number = super().__new__(cls, value)
+        number.digits = digits
+        return number
+
+
+def three_digits(value: float | None) -> Rounded | None:
+    """For a cell of a table: three digits are all that it can use."""
+    return Rounded(value) if value is not None and math.isfinite(value) else None
 
 
 def to_one_place(values: Sequence[float]) -> list[float | None]:

@@ -14,7 +14,7 @@ from pipelines.model.writing.result import Result
 from pipelines.report.bps import torque_figure
 from pipelines.report.joint_units import each, joined
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
-from pipelines.report.style import format_decimals, format_number, format_unit
+from pipelines.report.style import format_decimals, format_number, format_unit, three_digits
 from pipelines.report.writing_figures import error_map_figure, executed_figure, simulated_figures, split_figure, task_figures
 
 __all__ = ["writing_report"]
@@ -35,7 +35,8 @@ def writing_report(result: Result) -> Report:
 
 
 def _tone(result: Result) -> Tone:
-    gates = (result.gates.torque, result.gates.cases)
+    written = any(log.experiment == "writing" for log in result.logs)  # that nobody wrote is no remark: the cases are of writing
+    gates = (result.gates.torque, result.gates.cases) if written else (result.gates.torque,)
     return "bad" if False in gates else "good" if all(gates) else "attention"
 
 
@@ -68,11 +69,6 @@ def _mm(case: Case) -> str:
     return ", ".join(f"{1e3 * x:.2f}" if x >= 1e-4 else format_number(1e3 * x, 2) for x in case.tip_error_std.values)
 
 
-def _short(value: float) -> float:
-    """Three digits are all that a table can use."""
-    return float(f"{value:.3g}")
-
-
 def _list(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
     return ", ".join(format_number(float(x), 2) for x in values)
 
@@ -81,11 +77,11 @@ def _key_figures(result: Result) -> Table | None:
     if (torque := result.torque) is None:
         return None
     log = next(one for one in result.logs if one.experiment == "writing" or torque.of != "writing")
-    rows = tuple((name, _short(torque.signal_rms[j]), _short(torque.rms[j]), _short(100 * torque.relative_error[j]),
+    rows = tuple((name, *map(three_digits, (torque.signal_rms[j], torque.rms[j], 100 * torque.relative_error[j])),
                   "yes" if torque.relative_error[j] < result.gates.torque_limit else "no",
                   *((None, None) if result.simulation is None or result.simulation.position_rms is None else
-                    (float(f"{result.simulation.position_rms[j]:.3g}"),
-                     None if result.simulation.torque_rms is None else float(f"{result.simulation.torque_rms[j]:.3g}"))))
+                    (three_digits(result.simulation.position_rms[j]),
+                     None if result.simulation.torque_rms is None else three_digits(result.simulation.torque_rms[j]))))
                  for j, name in enumerate(result.joints))
     unit, position = joined(log.torque_units), joined("rad" if own == "N m" else "m" for own in log.torque_units)
     return Table(("joint", f"torque, rms [{unit}]", f"model misses, rms [{unit}]", "of it [%]", "below the gate",
@@ -98,9 +94,9 @@ def _torque_section(result: Result) -> Section:
     felt = any((log.parts_rms["effects"] > _FELT * log.rms).any() for log in result.logs)
     parts = [name for name in _PARTS if felt or name != "effects"]
     rows: list[tuple[Cell, ...]] = [
-        (f"{log.name}, {result.joints[j]}", *map(_short, (log.signal_rms[j], log.rms[j], 100 * log.relative_error[j],
-                                                          100 * log.relative_error_low_pass[j],
-                                                          *(log.parts_rms[name][j] for name in parts))))
+        (f"{log.name}, {result.joints[j]}", *map(three_digits, (
+            log.signal_rms[j], log.rms[j], 100 * log.relative_error[j], 100 * log.relative_error_low_pass[j],
+            *(log.parts_rms[name][j] for name in parts))))
         for log in result.logs for j in range(len(result.joints))]
     columns = ("log, joint", "torque", "left", "left [%]", "low-passed [%]", *(name.capitalize() if name == "coriolis" else name
                                                                               for name in parts))
@@ -131,7 +127,8 @@ def _where_section(result: Result) -> Section:
     filtered = "" if log.low_pass_hz is None else ", after the low-pass"
     text = (f"By {kinds[log.marks]}. Log {log.name}{filtered}.", *worst)
     rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (one.label, one.start, one.end, *(_short(100 * x) for x in one.relative_error)) for one in log.letters[:_MOST_LETTERS])
+        (one.label, one.start, one.end, *(three_digits(100 * x) for x in one.relative_error))
+        for one in log.letters[:_MOST_LETTERS])
     table = Table(("where", "from [s]", "to [s]", *(f"{name} [%]" for name in result.joints)), rows,
                   "What the model leaves in each, rms, over the torque of the whole log.", keeps_empty=True)
     figure = error_map_figure(log, result.joints)
@@ -218,8 +215,8 @@ def _simulation_section(result: Result) -> Section:
     how = ("in closed loop: the controller, the references and the encoders of the log" if found.simulation == "closed-loop" else
            f"in windows of {format_number((found.window or 0.0) * 1e3, 3)} ms under the logged torque ({found.reason})")
     text = (f"The model in the experiment of {found.name}, {how}. It is not told what the arm did.",)
-    rows = tuple((name, *(None if x is None else float(f"{x[j]:.3g}") for x in (found.position_rms, found.position_max,
-                                                                               found.speed_rms, found.torque_rms)))
+    rows = tuple((name, *(None if x is None else three_digits(x[j]) for x in (
+        found.position_rms, found.position_max, found.speed_rms, found.torque_rms)))
                  for j, name in enumerate(result.joints))
     unit, torque_unit = joined(found.units), joined(found.torque_units)
     table = Table(("joint", f"position, rms [{unit}]", f"position, largest [{unit}]", f"speed, rms [{each(unit, '/s')}]",

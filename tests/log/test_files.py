@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from pipelines.batch.items import find_items
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
 from pipelines.log.experiment import Controller, Derived, Signal
 from pipelines.log.files import find_logs, open_log, write_log
@@ -202,6 +203,19 @@ def test_nothing_there_is_said(tmp_path: Path) -> None:
         find_logs([tmp_path])
     with pytest.raises(UsageError, match="RRID-C04"):
         find_logs([tmp_path / "nowhere"])
+
+
+def test_where_nothing_is_but_links_they_are_named(tmp_path: Path) -> None:
+    """X11: two folders of logs, gathered by links, are no empty folder: what was passed over is told, and what to give instead."""
+    (tmp_path / "two").mkdir()
+    for name in "ab":
+        (tmp_path / "logs" / name).mkdir(parents=True)
+        (tmp_path / "two" / name).symlink_to(tmp_path / "logs" / name)
+    with pytest.raises(NothingMatched, match=r"RRID-C06 .*no log there; 2 links passed over, first \S*two/a\. Give what"):
+        find_logs([tmp_path / "two"])
+    (tmp_path / "two/b").unlink()
+    with pytest.raises(NothingMatched, match=r"1 link passed over, \S*two/a\."):
+        find_items(tmp_path / "two")
 
 
 def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
-from pipelines.report.cells import filled
+from pipelines.report.cells import column_texts, filled
 from pipelines.report.render import render_report
 from pipelines.report.report import Report, Table
+from pipelines.report.style import format_number, three_digits
 from pipelines.stage import Outcome
 from rrrid_cli.console import say_outcome
 
@@ -43,3 +44,12 @@ def test_page_and_terminal_leave_it_out(capsys: pytest.CaptureFixture[str]) -> N
         assert "in order" in shown
         assert "gravity" not in shown
         assert "rated" not in shown
+
+
+def test_a_column_is_filled_up_with_digits_that_are_known() -> None:
+    """Three digits are enough of each, and five decimals for the smallest: what stands there of the others is theirs, no zeros."""
+    known = (0.9958993, 0.9250412, 0.06190177, 0.001234)
+    cells = [three_digits(x) for x in known]
+    assert [format_number(cell) for cell in cells] == ["0.996", "0.925", "0.0619", "0.00123"]
+    assert column_texts(cells) == ["0.99590", "0.92504", "0.06190", "0.00123"]
+    assert three_digits(math.nan) is None

@@ -85,7 +85,7 @@ def test_a_joint_that_is_worse_off_with_it_is_named(low: float, said: bool) -> N
     change = np.array([[low, 0.4], [-0.1, 0.1], [-0.02, -0.01]])
     gain = TorqueGain(np.array([1.59, 0.4, 0.02]), np.array([1.83, 0.4, 0.005]), change)
     text = " ".join(finding_section(1, replace(one, gain=replace(one.gain, validate_torque_rms=gain)), NOMINAL).text)
-    assert ("error is larger of joint 1, 1.83 instead of 1.59 N m rms" in text) is said
+    assert ("error is larger at joint 1, 1.83 instead of 1.59 N m rms" in text) is said
     assert ("error is larger" in text) is said
 
 
@@ -196,3 +196,14 @@ def test_no_line_is_drawn_over_a_gap_in_time() -> None:
         joined = np.isfinite(y[:-1]) & np.isfinite(y[1:])
         assert np.diff(at)[joined].max() < 0.01
         assert np.isfinite(y).sum() == len(t)
+
+
+@pytest.mark.parametrize(("left", "doubted"), [(0.0307, True), (0.0295, True), (0.0160, False), (0.0170, False)])
+def test_what_another_finding_takes_away_again_is_no_doubt(left: float, doubted: bool) -> None:
+    """Torque of another joint makes joint 1 worse until the cogging beside it is known too: then the error is as before."""
+    before, after = np.array([0.0162, 0.4, 0.92]), np.array([0.0307, 0.4, 0.004])
+    interval = np.array([[0.012, 0.017], [-0.01, 0.01], [-0.93, -0.91]])
+    one = replace(finding(), gain=Gain(TorqueGain(before, after, interval), None, "closed-loop", None))
+    text = " ".join(finding_section(1, one, NOMINAL, left=np.array([left, 0.01, 0.004])).text)
+    assert ("larger at joint 1, 0.0307 instead of 0.0162 N m rms" in text) is doubted
+    assert "joint 2," not in text

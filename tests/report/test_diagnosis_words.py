@@ -38,8 +38,8 @@ COMMAND = re.compile(r'"rrrid [^"]*"')
 
 NOTHING: Any = {field.name: () for field in fields(Result)} | {
     "verdict": "nothing-wrong", "question": "what is wrong", "reason": "", "floor_origin": "twin", "held_out": "logs",
-    "held_out_floor": None, "replicas": 0, "robot": "", "residual_rms": ResidualRms(*(np.ones(2),) * 3),
-    "after_rms": ResidualRms(*(np.ones(2),) * 3), "noise": np.ones(2), "memory": None, "rated": (50.0, 50.0)}
+    "held_out_floor": None, "replicas": 0, "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
+    "after_rms": ResidualRms(*(np.ones(3),) * 3), "noise": np.ones(3), "memory": None, "rated": (50.0,) * 3}
 
 
 def found(cause: str) -> Finding:
@@ -103,6 +103,15 @@ def test_one_cause_at_several_joints_is_told_once() -> None:
     found = [Rejected(cause, joint, "") for cause, joint in places]
     assert [words for _, words in together(found)] == ["Stribeck friction at joints 1, 3 and 2", "a load at the tip",
                                                        "cogging at joint 2"]
+
+
+def test_a_cause_at_a_joint_and_at_all_together_is_a_sentence() -> None:
+    """A scale of torque that is wrong at one joint, or at all alike: no joint without its number, in whichever order they come."""
+    for joints in ((1, None), (None, 1)):
+        said, = (words for _, words in together(Rejected("torque_gain", joint, "") for joint in joints))
+        assert said == "wrong torque scale at joint 1 and at all joints together"
+    said, = (words for _, words in together(Rejected("torque_gain", joint, "") for joint in (1, None, 3)))
+    assert said == "wrong torque scale at joints 1 and 3 and at all joints together"
 
 
 def test_whether_an_error_is_in_order_is_said() -> None:

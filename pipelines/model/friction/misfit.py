@@ -19,6 +19,7 @@ NAMED = "let 'rrrid diagnose' say what makes it: a motor that cogs, a spring, a 
 _TOLD_APART = 0.9  # of a wave along the travel, that two of them differ by at least
 _SEVERAL = 4.0  # waves along the travel: fewer beside others like it are a bend
 _MOST = 0.5  # of all waves (mean square), that the largest is where it is named beside others like it
+_MANY = 10.0  # deviations in a value: it then has digits before the first of the deviation
 _MOVED = 0.1  # of the inertia: less is within what a fit is good for
 
 
@@ -90,8 +91,10 @@ def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value
 
 
 def _written(value: Value) -> str:
-    """Both to the place of the deviation's first digit: "0.5305 ± 0.0004 kg m^2"."""
+    """Both to the place of the deviation's first digit, "0.5305 ± 0.0004 kg m^2"; to its second, where the value has no digit before
+    that: "0.0000302 ± 0.0000096 kg m^2"."""
     if value.std is None or not 0.0 < value.std < math.inf:
-        return f"{value.value:.3g} {value.unit}"
-    place = max(0, -int(f"{value.std:.0e}".split("e")[1]))
+        return f"{plain_number(value.value, 3)} {value.unit}"
+    digits = 1 if abs(value.value) >= _MANY * value.std else 2
+    place = max(0, digits - 1 - int(f"{value.std:.{digits - 1}e}".split("e")[1]))
     return f"{round(value.value, place) + 0.0:.{place}f} ± {value.std:.{place}f} {value.unit}"  # no minus before a zero

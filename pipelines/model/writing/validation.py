@@ -149,7 +149,8 @@ def _said(torque: TorqueError | None, gates: Gates, robot: str) -> tuple[Check, 
                           if not error < gates.torque_limit)
         found.append(Check.of("D19", "warn", f"the model misses the torque of held-out logs by more than "
                               f"{100 * gates.torque_limit:.3g} %: {words}", where=robot, gate=True,
-                              remedy="see in which letters; then 'rrrid diagnose', or a fit to richer logs"))
+                              remedy=f"{'see in which letters; then ' if torque.of == 'writing' else ''}let 'rrrid diagnose' say "
+                                     "what is missed, or fit to richer logs"))
     if gates.cases is False:
         found.append(Check.of("D20", "warn", "with the complete model ahead of the feedback the tip strays no less than without, "
                               "on some axis", where=robot, gate=True, remedy="look at the split of the torque, and at its signs"))

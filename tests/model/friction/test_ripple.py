@@ -129,6 +129,10 @@ def test_value_and_deviation_end_at_one_place() -> None:
     (check,) = misfits((replace(joint, inertia=Value(0.5118, 0.0059, "kg m^2"), ripple=ripple),), "log")
     assert "0.512 ± 0.006 kg m^2" in check.message
     assert "0.5300 ± 0.0004 kg m^2" in check.message
+    small = replace(joint.ripple, inertia=Value(3.02e-5, 9.6e-6, "kg m^2"))  # one digit of each would be all that is left of them
+    (check,) = misfits((replace(joint, inertia=Value(4.1e-5, None, "kg m^2"), ripple=small),), "log")
+    assert "0.000041 kg m^2" in check.message
+    assert "0.0000302 ± 0.0000096 kg m^2" in check.message
 
 
 def test_friction_by_position_of_a_joint_that_goes_one_way_is_no_ripple() -> None:
