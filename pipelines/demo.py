@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.results import NOT_STORED
@@ -67,12 +67,20 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         UsageError: C01, C02, a fault that is none; a negative seed.
-        InputRejected: D17, the arm runs away with it.
+        InputRejected: the arm runs away with it (D17), or is no arm.
     """
     if settings.seed < 0:
         raise UsageError("C02", f"the seed {settings.seed} is negative", where="--seed", remedy="give 0 or more")
     faults = tuple(text for text in settings.fault if text != "none")
-    logs = tuple(replace(log, recorded="2004-05-17T09:30:00Z") for log in example_session(*faults, seed=settings.seed))
+    try:
+        session = example_session(*faults, seed=settings.seed)
+    except InputRejected as problem:
+        if problem.code != "RRID-D17":
+            raise
+        # what it says of the gains in a log is no help to who has none
+        raise InputRejected("D17", f"{problem.message}, with {' '.join(faults)}", where="--fault",
+                            remedy="give it another number: the controller of the demo cannot hold an arm with this one") from None
+    logs = tuple(replace(log, recorded="2004-05-17T09:30:00Z") for log in session)
     return Result(logs[0].robot_name, faults,
                   tuple(Recorded(f"logs/{log.name}", log.experiment, log.role, log.n_samples, log) for log in logs))
 

@@ -91,7 +91,8 @@ def _call(words: list[str]) -> None:
         typer.Exit: done, with the exit code.
         UsageError: C01, an unknown option or command; C02, an argument is missing or has the wrong form.
     """
-    command = typer.main.get_command(_with_only(words[0]) if words else app)
+    only = _with_only(words[0]) if words else app
+    command = typer.main.get_command(only)
     try:
         with command.make_context("rrrid", list(words)) as context:
             command.invoke(context)
@@ -99,7 +100,7 @@ def _call(words: list[str]) -> None:
         if not words:  # `rrrid` alone: the help
             print(problem.format_message(), file=sys.stderr)
             raise typer.Exit(2) from None
-        raise as_error(problem) from None
+        raise as_error(problem, "rrrid" if only.registered_commands is app.registered_commands else f"rrrid {words[0]}") from None
 
 
 def _with_only(word: str) -> typer.Typer:

@@ -17,14 +17,15 @@ __all__ = ["WrongUsage", "as_error", "as_given"]
 WrongUsage: Final[Any] = typer.BadParameter.__mro__[1]
 
 
-def as_error(problem: Any) -> UsageError:
+def as_error(problem: Any, called: str = "rrrid") -> UsageError:
     """The parser's complaint in rrrid's words.
 
     Args:
         problem: a `WrongUsage`.
+        called: the command that was called: of an option without its argument the parser does not say whose it is.
     """
     context = problem.ctx
-    command = context.command_path if context is not None else "rrrid"
+    command = context.command_path if context is not None else called
     remedy = f"see '{command} --help'"
     option = getattr(problem, "option_name", None)
     if type(problem).__name__ == "NoSuchOption":

@@ -15,10 +15,15 @@ import argparse
 import math
 from pathlib import Path
 
-from benchmarks.hidden_effects.cases import FAMILIES, SealedCase, campaign, in_part
-from benchmarks.hidden_effects.judge import engine_named, judge, scores_in, tasks
-from benchmarks.hidden_effects.make import make_cases
-from benchmarks.hidden_effects.table import table
+try:
+    from benchmarks.hidden_effects.cases import FAMILIES, SealedCase, campaign, in_part
+    from benchmarks.hidden_effects.judge import engine_named, judge, scores_in, tasks
+    from benchmarks.hidden_effects.make import make_cases
+    from benchmarks.hidden_effects.table import table
+except ModuleNotFoundError as missing:
+    if missing.name != "mujoco":
+        raise
+    raise SystemExit("the bench needs MuJoCo, which is not installed: pip install -e '.[bench]'") from None
 
 
 def main() -> None:

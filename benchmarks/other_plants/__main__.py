@@ -17,10 +17,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hidden_effects.judge import asked
-from benchmarks.other_plants.cases import CASES, Case
-from benchmarks.other_plants.drawn import drawn
 from pipelines.log.files import write_log
+
+try:
+    from benchmarks.hidden_effects.judge import asked
+    from benchmarks.other_plants.cases import CASES, Case
+    from benchmarks.other_plants.drawn import drawn
+except ModuleNotFoundError as missing:
+    if missing.name != "mujoco":
+        raise
+    raise SystemExit("the plants need MuJoCo, which is not installed: pip install -e '.[bench]'") from None
 
 __all__ = ["judged", "main"]
 

@@ -14,19 +14,25 @@ from collections.abc import Sequence
 from pipelines.errors import UsageError, did_you_mean
 from pipelines.model.arm import Acting
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.effects.base import Effect
+from pipelines.model.effects.base import Effect, Quantity
 
 __all__ = ["acting_cause", "refuse_unknown", "wanted_cause"]
 
 
-def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault") -> Acting:
+_LISTED_BY = {"--with": "extend", "--without": "diagnose", "--tell-apart": "design-excitation"}  # whose option it is
+
+
+def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault", command: str = "simulate") -> Acting:
     """The cause that `text` names, with its numbers, on an arm whose joints are turning (`revolute`) or not.
+
+    Args:
+        command: whose help lists the causes that there are.
 
     Raises:
         UsageError: C01, no such cause or parameter; C02, a joint or number that does not fit.
     """
     name, *rest = text.split(":")
-    refuse_unknown(text, where)
+    refuse_unknown(text, where, command)
     kind = find_effect(name)
     joint, numbers = _place(text, kind, rest, revolute, where)
     values = _values(text, kind, kind(joint=joint), numbers, where)
@@ -59,7 +65,7 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
     return effect, {one: values[one] for one in given}
 
 
-def refuse_unknown(text: str, where: str) -> None:
+def refuse_unknown(text: str, where: str, command: str = "extend") -> None:
     """Whether `text` begins with the name of a cause.
 
     Raises:
@@ -69,7 +75,7 @@ def refuse_unknown(text: str, where: str) -> None:
     if name not in effect_names():
         near = did_you_mean(name, effect_names(), 3) or did_you_mean(name, effect_names(), 3, 0.5)
         raise UsageError("C01", f"'{name}' is not a cause{near}", where=where,
-                         remedy=f"'rrrid {'diagnose' if where == '--without' else 'extend'} --help' lists all causes")
+                         remedy=f"'rrrid {_LISTED_BY.get(where, command)} --help' lists all causes")
 
 
 def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bool], where: str) -> tuple[int | None, str]:
@@ -95,7 +101,7 @@ def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: 
     known = {quantity.name: quantity for quantity in kind.parameters}
     fixed = {} if kind.fixed_amplitudes is None else effect.values(kind.fixed_amplitudes)
     values = {q.name: float(getattr(effect, q.name)) if q.shape else fixed.get(q.name, 0.0) for q in kind.parameters}
-    ranges = ", ".join(f"{q.name} {q.low:g} to {q.high:g} {q.unit}" for q in kind.parameters)
+    ranges = ", ".join(map(_range, kind.parameters))
     given = [part.partition("=") for part in numbers.split(",") if part.strip()]
     if not given:
         raise UsageError("C02", f"'{text}' does not say how strong it is", where=where, remedy=f"give some of {ranges}")
@@ -110,13 +116,18 @@ def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: 
     return values
 
 
+def _range(q: Quantity) -> str:
+    """"amplitude -50 to 50 N m"; a pure number has no unit to show."""
+    return f"{q.name} {q.low:g} to {q.high:g}{'' if q.unit == '1' else f' {q.unit}'}"
+
+
 def _refuse_weak(text: str, kind: type[Effect], values: dict[str, float], numbers: str, where: str) -> None:
     """C02, only numbers that do nothing without an amplitude: an order, a frequency."""
     linear = [q for q in kind.parameters if not q.shape and not q.derived and q.period is None]
     given = {part.partition("=")[0].strip() for part in numbers.split(",")}
     if given & {q.name for q in linear} or any(values[q.name] for q in linear):
         return
-    ranges = ", ".join(f"{q.name} {q.low:g} to {q.high:g} {q.unit}" for q in linear)
+    ranges = ", ".join(map(_range, linear))
     follows = [q.name for q in kind.parameters if q.derived and q.name in given]
     what = f"{', '.join(follows)} follows from other numbers" if follows else "does not say how strong it is"
     raise UsageError("C02", f"'{text}': {what}" if follows else f"'{text}' {what}", where=where, remedy=f"give {ranges}")

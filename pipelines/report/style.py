@@ -172,19 +172,23 @@ def log_ticks(axis: Axis) -> None:
     """Label powers of ten on a logarithmic axis as plain text; matplotlib's own labels are formulas.
 
     Where fewer than two of them are in view, so that no scale could be read, what lies between is labelled: twice and five times
-    a power of ten, or every whole multiple.
+    a power of ten, or every whole multiple, and the powers in the same way.
     """
     from matplotlib.ticker import FuncFormatter
 
+    def seen() -> list[int]:
+        low, high = sorted(axis.get_view_interval())
+        return [k for k in range(1, 10) for power in _powers(low, high) if low <= k * 10.0**power <= high]
+
     def label(value: float, _position: int | None = None) -> str:
-        return format_number(int(value)) if 1.0 <= value < 1e4 else f"10{_raised(round(math.log10(value)))}"
+        if 1.0 <= value < 1e4:
+            return format_number(int(value))
+        return f"10{_raised(round(math.log10(value)))}" if seen().count(1) >= 2 else format_number(value, 1)
 
     def between(value: float, _position: int | None = None) -> str:
-        low, high = sorted(axis.get_view_interval())
-        seen = [k for k in range(1, 10) for power in _powers(low, high) if low <= k * 10.0**power <= high]
-        if seen.count(1) >= 2:
+        if (there := seen()).count(1) >= 2:
             return ""
-        wanted = (2, 5) if sum(seen.count(k) for k in (1, 2, 5)) >= 2 else range(2, 10)
+        wanted = (2, 5) if sum(there.count(k) for k in (1, 2, 5)) >= 2 else range(2, 10)
         return format_number(float(f"{value:.1g}"), 1) if round(value / 10.0 ** math.floor(math.log10(value))) in wanted else ""
 
     axis.set_major_formatter(FuncFormatter(label))

@@ -129,6 +129,16 @@ def test_wrong_usage_is_one_line_and_exit_2(logs: Path, words: tuple[str, ...], 
         assert not json_too or said.startswith(json.loads(done.stdout)["error"]["code"])
 
 
+@pytest.mark.parametrize(("words", "option"), [
+    (("design-excitation", "rrr", "--tell-apart", "spring:2"), "--tell-apart"), (("reconstruct", "logs", "--order"), "--order")])
+def test_an_option_without_its_argument_is_one_of_a_command(tmp_path: Path, words: tuple[str, ...], option: str) -> None:
+    """Whose help has more: that of the command, and no list of all commands."""
+    done = rrrid(*words, cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert done.stderr.startswith(f"rrrid: RRID-C02 rrrid {words[0]}: option '{option}' requires ")
+    assert done.stderr.endswith(f" See 'rrrid {words[0]} --help'.\n")
+
+
 def test_rrrid_alone_says_its_help(tmp_path: Path) -> None:
     """Without a command: the help, on standard error, exit 2. --version is one line."""
     done = rrrid(cwd=tmp_path)

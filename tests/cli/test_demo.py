@@ -15,10 +15,12 @@ import numpy as np
 import pytest
 
 from pipelines import demo
+from pipelines.errors import InputRejected
 from pipelines.log.files import write_log
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Value
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.simulation.example import FAULT, example_arm, example_session
+from pipelines.stage import Request
 from tests.cli.commands import REPO, rrrid
 from tests.log.logs import small_log
 
@@ -49,6 +51,13 @@ def test_logs_and_what_was_hidden(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "demo/run/result.json").read_text())["stages"][0]["name"] == "inspect"
     refused = rrrid("demo", *QUICK, "--fault", "quadratic_dog:3", cwd=tmp_path)
     assert (refused.returncode, "quadratic_drag" in refused.stderr) == (2, True)
+
+
+def test_an_arm_that_runs_away_is_told_of_the_fault() -> None:
+    """No log gave gains, and nobody gave a model: another number is what helps."""
+    with pytest.raises(InputRejected, match=r"RRID-D17 .*joint_elasticity:2:stiffness=2000.* another number") as refused:
+        demo.compute(demo.read(Request(()), demo.Settings()), demo.Settings(fault=("joint_elasticity:2:stiffness=2000",)))
+    assert "log" not in refused.value.remedy
 
 
 @pytest.mark.row("C05")

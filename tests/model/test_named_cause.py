@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from pipelines.errors import UsageError
@@ -92,3 +94,20 @@ def test_a_start_is_held_to_the_arm_as_well(text: str) -> None:
         wanted_cause(text, REVOLUTE)
     assert wanted_cause("transmission_coupling:2:with_joint=3", REVOLUTE)[1] == {"with_joint": 3.0}
     assert wanted_cause("link_length:link=2", REVOLUTE)[1] == {"link": 2.0}
+
+
+def test_a_pure_number_has_no_unit_to_show() -> None:
+    """And who is to give a number is told its range."""
+    with pytest.raises(UsageError, match=r"coefficient [^,]* to 2(,|\.)") as refused:
+        acting_cause("backlash:2", REVOLUTE)
+    assert not re.search(r"\d 1\b", refused.value.remedy)
+
+
+@pytest.mark.parametrize(("command", "of"), [("simulate", {}), ("demo", {"command": "demo"})])
+def test_the_command_that_was_called_lists_the_causes(command: str, of: dict[str, str]) -> None:
+    with pytest.raises(UsageError) as refused:
+        acting_cause("x", REVOLUTE, **of)
+    assert refused.value.remedy == f"'rrrid {command} --help' lists all causes"
+    with pytest.raises(UsageError) as refused:
+        wanted_cause("x", REVOLUTE, "--tell-apart")
+    assert refused.value.remedy == "'rrrid design-excitation --help' lists all causes"

@@ -57,7 +57,8 @@ def test_a_row_of_errors_is_rounded_at_one_place() -> None:
     assert to_one_place([]) == []
 
 
-@pytest.mark.parametrize(("ends", "least"), [((0.3, 8.0), 2), ((0.2, 0.8), 2), ((1.1, 4.4), 2), ((3.0, 70.0), 2), ((1.0, 1e3), 4)])
+@pytest.mark.parametrize(("ends", "least"), [((0.3, 8.0), 2), ((0.2, 0.8), 2), ((1.1, 4.4), 2), ((3.0, 70.0), 2), ((1.0, 1e3), 4),
+                                              ((4e-3, 0.08), 2)])
 def test_a_logarithmic_axis_can_be_read(ends: tuple[float, float], least: int) -> None:
     """At least two labels in view, each of which reads as the number it stands at; powers of ten alone where they do."""
     with figure_style("test"):
@@ -74,5 +75,6 @@ def test_a_logarithmic_axis_can_be_read(ends: tuple[float, float], least: int) -
             found |= {float(x): text for x, text in zip(places, words, strict=True) if text and ends[0] <= x <= ends[1]}
     assert len(found) >= least
     assert all(float(text) == pytest.approx(x) for x, text in found.items() if text[:2] != "10")
+    assert not (any("⁻" in text for text in found.values()) and any("." in text for text in found.values()))  # one way of writing
     if least == 4:
         assert list(found.values()) == ["1", "10", "100", "1000"]

@@ -91,8 +91,9 @@ def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value
 
 
 def _written(value: Value) -> str:
-    """Both to the place of the deviation's first digit, "0.5305 ± 0.0004 kg m^2"; to its second, where the value has no digit before
-    that: "0.0000302 ± 0.0000096 kg m^2"."""
+    """Both to the place of the deviation's first digit, "0.5305 ± 0.0004 kg m^2"; to its second where the value has no digit before
+    that one: "0.0000302 ± 0.0000096 kg m^2".
+    """
     if value.std is None or not 0.0 < value.std < math.inf:
         return f"{plain_number(value.value, 3)} {value.unit}"
     digits = 1 if abs(value.value) >= _MANY * value.std else 2

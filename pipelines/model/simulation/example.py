@@ -42,7 +42,7 @@ def example_arm(*faults: str) -> Arm:
     shipped = Arm.from_model(read_model("rrr"))
     revolute = shipped.robot.revolute
     return replace(shipped, friction=tuple(acting_cause(text, revolute) for text in _FRICTION)).extended(
-        *(acting_cause(text, revolute) for text in faults))
+        *(acting_cause(text, revolute, command="demo") for text in faults))
 
 
 def example_session(*faults: str, seed: int = 1) -> tuple[ExperimentLog, ...]:
