@@ -9,6 +9,7 @@ Source   Kostić et al. 2004, eq. (22) for the motion, Section III for the arm; 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,10 +17,10 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.results import NOT_STORED
-from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.result import Diagnosis, NotTestable
 from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
-from pipelines.report.diagnosis_words import in_order, named, spoken, told_values
+from pipelines.report.diagnosis_words import in_order, named, spoken, told_values, without_keys
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.style import format_number, unit_in_words
 from pipelines.stage import Inputs, Request, Stage
@@ -115,14 +116,32 @@ def _given(fault: str) -> dict[str, str]:
     return {key.strip(): value for key, value in pairs}
 
 
-def ending(result: Result, found: Diagnosis | None) -> tuple[str, str]:
-    """What was hidden beside what was found, a line each; `found`: the diagnosis of the logs, None where none was made."""
-    return f"Was hidden: {hidden(result)}.", f"Was found:  {_found(result, found)}."
+def ending(result: Result, found: Diagnosis | None) -> tuple[str, ...]:
+    """What was hidden beside what was found, a line each; and what would show that of which such logs say nothing.
+
+    Args:
+        found: the diagnosis of the logs, None where none was made.
+    """
+    beyond = [] if found is None else list(_beyond(result, found))
+    untold = "; and ".join(f"of {named(*_place(fault))} such logs say nothing: {without_keys(one.reason)}" for fault, one in beyond)
+    return (f"Was hidden: {hidden(result)}.", f"Was found:  {_found(result, found)}{untold and f'; {untold}'}.",
+            *(f"To see it:  {without_keys(record)}" for record in dict.fromkeys(one.record for _, one in beyond)))
+
+
+def _beyond(result: Result, found: Diagnosis) -> Iterator[tuple[str, NotTestable]]:
+    """Each fault that is not found, for the logs cannot tell it."""
+    told = {(one.cause, one.joint) for one in found.findings}
+    for fault in result.fault:
+        cause, joint = _place(fault)
+        at = {joint} if find_effect(cause).evidence == "residual" else {joint, None}  # of the former None is: at all joints alike
+        blind = (one for one in found.not_testable if one.cause == cause and one.joint in at)
+        if (cause, joint) not in told and (one := next(blind, None)) is not None:
+            yield fault, one
 
 
 def _found(result: Result, found: Diagnosis | None) -> str:
     if found is None:
-        return "nobody has looked, for diagnose was left out"
+        return "nobody has looked, for diagnose was not done"
     if found.verdict == "nothing-wrong":
         return "nothing"
     asked = {_place(fault): _given(fault) for fault in result.fault}

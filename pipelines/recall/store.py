@@ -82,7 +82,7 @@ class Store:
             return Missed("everything is asked to be computed anew")
         if not dry and self.unfinished.is_dir():
             self._own()
-        why = "never computed here"
+        why = "for the first time here"
         for entry, files in ((self.unfinished / place, self.unfinished / place / _FILES),
                              (self.out / CACHE / place, self.out / place)):
             about = _about(entry)

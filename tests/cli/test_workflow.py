@@ -42,7 +42,7 @@ def test_roles_by_name(short: Path) -> None:
     write_log(short / "logs/b.h5", replace(controlled_log(400, 2), name="b"))
     words = ("run", "logs", "--out", "out", "--no-report", *SKIP, "--json")
     plain = json.loads(rrrid(*words, "--dry-run", cwd=short).stdout)
-    assert plain["stages"][0]["why"] == "never computed here"
+    assert plain["stages"][0]["why"] == "for the first time here"
     assert rrrid(*words, cwd=short).returncode == 0
     named = json.loads(rrrid(*words, "--dry-run", "--validate", "logs/b.h5", cwd=short).stdout)
     assert "roles" in named["stages"][0]["why"]
