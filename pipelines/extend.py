@@ -114,7 +114,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     if isinstance(inputs.material, Diagnosed) and not settings.causes:
         wanted = _found(inputs.material, inputs.label)
     if not wanted:
-        raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was left out", where=inputs.label,
+        raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was not done", where=inputs.label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     memory = (inputs.material.memory if isinstance(inputs.material, Diagnosed) else None) or Memory()  # none of one taken back
     said = memory.examined(chosen, settings.allow_mismatch)

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pipelines.report.diagnosis_words import at_places, without_keys
+from pipelines.report.diagnosis_words import at_places, unit_or_dash, without_keys
 from pipelines.report.figure_words import figure_in_words
 from pipelines.report.report import Figure as Picture
 from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.style import BLUE, VERMILLION, format_number, format_unit, three_digits, with_std
+from pipelines.report.style import BLUE, VERMILLION, format_number, three_digits, with_std
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -160,7 +160,7 @@ def _figures(result: Comparison) -> Section | None:
     if not result.figures:
         return None
     shown = result.figures[:_SHOWN]
-    rows = tuple((figure_in_words(one.name), with_std(one.a, one.a_std), with_std(one.b, one.b_std), format_unit(one.unit),
+    rows = tuple((figure_in_words(one.name), with_std(one.a, one.a_std), with_std(one.b, one.b_std), unit_or_dash(one.unit),
                   round(one.away, 1) if math.isfinite(one.away) else None, "differs" if one.beyond else "") for one in shown)
     tones: tuple[Tone, ...] = tuple("attention" if one.beyond else "neutral" for one in shown)
     more = len(result.figures) - len(shown)
@@ -196,7 +196,7 @@ def _residuals(result: Comparison) -> Section | None:
     if not result.residuals:
         return None
     changed = sorted(result.residuals, key=lambda one: -abs(_change(one) or 0.0))[:_SHOWN]
-    rows = tuple((figure_in_words(one.name), three_digits(one.a), three_digits(one.b), format_unit(one.unit),
+    rows = tuple((figure_in_words(one.name), three_digits(one.a), three_digits(one.b), unit_or_dash(one.unit),
                   three_digits(_change(one))) for one in changed)
     more = len(result.residuals) - len(changed)
     text = ("No standard deviation is known of these, so that they are not judged.",

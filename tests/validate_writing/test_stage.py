@@ -131,6 +131,19 @@ def test_the_gates_decide_the_exit_code(writing: ExperimentLog, tmp_path: Path) 
     assert validated(tmp_path, {"w": writing}, replace(plain, torque_gate=0.9), check=True).exit_code == 0
 
 
+def test_that_nobody_wrote_is_no_remark(writing: ExperimentLog, tmp_path: Path) -> None:
+    """A held-out log of another motion judges the torque alone: in order where that is, else without letters to look at."""
+    moved, plain = replace(writing, name="moved", experiment="free"), Settings("rrr", simulate=False)
+    wide = validated(tmp_path, {"m": moved}, replace(plain, torque_gate=0.9))
+    assert (wide.result.gates.cases, wide.report.tone) == (None, "good")
+    strict = validated(tmp_path, {"m": moved}, replace(plain, torque_gate=0.01))
+    (missed,) = (check for check in strict.checks if check.code == "RRID-D19")
+    assert (strict.report.tone, "letters" in missed.remedy) == ("bad", False)
+    (missed,) = (check for check in validated(tmp_path, {"w": writing}, replace(plain, torque_gate=0.01)).checks
+                 if check.code == "RRID-D19")
+    assert "letters" in missed.remedy
+
+
 def test_feed_forward_that_harms_fails_the_second_gate(writing: ExperimentLog, tmp_path: Path) -> None:
     """A log of case 6 that errs more than case 1 in z: the gate says so."""
     controller = writing.controller
