@@ -55,6 +55,9 @@ def refuse_foreign(out: Path, force: bool = False, remade: Callable[[str], bool]
     """
     if out.is_symlink() or (out.exists() and not out.is_dir()):
         raise UsageError("C05", "is not a folder", where=out, remedy=_ELSEWHERE)
+    if Path.cwd().is_relative_to(out.resolve()):  # a shell that stays in the old one finds nothing there any more
+        raise UsageError("C05", "is the folder you are in, or around it, and would be replaced under you", where=out,
+                         remedy=f"{_ELSEWHERE}, or call from outside of it (cd)")
     if not out.exists() or not any(out.iterdir()):
         return ()
     try:

@@ -6,6 +6,8 @@
         ...
         found = answer()                      work()
 
+    with errand(prepare):                     something that is done when this process would have to wait for such an answer
+
 The other process is a copy of this one, made where there is a second processor and this is none of a batch's workers: what `work`
 needs it has already, and its answers are copied back. A piece gets the same answer in either: the outcome does not hang on how
 the pieces fell.
@@ -21,6 +23,7 @@ import struct
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pipelines.log.guard import die_with_parent
@@ -30,17 +33,19 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from types import FrameType
 
-__all__ = ["meanwhile", "shared_out"]
+__all__ = ["errand", "meanwhile", "shared_out"]
 
 P = TypeVar("P")
 A = TypeVar("A")
 
 _PLACE = struct.Struct("<I")
 _MOST = 10_000  # pieces: their places fit into a pipe that nobody reads yet
+_PATIENT = 10  # a tenth of a processor that another wants
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 _COPY = threading.Event()  # set in the other process: it makes no further one
 # Processes that have answered: what they hold is given back while this one goes on, for that takes 20 ms of half a gigabyte.
 _LEAVING: list[int] = []
+_ERRANDS: list[Callable[[], None]] = []
 
 
 def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[], Any] = lambda: None,
@@ -70,26 +75,48 @@ def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[]
 
 
 @contextlib.contextmanager
-def meanwhile(work: Callable[[], A]) -> Iterator[Callable[[], A]]:
+def meanwhile(work: Callable[[], A], patient: bool = False) -> Iterator[Callable[[], A]]:
     """Another process does `work` while the body runs, which asks for the answer; where there is none, it is done when it is asked
-    for. An answer that nobody asks for is not waited for."""
+    for. An answer that nobody asks for is not waited for.
+
+    Args:
+        patient: it takes the time in which others leave a processor alone, of a body that shares out work itself.
+    """
     if not _second():
         yield work
         return
     other = _Other()
 
     def answer() -> A:
+        while _ERRANDS and not other.ready:
+            _ERRANDS.pop()()
         with contextlib.suppress(EOFError, OSError, MemoryError):  # it came to grief
             found: A = other.answer()
             return found
         return work()
 
     try:
-        other.begin(work)
+        other.begin(partial(_patiently, work) if patient else work)
         yield answer
     finally:
         with _undisturbed():
             other.end()
+
+
+@contextlib.contextmanager
+def errand(prepare: Callable[[], None]) -> Iterator[None]:
+    """Where the body waits for what is done `meanwhile`, `prepare` is done; else it is not. Nothing may hang on it but time."""
+    _ERRANDS.append(prepare)
+    try:
+        yield
+    finally:
+        if prepare in _ERRANDS:
+            _ERRANDS.remove(prepare)
+
+
+def _patiently(work: Callable[[], A]) -> A:
+    os.nice(_PATIENT)
+    return work()
 
 
 def _second() -> bool:
@@ -132,6 +159,11 @@ class _Other:
             finally:
                 self._theirs.close()  # or nobody would ever be told that no answer comes
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    @property
+    def ready(self) -> bool:
+        """Whether its answer is there, or none will come."""
+        return self._ours.poll()
 
     def answer(self) -> Any:
         """What it has made of its work.

@@ -30,11 +30,14 @@ _FLOOR_NAMES = {"twin": "left by the twin", "reference logs": "left by reference
 _ORDER = 1.3  # times what an arm in order leaves: no further than that may an extended model be from it (issue 9)
 # Times the floor, up to which the table calls an error in order, and times the noise, up to which nobody asks whether it is.
 _STAYS, _STAYS_ABOVE_NOISE = _ORDER, 10.0
+_OF_A_LAW = 0.02  # of what a joint left before: no law is that of the machine to more, least of all where it was not fitted
 _LITTLE = 1.9  # the same: of 114 arms in order none left more
 _HELD_OUT_FLOOR = ("An arm in order is the fitted rigid body and friction, simulated in the held-out experiments with the noise of "
                    "these drives")
 _LEFT_IN_ORDER = "an arm in order leaves"
-_JUDGED = f"What is up to {_ORDER:g} times as much is in order."
+_TOO_HIGH = 4.0  # times what is left: of 1246 diagnoses of the bench no floor that was one stood higher than 2.3
+_JUDGED = (f"What is up to {_ORDER:g} times as much is in order; a little above it, up to {_LITTLE:g} times, some arms in order "
+           "have been seen")
 _AND_BEFORE = ", and what the model left of the reference logs beyond that"
 
 
@@ -55,8 +58,19 @@ def what_stays(found: Diagnosis) -> str:
         return (f" Held out, {which} still {leave} more than noise; whether more than an arm in order does is not known: "
                 f"{_no_floor(found)}.")
     what = f"what {name}" if name == _LEFT_IN_ORDER else "its floor"
-    each = "; ".join(f"joint {j + 1} stays at {format_number(float(times[j]), 2)} times {what}" for j in high)
-    return f" {each.capitalize()}, held out, without a name."
+    share = found.after_rms.validate / np.maximum(found.residual_rms.validate, 1e-300)
+    named = [j for j in high if share[j] <= _OF_A_LAW]
+
+    def stays(some: Sequence[int]) -> str:
+        each = "; ".join(f"joint {j + 1} stays at {format_number(float(times[j]), 2)} times {what}" for j in some)
+        return f" {each.capitalize()}, held out"
+
+    nameless = [j for j in high if j not in named]
+    without = f"{stays(nameless)}, without a name." if nameless else ""
+    if not named:
+        return without
+    most = f"{'at most ' if len(named) > 1 else ''}{format_number(100.0 * float(share[named].max()), 2)} %"
+    return f"{without}{stays(named)}: {most} of what was left before, as what was found is not known to the last."
 
 
 def above_in_order(found: Diagnosis) -> str:
@@ -92,7 +106,7 @@ def held_out_floor(found: Diagnosis) -> tuple[Array, str, str]:
     if found.held_out_floor is None:
         return found.residual_rms.floor, floor_name(found), floor_words(found)
     more = _AND_BEFORE if found.floor_origin == "reference logs" else ""
-    return found.held_out_floor, _LEFT_IN_ORDER, f"{_HELD_OUT_FLOOR}{more}. {_JUDGED}"
+    return found.held_out_floor, _LEFT_IN_ORDER, f"{_HELD_OUT_FLOOR}{more}. {_JUDGED}."
 
 
 def floor_words(found: Diagnosis) -> str:
@@ -163,4 +177,6 @@ def _judged(errors: Sequence[float], floor: float) -> str:
     fine = [error <= _ORDER * floor for error in errors]
     times = [_times(error / floor) for error in errors]
     shown = " → ".join(dict.fromkeys(times[-1:] if fine[0] and fine[-1] else times))
-    return f"{shown}, {'in order' if fine[-1] else 'above it'}"
+    if errors[-1] * _TOO_HIGH < floor:
+        return f"{shown}, no measure"
+    return f"{shown}, {'in order' if fine[-1] else 'a little above it' if errors[-1] <= _LITTLE * floor else 'above it'}"

@@ -15,7 +15,7 @@ import pytest
 
 from pipelines.errors import Interrupted
 from pipelines.log import shared_work
-from pipelines.log.shared_work import meanwhile, shared_out
+from pipelines.log.shared_work import errand, meanwhile, shared_out
 
 PIECES = list(range(9))
 
@@ -273,3 +273,31 @@ def test_an_answer_that_nobody_asks_for_is_not_waited_for(monkeypatch: pytest.Mo
         raise KeyError
     assert time.monotonic() - begun < 30.0
     assert _all_gone(started)
+
+
+def test_an_errand_is_done_while_an_answer_is_waited_for() -> None:
+    """Once; not where the answer is there already, and never after its body."""
+    done = list[float]()
+
+    def slowly_made() -> float:
+        time.sleep(0.3)
+        return time.perf_counter()
+
+    with errand(lambda: done.append(time.perf_counter())), meanwhile(slowly_made) as answer:
+        ended = answer()
+    assert len(done) == 1
+    assert done[0] < ended
+    with errand(lambda: done.append(0.0)):
+        with meanwhile(os.getpid) as answer:
+            time.sleep(0.3)
+            answer()
+        assert len(done) == 1
+    with meanwhile(slowly_made) as answer:
+        answer()
+    assert len(done) == 1
+
+
+def test_patient_work_gives_way_to_what_others_do() -> None:
+    with meanwhile(lambda: os.getpriority(os.PRIO_PROCESS, 0), patient=True) as later, \
+            meanwhile(lambda: os.getpriority(os.PRIO_PROCESS, 0)) as now:
+        assert later() > now() == os.getpriority(os.PRIO_PROCESS, 0)

@@ -44,6 +44,16 @@ def test_what_stays_above_the_floor_is_said(origin: str, own: bool, said: str) -
     assert what_stays(there) == said
 
 
+def test_what_a_law_does_not_have_to_the_last_is_told_as_little() -> None:
+    """A spring that was found took 99 % off joint 1: what stays has its name, though it is above the floor."""
+    floor, now = np.array([0.004, 0.018]), ResidualRms(np.array([4.8, 0.5]), np.array([2.4, 0.5]), np.array([0.004, 0.018]))
+    then = ResidualRms(np.array([0.01, 0.1]), np.array([0.01, 0.1]), now.floor)
+    there: Any = SimpleNamespace(floor_origin="twin", after_rms=then, residual_rms=now, no_twin="", held_out_floor=floor)
+    assert what_stays(there) == (
+        " Joint 2 stays at 5.6 times what an arm in order leaves, held out, without a name. Joint 1 stays at 2.5 times what an arm "
+        "in order leaves, held out: 0.42 % of what was left before, as what was found is not known to the last.")
+
+
 def test_a_twin_that_failed_is_no_unknown_controller() -> None:
     """Nor is a multiple of the noise told, as an arm in order leaves many times as much."""
     rms = ResidualRms(np.array([0.1, 0.1]), np.array([0.1, 0.1]), np.full(2, 0.005))

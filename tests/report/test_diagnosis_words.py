@@ -126,7 +126,9 @@ def test_whether_an_error_is_in_order_is_said() -> None:
     assert beside == ["1.2×, in order", "9× → 1×, in order", "9× → 8×, above it"]
     assert "1.3 times" in table.caption
     near = torque_errors(before, ResidualRms(then, np.array([0.0965, 0.03, 0.01339]), floor), (50.0,) * 3, *known)
-    assert [row[near.columns.index("beside it")] for row in near.rows][::2] == ["1.3×, in order", "9× → 1.34×, above it"]
+    assert [row[near.columns.index("beside it")] for row in near.rows][::2] == ["1.3×, in order", "9× → 1.34×, a little above it"]
+    loud = torque_errors(before, before, (50.0,) * 3, *held_out_floor(Diagnosis(**(nothing | {"held_out_floor": 5.0 * now}))))
+    assert {row[loud.columns.index("beside it")] for row in loud.rows} == {"0.2×, no measure"}  # so loud is no arm in order
     noise = held_out_floor(Diagnosis(**(nothing | {"residual_rms": before})))  # noise alone: any arm leaves more at its reversals
     assert "beside it" not in torque_errors(before, after, (50.0,) * 3, *noise).columns
 

@@ -141,7 +141,7 @@ def _compared(first: Responding, since: Since, reference: Data, chosen: Diagnosi
     for count in range(_STOOD + 1):
         case = first.nameable(since.case)
         asked = Before(case, again=count < _STOOD)
-        with meanwhile(partial(drives, since)) as noise:
+        with meanwhile(partial(drives, since), patient=True) as noise:
             # Once a search ends early: of many joints that have the same law each would have a search of its own.
             found = search(case, chosen.most, ends=asked.ended if count == 0 else None)
             more = asked.stood(found.final)

@@ -22,7 +22,14 @@ from pipelines.model.diagnosis.answered.told import diagnosis_of
 from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, of_those_held_out, only_held_out, share_held_out
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.believed.doubted import of_replicas, told_why, unlike_motion, unlike_noise, without_twin
+from pipelines.model.diagnosis.believed.doubted import (
+    louder_than_logs,
+    of_replicas,
+    told_why,
+    unlike_motion,
+    unlike_noise,
+    without_twin,
+)
 from pipelines.model.diagnosis.believed.pruned import settled
 from pipelines.model.diagnosis.believed.second_look import looked_again
 from pipelines.model.diagnosis.changed import changed
@@ -176,7 +183,7 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
     done = told_why(done, floored.no_twin)
     if floored.twin is not None:
         done = looked_again(done, case, prepared, floored.twin, chosen.most, floored.rms)
-        done = unlike_noise(done, partial(of_replicas, floored.twin))
+        done = louder_than_logs(unlike_noise(done, partial(of_replicas, floored.twin)), floored.rms)
     say("weighing what was found, and what these logs would have shown" if chosen.limits else "weighing what was found")
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
 

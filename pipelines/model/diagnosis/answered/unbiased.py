@@ -40,7 +40,7 @@ from pipelines.model.simulation import Noise, Plant, Simulated, choose_steps, ru
 
 __all__ = ["smoothed_away", "unbiased"]
 
-_RUNS = 3
+_RUNS = 2
 _MOST = 1.2  # times what is left of the logs, that sampling may leave at a joint: more was no such thing
 
 

@@ -3,6 +3,7 @@
     done = unlike_held_out(done, rms, floor, nominal)     held-out logs have a floor of their own
     done = above_in_both(done, rms, floor, fitted)        what has no name shows in both, in neither enough alone
     done = without_twin(done, rms, noise, why)           an arm in order can be simulated under its own controller
+    done = louder_than_logs(done, floor)                  a twin is no louder than the logs that it stands for
     done = told_why(done, why)                            who wants a floor is told why there is none
     done = unlike_motion(done, usual)                     noise does not follow how a joint moves
     done = unlike_noise(done, usual)                      noise does not oscillate
@@ -24,8 +25,8 @@ from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.twin import Twin
 from pipelines.model.diagnosis.named.verdict import Ruling, at_floor, held_out_high, takes_most, without_steps
 
-__all__ = ["above_in_both", "of_replicas", "told_why", "unlike_held_out", "unlike_motion", "unlike_noise", "unnamed",
-           "without_twin"]
+__all__ = ["above_in_both", "louder_than_logs", "of_replicas", "told_why", "unlike_held_out", "unlike_motion", "unlike_noise",
+           "unnamed", "without_twin"]
 
 # Times the floor of the held-out logs. The right cause, a spring turned farther than it was fitted, has been seen to leave 5.1, a
 # wrong one 16; of 114 arms in order none left more than 1.9. Of what the nominal model leaves there a wrong name leaves more than a
@@ -41,6 +42,8 @@ _BOTH = 1.4
 # Times the noise in what a model leaves. No arm in order of the test bench, 286 and some of other kinds, was without a twin where
 # its controller was described; one with a load that sloshes left 18, 33 and 1400 times the noise of its joints.
 _NO_NOISE = 15.0
+# Times what the logs leave of a joint, that their twin does at most: of 1246 diagnoses of the bench none did more than 2.1.
+_LOUDER = 4.0
 _QUIET = 1.3  # times the floor that a twin gives, that an arm in order leaves of the fitted logs at most: of 147 none left more
 _MOST_LEFT = "what explains the fitted logs leaves more than half of what stands above the floor at its joint in those held out"
 # Times the spectrum beside it, and times the most of any replica, that a line of an oscillation has at least. Of 21 arms in order,
@@ -140,6 +143,21 @@ def without_twin(done: Settled, held_out: Array, noise: Array, why: str) -> Sett
         return done
     reason = (f"the residual of {high} stands far above the noise, no cause explains it, and the arm as it was fitted cannot be "
               f"simulated: {why}")
+    return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
+
+
+def louder_than_logs(done: Settled, floor: Array) -> Settled:
+    """"unknown" where nothing was found, and an arm in order leaves, (joints,) [N m] by the twin of these logs, many times what
+    they do: with the noise that shows in them it is shaken as they are not. That is something else then, a gap say."""
+    if done.ruling.verdict != "nothing-wrong":
+        return done
+    times = floor / np.maximum(done.found.nominal.rms, 1e-300)
+    high = held_out_high(times, np.ones(len(times)), _LOUDER)
+    if not high:
+        return done
+    reason = (f"what looks like noise of the drives is none: with as much, the arm as it was fitted would leave {times.max():.2g} "
+              f"times what is left of {high}, so that nobody knows what an arm in order leaves; record reference logs, or "
+              "frequency responses")
     return replace(done, ruling=Ruling("unknown", (), reason, done.ruling.doubts), simulated=())
 
 

@@ -34,14 +34,15 @@ from pipelines.model.diagnosis.rows.data import Data, gather
 from pipelines.model.diagnosis.rows.imperfections import DriveNoise
 from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.motion import Reconstructed
-from pipelines.model.simulation import Noise, Simulated, Step, choose_steps, simulate_together
+from pipelines.model.simulation import Noise, Simulated, Step, choose_steps, runs_alone, simulate_together
 
 __all__ = ["motion_floor", "noise_in"]
 
 Indices = npt.NDArray[np.intp]
 
 # Of each log: with one, whose reversals fall as they will, the root mean square scatters by 2 to 6 %, as that of the log itself
-# does, which it is held against; a third would take off a twentieth of what both scatter.
+# does, which it is held against; a third would take off a twentieth of what both scatter. Reference logs that are about as long as
+# the copies of the others together say as much with one; where it costs as much as two, they have two as well.
 _COPIES = 2
 
 
@@ -64,11 +65,11 @@ def motion_floor(model: Exact, arm: Arm, noise: DriveNoise, motions: Motions, da
     asked = [(motions, data)]
     if prepared.reference is not None:
         asked.append((prepared.referring, prepared.reference))
-    pieces = [_Piece(rows, place, *one) for some, rows in asked for place, one in enumerate(some)]
-    logs = [piece.log for piece in pieces]
-    if not len(replayable(logs)) == len(pieces) > 0:
+    logs = [log for some, _ in asked for log, _ in some]
+    if not len(replayable(logs)) == len(logs) > 0:
         return None
     try:
+        pieces = [_Piece(rows, place, *one, order.copies(some, motions)) for some, rows in asked for place, one in enumerate(some)]
         steps = order.steps(logs)
         shares = _shares(pieces)
         powers = shared_out(lambda share: order.powers(share, steps), shares)
@@ -91,13 +92,18 @@ class _Piece:
     place: int  # in these
     log: ExperimentLog
     found: Reconstructed
+    copies: int
+
+    @property
+    def cost(self) -> int:
+        return self.copies * self.log.n_samples
 
 
 def _shares(pieces: Sequence[_Piece]) -> list[list[_Piece]]:
     """For two processes: each log, the longest first, to the one that has less."""
     shares: tuple[list[_Piece], list[_Piece]] = ([], [])
-    for piece in sorted(pieces, key=lambda piece: -piece.log.n_samples):
-        min(shares, key=lambda share: sum(one.log.n_samples for one in share)).append(piece)
+    for piece in sorted(pieces, key=lambda piece: -piece.cost):
+        min(shares, key=lambda share: sum(one.cost for one in share)).append(piece)
     return [share for share in shares if share]
 
 
@@ -112,6 +118,13 @@ class _InOrder:
     recipe: Recipe
     seed: int
 
+    def copies(self, some: Motions, judged: Motions) -> int:
+        """Of each of `some` logs, when of those that are `judged` there are `_COPIES`."""
+        if some is judged or not all(runs_alone(self.plant, experiment_of(log)) for log, _ in some):
+            return _COPIES
+        length, asked = (sum(log.n_samples * log.sample_time for log, _ in motions) for motions in (some, judged))
+        return max(1, min(_COPIES, round(_COPIES * asked / length)))
+
     def steps(self, logs: Sequence[ExperimentLog]) -> dict[float, Step]:
         """Chosen in the first log of each sample time: what is a tenth of the noise there is little of it in the next."""
         first = {log.sample_time: log for log in reversed(logs)}
@@ -119,23 +132,25 @@ class _InOrder:
 
     def powers(self, pieces: Sequence[_Piece], steps: Mapping[float, Step]) -> list[tuple[Array, Indices]]:
         """Of each log (joints,) [N m^2] sum of squares of what the model leaves of its own replicas, and of how many rows."""
-        experiments = [experiment_of(one.log) for one in pieces]
-        done = simulate_together(self.plant, experiments, self._drives, self._seeds, steps)
-        return [self._power(one, simulated) for one, simulated in zip(pieces, done, strict=True)]
+        found: dict[int, tuple[Array, Indices]] = {}
+        for copies in {one.copies for one in pieces}:
+            some = [one for one in pieces if one.copies == copies]
+            done = simulate_together(self.plant, [experiment_of(one.log) for one in some], self._drives, self._seeds(copies), steps)
+            found |= {id(one): self._power(one, simulated) for one, simulated in zip(some, done, strict=True)}
+        return [found[id(one)] for one in pieces]
 
     def _power(self, piece: _Piece, done: Simulated) -> tuple[Array, Indices]:
-        square, count = np.sum([self._power_of(piece, done, k) for k in range(_COPIES)], axis=0)
+        square, count = np.sum([self._power_of(piece, done, k) for k in range(piece.copies)], axis=0)
         return square, count
 
     def _power_of(self, piece: _Piece, done: Simulated, k: int) -> tuple[Array, Indices]:
         copy, seen = replica((piece.log, piece.found), done, k, self.recipe), piece.rows.logs[piece.place].equations.rows
         own = gather((copy,), self.bare.columns, self.recipe, [seen], piece.place)
-        small = own.lay_each(imperfect(self.arm, self.noise, own, self._seeds, k))
+        small = own.lay_each(imperfect(self.arm, self.noise, own, self._seeds(piece.copies), k))
         return own.power(own.y + small - own.lay(self.plant.torque))
 
-    @property
-    def _seeds(self) -> range:
-        return range(self.seed, self.seed + _COPIES)
+    def _seeds(self, copies: int) -> range:
+        return range(self.seed, self.seed + copies)
 
     @property
     def _drives(self) -> Noise:

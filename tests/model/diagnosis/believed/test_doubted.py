@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.believed.doubted import above_in_both, unlike_held_out, unlike_noise, unnamed, without_twin
+from pipelines.model.diagnosis.believed.doubted import (
+    above_in_both,
+    louder_than_logs,
+    unlike_held_out,
+    unlike_noise,
+    unnamed,
+    without_twin,
+)
 from pipelines.model.diagnosis.believed.pruned import Settled
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.searched.search import Found
@@ -47,6 +54,18 @@ def test_what_shows_in_fitted_and_in_held_out_logs_is_no_chance(fitted: float, h
     assert ("joint 2" in told.ruling.reason) is (verdict == "unknown")
     named = replace(done, ruling=Ruling("cause", (0,), ""))
     assert above_in_both(named, np.array([0.03, held_out, 0.01]), FLOOR, FLOOR) is named
+
+
+@pytest.mark.parametrize(("floor", "verdict"), [(0.02, "nothing-wrong"), (0.07, "unknown")])
+def test_a_twin_that_is_far_louder_than_the_logs_tells_of_no_arm_in_order(floor: float, verdict: str) -> None:
+    """A gap of 5 mrad shakes joint 2 of an arm: what is taken for noise of its drives would leave seven times as much of it."""
+    nominal = left(0.01, 0.01, 0.01)
+    done = Settled(Found(nominal, (), nominal), Ruling("nothing-wrong", (), ""), ())
+    told = louder_than_logs(done, np.array([0.01, floor, 0.01]))
+    assert told.ruling.verdict == verdict
+    assert ("joint 2" in told.ruling.reason) is (verdict == "unknown")
+    named = replace(done, ruling=Ruling("cause", (0,), ""))
+    assert louder_than_logs(named, np.array([0.01, floor, 0.01])) is named
 
 
 @pytest.mark.parametrize(("fitted", "held_out", "why", "verdict"), [
