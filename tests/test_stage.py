@@ -163,6 +163,17 @@ def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> No
         refuse_foreign(tmp_path / "link")
 
 
+@pytest.mark.parametrize(("inside", "out"), [(".", "."), ("figures", "..")])
+def test_the_folder_one_is_in_is_not_replaced_under_one(inside: str, out: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """C05: the shell would stay in one that is gone, and find nothing there."""
+    (tmp_path / "out/figures").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "out" / inside)
+    with pytest.raises(UsageError, match="RRID-C05 .*is the folder you are in"):
+        refuse_foreign(Path(out))
+    (tmp_path / "other").mkdir()
+    refuse_foreign(tmp_path / "other")
+
+
 def test_a_large_folder_of_somebody_else_is_not_walked_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """C05: three files that are not rrrid's are enough; `--out /usr` took seconds before it was refused."""
     for number in range(30):
