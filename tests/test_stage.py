@@ -164,7 +164,8 @@ def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("inside", "out"), [(".", "."), ("figures", "..")])
-def test_the_folder_one_is_in_is_not_replaced_under_one(inside: str, out: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_one_is_in_is_not_replaced_under_one(inside: str, out: str, tmp_path: Path,
+                                                        monkeypatch: pytest.MonkeyPatch) -> None:
     """C05: the shell would stay in one that is gone, and find nothing there."""
     (tmp_path / "out/figures").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "out" / inside)
