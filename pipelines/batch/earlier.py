@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from pipelines.batch.folder import BatchFolder
@@ -12,7 +12,7 @@ from pipelines.batch.items import Item
 from pipelines.batch.lock import LOCK, locked
 from pipelines.errors import Check, RrridError, clean
 from pipelines.log.atomic import environment_faults
-from pipelines.log.earlier import beside, data_of, kept, replaced
+from pipelines.log.earlier import beside, kept, of_other_data, replaced
 from pipelines.log.files import hash_file
 from pipelines.log.places import provenance_of, tilde
 
@@ -39,8 +39,8 @@ def make_way(folder: BatchFolder, stage: str, root: Path, items: Iterable[Item],
         earlier = clean(str(about.get("stage") or ""), 40)
         if about.get("stage") != stage:
             what, ending = f"the earlier batch of {earlier or 'another command'}", earlier or "earlier"
-        elif not named and provenance_of(out).get("root") != tilde(str(root)) and _of_other_data(
-                _inputs(folder.ledger.folder), items):
+        elif not named and provenance_of(out).get("root") != tilde(str(root)) and of_other_data(
+                _inputs(folder.ledger.folder), (_hash(log) for item in items for log in item.logs)):
             what, ending = f"the earlier batch of {earlier}, of other data,", ""
         else:
             return ()
@@ -62,12 +62,6 @@ def _inputs(ledger: Path) -> dict[str, str]:
         except (OSError, ValueError, KeyError, TypeError):
             continue  # torn by a power cut
     return found
-
-
-def _of_other_data(inputs: Mapping[str, str], items: Iterable[Item]) -> bool:
-    """Whether no log of the items is among the inputs; as a rule the very first one is."""
-    earlier = set(map(str, data_of(inputs).values()))
-    return bool(earlier) and not any(_hash(log) in earlier for item in items for log in item.logs)
 
 
 def _hash(log: Path) -> str:

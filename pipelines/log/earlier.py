@@ -8,7 +8,7 @@ is kept or lost is said.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
@@ -16,7 +16,7 @@ from pipelines.errors import Check, clean
 from pipelines.log.atomic import replace_folder
 from pipelines.log.places import free_name, provenance_of, slug
 
-__all__ = ["Coming", "beside", "data_of", "kept", "of_other_data", "put_in_place", "replaced"]
+__all__ = ["Coming", "beside", "kept", "of_other_data", "put_in_place", "replaced"]
 
 _DESCRIBES = {".toml", ".json", ".urdf", ".xml", ".xacro"}  # robots, recipes, models, results: two sessions may share them
 _LOOK = "look there for it, or choose folders with --out"
@@ -74,24 +74,25 @@ def _loss(out: Path, coming: Coming) -> _Loss | None:
     return None
 
 
-def of_other_data(inputs: object, read: Collection[str]) -> bool:
-    """Whether an output of `inputs` (path -> SHA-256) is of logs, and none of them was `read`; also where it says nothing.
+def of_other_data(inputs: object, read: Iterable[str]) -> bool:
+    """Whether an output of `inputs` (path -> SHA-256) is of logs, and none of them is among those that were `read`, by SHA-256 or
+    place, of which no more are asked than it takes; also where it says nothing.
 
     What was made anew in its old place, imported again say, is no other data.
     """
     if not isinstance(inputs, Mapping):
         return True
-    earlier = data_of(inputs)
+    earlier = _data_of(inputs)
     return bool(earlier) and {*earlier, *map(str, earlier.values())}.isdisjoint(read)
 
 
-def data_of(inputs: Mapping[str, str]) -> dict[str, str]:
+def _data_of(inputs: Mapping[str, str]) -> dict[str, str]:
     """Those of the inputs that are measured; all where none is: results that are compared."""
     return {path: value for path, value in inputs.items() if PurePath(path).suffix.lower() not in _DESCRIBES} or dict(inputs)
 
 
 def _whose(inputs: object) -> str:
-    data = sorted(data_of(inputs)) if isinstance(inputs, Mapping) else ()
+    data = sorted(_data_of(inputs)) if isinstance(inputs, Mapping) else ()
     if not data:
         return "which does not say of what data it is"
     return f"of other data ({clean(data[0])}{f' and {len(data) - 1} more' if len(data) > 1 else ''})"
