@@ -143,7 +143,8 @@ def _compared(first: Responding, since: Since, reference: Data, chosen: Diagnosi
         asked = Before(case, again=count < _STOOD)
         with meanwhile(partial(drives, since), patient=True) as noise:
             # Once a search ends early: of many joints that have the same law each would have a search of its own.
-            found = search(case, chosen.most, ends=asked.ended if count == 0 else None)
+            once = count == 0
+            found = search(case, chosen.most, ends=asked.ended if once else None, vain=asked.shown if once else None)
             more = asked.stood(found.final)
             if not more:
                 return _Compared(since, found, asked.told(found.final), noise())

@@ -105,8 +105,9 @@ def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
     seen = _judged(task, task.arm, problem, problem.start(rng), pair)
     hidden = [name for name, eta in zip(_names(pair), seen.visibility, strict=True) if eta < _RANK]
     if hidden:
-        which = f"{' and '.join(hidden)} {'show' if len(hidden) > 1 else 'shows'}"
-        raise UsageError("C02", f"{which} in no motion: the base parameters take {'them' if len(hidden) > 1 else 'it'} up", where="--tell-apart",
+        show, them = ("show", "them") if len(hidden) > 1 else ("shows", "it")
+        raise UsageError("C02", f"{' and '.join(hidden)} {show} in no motion: the base parameters take {them} up",
+                         where="--tell-apart",
                          remedy="the report of diagnose says what would tell it, under 'What these logs cannot tell'")
 
 

@@ -1,6 +1,7 @@
 """What was found beside reference logs and is no change since then.
 
     asked = Before(case)                   how much of what a search finds the reference logs have
+    asked.shown(now, passed)               whether something stood before of what is seen beside what is far greater: asked.early
     asked.ended(done)                      whether what was found last stood before: it is searched again beside that
     asked.stood(done)                      what did, and may be taken out with the rest that stands
     no_change(found, k, case, floor)       why step `k` is not believed to have changed
@@ -9,6 +10,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pipelines.log.experiment import Array
@@ -16,12 +18,15 @@ from pipelines.log.shared_work import shared_out
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.named.verdict import Ruling, at_floor, takes_most
 from pipelines.model.diagnosis.reference.stood import Share
+from pipelines.model.diagnosis.screened.screen import Screened
 from pipelines.model.diagnosis.searched.case import Case
+from pipelines.model.diagnosis.searched.hypotheses import as_seen
 from pipelines.model.diagnosis.searched.search import Found
 from pipelines.model.effects.base import Effect
 
 __all__ = ["Before", "near_other_motion", "no_change"]
 
+_STEPS = 10  # of a fit
 _AS_MUCH = "its joint moves at other speeds than in the reference logs, and no more is left of it than they leave at such speeds"
 _UNCHANGED = "the reference logs may have had it: fitted to them alone, some of it is there as well"
 
@@ -32,7 +37,26 @@ class Before:
     def __init__(self, case: Case, again: bool = True) -> None:
         """`again`: whether there is another search, beside what stood before."""
         self._case, self._again = case, again and case.before is not None
+        self.early: list[Effect] = []
         self._known: dict[tuple[int, int], tuple[Refined, Share]] = {}  # by model, which keeps its id, and place
+
+    def shown(self, now: Refined, passed: Sequence[Screened]) -> bool:
+        """Whether something stood before, at another joint than the greatest of the causes that `passed`: before these are fitted,
+        which would be in vain. What a change makes of itself at other joints the reference logs have not."""
+        own = [one for one in passed if one.joint is not None and not one.family.event and one.amplitude is None]
+        if not own or not self._again:
+            return False
+        first = max(passed, key=lambda one: one.gain[0]).joint
+        for joint in sorted({one.joint for one in own if one.joint is not None} - {first}):
+            best = max((one for one in own if one.joint == joint), key=lambda one: one.gain[0])
+            for steps in (0, _STEPS):  # to first order most of what is none is told
+                done = as_seen(self._case, now, best, steps)
+                last = len(done.model.effects) - 1
+                if last not in self._able(done) or not self._share(done, last).stood:
+                    break
+            else:
+                self.early.append(done.model.effects[last].effect)
+        return bool(self.early)
 
     def ended(self, done: Refined) -> bool:
         """Whether the effect that was found last stood before."""
@@ -41,6 +65,8 @@ class Before:
 
     def stood(self, done: Refined) -> list[Effect]:
         """Effects that stood before, and may be taken out with the rest that stands."""
+        if self.early:
+            return self.early
         able = self._able(done)
         found = shared_out(lambda place: self._share(done, place), able)
         self._known |= {(id(done), place): (done, share) for place, share in zip(able, found, strict=True)}

@@ -22,7 +22,7 @@ from pipelines.model.diagnosis.searched.ledger import Tried
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.effects.base import Effect
 
-__all__ = ["apart_from", "best_form", "each_fitted", "first_order_missed", "fitted", "laid_whole", "plainer"]
+__all__ = ["apart_from", "as_seen", "best_form", "each_fitted", "first_order_missed", "fitted", "laid_whole", "plainer"]
 
 _CONFIRMED = 0.9  # of the held-out error: an event that others confirm leaves less, and a cause in a shape that is not the best
 _NEARLY = 0.95  # of what the best shape explains
@@ -51,6 +51,13 @@ def fitted(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried:
         return (_as_screened(case, now, one, effect, error) or
                 (_borne_out_elsewise(case, now, one, error) if _takes_most(now, one) else None) or tried)
     return tried if tried.possible or not effect.free else _in_range(case, now, one, error) or tried
+
+
+def as_seen(case: Case, now: Refined, one: Screened, steps: int) -> Refined:
+    """The model with a cause as it was screened, fitted in so many steps: none leaves it as it was to first order."""
+    effect = one.shape[0]
+    start = now.model.with_effect(effect, _amplitudes(now.fit, laid_whole(case.data, effect, now.model.arm)))
+    return refine(start, case.data, now.weight, steps)
 
 
 def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error: HeldOut) -> Tried | None:

@@ -115,12 +115,14 @@ def beside_another(rough: Sequence[Explored], case: Case) -> Iterator[Explored]:
             yield Explored(now, _screened(case, now), ())
 
 
-def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable[[Refined], bool] | None = None) -> Found:
+def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable[[Refined], bool] | None = None,
+           vain: Callable[[Refined, Sequence[Screened]], bool] | None = None) -> Found:
     """Up to `most` causes, the same at several joints being one; what `rough` explored already is not done again, as long as it
     leads the same way.
 
     Args:
         ends: whether nothing more is worth looking for beside the model with the cause that was found last.
+        vain: whether nothing at all is, by what exceeds its threshold beside the nominal model, before any of that is fitted.
     """
     now = rough[0].before if rough else refine(case.model, case.data, case.weight)
     nominal = now
@@ -132,6 +134,8 @@ def search(case: Case, most: int, rough: Sequence[Explored] = (), ends: Callable
         same = number <= len(rough) and rough[number - 1].before is now
         screened = rough[number - 1].screened if same else _screened(case, now)
         gate = gate_of(case, now, screened)
+        if vain is not None and not steps and vain(now, gate.passed):
+            break
         explored = rough[number - 1] if same else _explored(case, now, screened, gate)
         if same and (not case.floored or _others(case, explored, gate)):
             explored = _explored(case, now, screened, gate, explored.tried)

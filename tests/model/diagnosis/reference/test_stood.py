@@ -15,17 +15,19 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis import changed as changed_module
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.believed.unchanged import near_other_motion, no_change
+from pipelines.model.diagnosis.believed.unchanged import Before, near_other_motion, no_change
 from pipelines.model.diagnosis.changed import _times
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.fitted.nominal import rows_of
+from pipelines.model.diagnosis.fitted.refit import refine
 from pipelines.model.diagnosis.floor.by_speed import floor_by_speed
 from pipelines.model.diagnosis.given.since import _farther, _with, since_reference
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.reference.standing import Chosen, apart, joined
 from pipelines.model.diagnosis.reference.stood import ANYTHING, Share, share_before
 from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.diagnosis.screened.candidates import lay_one
+from pipelines.model.diagnosis.screened.candidates import Family, lay_one, whole_motion
+from pipelines.model.diagnosis.screened.screen import screen
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
@@ -137,6 +139,30 @@ def test_what_is_known_to_stand_is_taken_out_of_the_later_logs() -> None:
     assert known.case.data.rms(moved[1])[1] < 0.5 * plain.case.data.rms(moved[0])[1]
 
 
+@pytest.mark.parametrize(("before", "moved", "early"), [(1.0, True, True), (0.0, True, False), (1.0, False, False)])
+def test_what_stood_is_seen_beside_what_is_far_greater(before: float, moved: bool, early: bool) -> None:
+    """A drag at joint 2 of before and after, and a spring at joint 1 of the later logs alone: the drag ends the search before it
+    has begun, in the shape that is there. Not where the drag is new; nor where nothing is greater, for then it is found first."""
+    def later(motion: Motion) -> Array:
+        out = drag(1.0)(motion)
+        out[:, 0] += (3.0 if moved else 0.0) * motion.q[:, 0]
+        return out
+
+    logs = Logs((hidden(1, later),), (hidden(2, later),), (replace(hidden(4, drag(before)), role="reference"),))
+    prepared = prepare(logs, SETTINGS)
+    assert prepared.reference is not None
+    case = since_reference(prepared, prepared.reference, replace(SETTINGS, without=effect_names())).case
+    now = refine(case.model, case.data, case.weight)
+    motion = whole_motion(case.data)
+    some = [find_effect("spring")(joint=1), find_effect("quadratic_drag")(joint=2)]
+    families = [Family(one.name, one.joint, tuple(one.shapes(motion, case.model.arm))) for one in some]
+    passed = screen(case.data, now.fit, families, case.arms(now.model))
+    asked = Before(case)
+    assert asked.shown(now, passed) is early
+    assert [(one.name, one.joint) for one in asked.early] == ([("quadratic_drag", 2)] if early else [])
+    assert not Before(case, again=False).shown(now, passed)
+
+
 @pytest.mark.parametrize(("answers", "searched"), [([""], 1), (["a", ""], 2), (["a", "b", ""], 3), (list("abcdefgh"), 5)])
 def test_it_searches_until_nothing_more_stood(answers: list[str], searched: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """And there is an end to it."""
@@ -148,7 +174,7 @@ def test_it_searches_until_nothing_more_stood(answers: list[str], searched: int,
 
     class Asked:
         def __init__(self, case: int, again: bool) -> None:
-            self.case, self.again, self.ended = case, again, None
+            self.case, self.again, self.ended, self.shown = case, again, None, None
 
         def stood(self, _: object) -> list[str]:
             return list(next(told)) if self.again else []
@@ -156,7 +182,7 @@ def test_it_searches_until_nothing_more_stood(answers: list[str], searched: int,
         def told(self, _: object) -> int:
             return self.case
 
-    def searched_for(case: int, _: int, ends: object) -> Any:
+    def searched_for(case: int, _: int, ends: object, vain: object) -> Any:
         count.append(case)
         return SimpleNamespace(final=None)
 
