@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,6 +24,10 @@ from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
 
 __all__ = ["Acting", "Arm", "ArmTorque"]
+
+# Torque without effects that was asked for last, by body, base, friction and motion: an effect's slopes ask for it once a number.
+_KEPT: list[tuple[str, tuple[object, ...], Array]] = []
+_KEEP = 16
 
 
 @dataclass(frozen=True)
@@ -122,21 +126,45 @@ class Arm:
                        key=lambda acting: (acting.effect.last, acting.effect.in_drive, acting.effect.misread))
         return replace(self, effects=tuple(outer))
 
-    def torque(self, motion: Motion) -> Array:
-        """Torque (samples, joints) [N m] that a log of this motion should show."""
+    def torque(self, motion: Motion, inside: Callable[[Motion, ArmModel], Array] | None = None) -> Array:
+        """Torque (samples, joints) [N m] that a log of this motion should show.
+
+        Args:
+            inside: torque that is added to that of rigid body and friction, before any effect acts on it.
+        """
         def predict(motion: Motion, arm: ArmModel, acting: tuple[Acting, ...]) -> Array:
             if not acting:
-                return arm.torque(motion)
+                return arm.torque(motion) if inside is None else arm.torque(motion) + inside(motion, arm)
             *inner, last = acting
             return last.effect.apply(motion, arm, last.values, lambda m, a: predict(m, a, tuple(inner)))
 
-        if self.effects:
+        if self.effects or inside is not None:
             return predict(motion, self.nominal, self.effects)
+        return self._kept("torque", motion, self._nominal_torque).copy()
+
+    def _nominal_torque(self, motion: Motion) -> Array:
         rigid = self.body.torque(motion.q, motion.dq, motion.ddq, self.p)
         return rigid + self.friction_torque(motion) if self.friction else rigid
 
     def friction_torque(self, motion: Motion) -> Array:
-        """Torque (samples, joints) [N m] of the friction laws alone; they see the rigid body, not each other."""
+        """Torque (samples, joints) [N m] of the friction laws alone: they see the rigid body, not each other. To be read only."""
+        return self._kept("friction", motion, self._friction_torque)
+
+    def _kept(self, kind: str, motion: Motion, work: Callable[[Motion], Array]) -> Array:
+        """What `work` makes of a motion that nobody writes to, made once as long as there is room."""
+        if motion.q.flags.writeable:
+            return work(motion)
+        key = (self.body, self.base, self.friction, motion)
+        for other, same, found in tuple(_KEPT):
+            if other == kind and all(a is b for a, b in zip(key, same, strict=True)):
+                return found
+        torque = work(motion)
+        torque.flags.writeable = False
+        _KEPT.append((kind, key, torque))
+        del _KEPT[:-_KEEP]
+        return torque
+
+    def _friction_torque(self, motion: Motion) -> Array:
         rigid = replace(self, friction=(), effects=())
         torque = np.zeros_like(motion.q)
         for law in self.friction:

@@ -21,12 +21,15 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.fitted.nominal import Fit, effect_rows, law_rows, nominal_arm, rigid_rows, several_rows
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.mixed import mixable, mixed
-from pipelines.model.effects.base import Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Quantity
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["Exact", "Named", "law_of", "number_moved"]
 
+_ARMS: list[tuple[Columns, Array, Arm]] = []  # the nominal ones made last
+_STANDING: list[tuple[tuple[object, ...], Array]] = []  # what stands beside them over a motion
+_KEEP = 4
 _FARTHEST = 0.5  # of ln shape, a step
 
 
@@ -92,7 +95,13 @@ class Exact:
 
     @cached_property
     def nominal(self) -> Arm:
-        return nominal_arm(self.columns, self.beta)
+        """One and the same for models that differ in their effects: what it has worked out serves all of them."""
+        for columns, beta, arm in tuple(_ARMS):
+            if columns is self.columns and beta is self.beta:
+                return arm
+        _ARMS.append((self.columns, self.beta, nominal_arm(self.columns, self.beta)))
+        del _ARMS[:-_KEEP]
+        return _ARMS[-1][2]
 
     @cached_property
     def arm(self) -> Arm:
@@ -111,8 +120,23 @@ class Exact:
         arm = self.arm_in(log)
         if not self.standing:
             return arm.torque(motion)
-        known = sum(one.effect.torque(motion, self.nominal, one.values) for one in self.standing)
-        return np.asarray(replace(arm, effects=(*self.standing, *arm.effects)).torque(motion) - known)
+        known = self._standing_torque(motion)
+
+        def inside(there: Motion, own: ArmModel) -> Array:
+            same = there is motion and isinstance(own, Arm) and own.base is self.nominal.base and own.body is self.nominal.body
+            return known if same else _added(self.standing, there, own)
+
+        return np.asarray(arm.torque(motion, inside) - known)
+
+    def _standing_torque(self, motion: Motion) -> Array:
+        """(samples, joints) [N m] of what stands beside it; kept for models that differ in their effects, as `nominal` is."""
+        key = (self.standing, self.nominal, motion)
+        for same, found in tuple(_STANDING):
+            if all(a is b for a, b in zip(key, same, strict=True)):
+                return found
+        _STANDING.append((key, _added(self.standing, motion, self.nominal)))
+        del _STANDING[:-_KEEP]
+        return _STANDING[-1][1]
 
     @property
     def core(self) -> int:
@@ -191,6 +215,11 @@ class Exact:
         effects = [_following(one, laws) for one in effects]
         columns = replace(self.columns, laws=tuple(laws))
         return replace(self, columns=columns, beta=self.beta + shift[:first], effects=tuple(effects))
+
+
+def _added(standing: Sequence[Acting], motion: Motion, arm: ArmModel) -> Array:
+    """(samples, joints) [N m] of effects that just add theirs."""
+    return np.asarray(sum(one.effect.torque(motion, arm, one.values) for one in standing))
 
 
 def law_of(laws: Sequence[Effect], effect: Effect, name: str) -> int | None:

@@ -263,7 +263,7 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     skip = _skipped(equations)
     some = [(Motion(m.t[::skip], m.q[::skip], m.dq[::skip], m.ddq[::skip]), tau[::skip]) for m, tau in stretches]
     tau = np.concatenate([tau for _, tau in some])
-    t, q, dq, ddq = (np.concatenate([getattr(m, name) for m, _ in some]) for name in ("t", "q", "dq", "ddq"))
+    t, q, dq, ddq = (_only_read(np.concatenate([getattr(m, name) for m, _ in some])) for name in ("t", "q", "dq", "ddq"))
     ends = np.cumsum([0, *(len(tau) for _, tau in some)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     runs = tuple(run_of(equations, run, skip) for run in equations.runs)
@@ -272,6 +272,11 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     since = _first_known(runs[0], pieces[0])
     logged = None if equations.held else tau[since]
     return LogData(log, equations, Motion(t, q, dq, ddq, asked, logged, since=since), y, ~slow.T, pieces, runs, kept, place)
+
+
+def _only_read(x: Array) -> Array:
+    x.flags.writeable = False
+    return x
 
 
 def _first_known(run: Run, piece: slice) -> int:
