@@ -14,7 +14,7 @@ from pipelines.errors import Check, RrridError, clean
 from pipelines.log.atomic import environment_faults
 from pipelines.log.earlier import beside, kept, of_other_data, replaced
 from pipelines.log.files import hash_file
-from pipelines.log.places import provenance_of, tilde
+from pipelines.log.places import provenance_of, refuse_own_place, tilde
 
 __all__ = ["make_way"]
 
@@ -30,6 +30,7 @@ def make_way(folder: BatchFolder, stage: str, root: Path, items: Iterable[Item],
 
     Raises:
         EnvironmentFault: P08, a batch is at work there.
+        UsageError: C05, what would be moved is the folder one is in.
     """
     out = folder.out
     with locked(out), environment_faults(out):
@@ -46,6 +47,7 @@ def make_way(folder: BatchFolder, stage: str, root: Path, items: Iterable[Item],
             return ()
         if force:
             return (replaced(out, what, forced=True),)
+        refuse_own_place(out)
         aside = beside(out, ending)
         os.replace(out, aside)
         (aside / LOCK).unlink(missing_ok=True)

@@ -8,6 +8,7 @@ is kept or lost is said.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -100,7 +101,8 @@ def _whose(inputs: object) -> str:
 
 def beside(out: Path, ending: str) -> Path:
     """The free place beside `out` for what lies there now."""
-    return free_name(out.with_name(slug(f"{out.name}-{ending}")) if ending else out)
+    place = out if out.name not in ("", "..") else Path(os.path.abspath(out))  # a/.. has a name as well
+    return free_name(place.with_name(slug(f"{place.name}-{ending}")) if ending else place)
 
 
 def kept(out: Path, what: str, aside: Path, remedy: str = _LOOK) -> Check:

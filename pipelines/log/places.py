@@ -17,8 +17,8 @@ from typing import Any
 from pipelines.errors import EnvironmentFault, UsageError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 
-__all__ = ["free_name", "given_names", "holds_apart", "keep_apart", "provenance_of", "refuse_foreign", "refuse_unwritable",
-           "renamed", "short_names", "slug", "tilde", "told_apart", "written_by"]
+__all__ = ["free_name", "given_names", "holds_apart", "keep_apart", "provenance_of", "refuse_foreign", "refuse_own_place",
+           "refuse_unwritable", "renamed", "short_names", "slug", "tilde", "told_apart", "written_by"]
 
 _MOST_APART = 1000  # outputs in one folder
 _ELSEWHERE = "choose another folder with --out"
@@ -40,6 +40,20 @@ def keep_apart(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> N
             raise UsageError("C05", f"lies inside the input {folder}", where=out, remedy=_ELSEWHERE)
 
 
+def refuse_own_place(out: Path, remedy: str = f"{_ELSEWHERE}, or call from outside of it (cd)") -> None:
+    """C05: the folder one is in is not replaced, or moved: a shell that stays in the old one finds nothing there any more.
+
+    Raises:
+        UsageError: `out` is that folder, or around it.
+    """
+    try:
+        here = Path.cwd()
+    except FileNotFoundError:  # somebody has done so already: who is nowhere is in no output
+        return
+    if here.is_relative_to(out.resolve()):
+        raise UsageError("C05", "is the folder you are in, or around it, and would be replaced under you", where=out, remedy=remedy)
+
+
 def refuse_foreign(out: Path, force: bool = False, remade: Callable[[str], bool] = lambda name: False) -> tuple[str, ...]:
     """C05: an output folder may be new, empty, or rrrid's own earlier output as it was left.
 
@@ -55,9 +69,7 @@ def refuse_foreign(out: Path, force: bool = False, remade: Callable[[str], bool]
     """
     if out.is_symlink() or (out.exists() and not out.is_dir()):
         raise UsageError("C05", "is not a folder", where=out, remedy=_ELSEWHERE)
-    if Path.cwd().is_relative_to(out.resolve()):  # a shell that stays in the old one finds nothing there any more
-        raise UsageError("C05", "is the folder you are in, or around it, and would be replaced under you", where=out,
-                         remedy=f"{_ELSEWHERE}, or call from outside of it (cd)")
+    refuse_own_place(out)
     if not out.exists() or not any(out.iterdir()):
         return ()
     try:

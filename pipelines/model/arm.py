@@ -152,12 +152,12 @@ class Arm:
 
     def _kept(self, kind: str, motion: Motion, work: Callable[[Motion], Array]) -> Array:
         """What `work` makes of a motion that nobody writes to, made once as long as there is room."""
-        if motion.q.flags.writeable:
+        if any(x.flags.writeable for x in (motion.q, motion.dq, motion.ddq)):
             return work(motion)
         key = (self.body, self.base, self.friction, motion)
-        for other, same, found in tuple(_KEPT):
-            if other == kind and all(a is b for a, b in zip(key, same, strict=True)):
-                return found
+        for entry in tuple(_KEPT):
+            if entry[0] == kind and all(a is b for a, b in zip(key, entry[1], strict=True)):
+                return entry[2]
         torque = work(motion)
         torque.flags.writeable = False
         _KEPT.append((kind, key, torque))

@@ -37,7 +37,7 @@ _HELD_OUT_FLOOR = ("An arm in order is the fitted rigid body and friction, simul
 _LEFT_IN_ORDER = "an arm in order leaves"
 _TOO_HIGH = 4.0  # times what is left: of 1246 diagnoses of the bench no floor that was one stood higher than 2.3
 _JUDGED = (f"What is up to {_ORDER:g} times as much is in order; a little above it, up to {_LITTLE:g} times, some arms in order "
-           "have been seen")
+           f"have been seen; what is more than {_TOO_HIGH:g} times the error itself is no measure of it")
 _AND_BEFORE = ", and what the model left of the reference logs beyond that"
 
 

@@ -14,11 +14,11 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from pipelines import __version__
-from pipelines.errors import Check, InputRejected, RrridError, UsageError
+from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean
 from pipelines.log.atomic import environment_faults, replace_folder, staging_folder
 from pipelines.log.earlier import Coming, put_in_place
 from pipelines.log.files import PROVENANCE, hash_file
-from pipelines.log.places import keep_apart, refuse_foreign, tilde
+from pipelines.log.places import keep_apart, refuse_foreign, refuse_own_place, tilde
 from pipelines.log.results import decode, json_text, read_foreign_series
 from pipelines.log.stored_result import StoredResult, listed_outputs, read_result
 from pipelines.recall.pictures import DRAWING, pictures_of, with_pictures, write_drawing
@@ -44,6 +44,8 @@ def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[
     home = stored.path.parent
     if out is not None:
         keep_apart(out, (stored.path,), (home,))
+    if out is None:
+        refuse_own_place(home, f"go out of it first: cd .. and 'rrrid report {clean(home.name)}'")
     refuse_foreign(home if out is None else out, force)
     report = tilde(_report(stored))
     about = _provenance(home)

@@ -81,18 +81,22 @@ def test_effects_act_around_those_before(arm: Arm, motion: Motion) -> None:
     assert arm.extended(half, drag).nominal == arm
 
 
-def test_what_is_kept_of_a_motion_is_that_of_the_very_arm(arm: Arm, motion: Motion) -> None:
+def test_what_is_kept_of_a_motion_is_that_of_the_very_arm(arm: Arm, motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of one that nobody writes to, torque is worked out once: for another arm anew, and whoever writes to it writes to a copy."""
     still = replace(motion, q=motion.q.copy(), dq=motion.dq.copy(), ddq=motion.ddq.copy())
-    still.q.flags.writeable = False
+    for x in (still.q, still.dq, still.ddq):
+        x.flags.writeable = False
     heavier = replace(arm, base=tuple(replace(p, value=1.1 * p.value) for p in arm.base))
     smoother = replace(arm, friction=arm.friction[:1])
     arms = (arm.nominal, heavier.nominal, smoother.nominal, arm, heavier)
+    asked, worked = list[int](), type(arm.body).torque
+    monkeypatch.setattr(type(arm.body), "torque", lambda body, q, *rest: asked.append(id(q)) or worked(body, q, *rest))
     for one in (*arms, *reversed(arms)):
         torque = one.torque(still)
         np.testing.assert_allclose(torque, one.torque(motion), rtol=0, atol=1e-12)
         np.testing.assert_allclose(one.friction_torque(still), one.friction_torque(motion), rtol=0, atol=1e-12)
         torque += 1.0
+    assert asked.count(id(still.q)) == 3
     half = arm.nominal.extended(Acting(HalfTorque(), (Parameter("part", 0.5, None, "1"),)))
     inside = half.torque(still, lambda there, _: np.ones_like(there.q))
     np.testing.assert_allclose(inside, half.torque(motion) + 0.5, rtol=0, atol=1e-12)  # it acts on what stands inside too

@@ -140,9 +140,9 @@ def rehearsed_design(task: Task, found: Design, seed: int, tell: Callable[[str],
     """`found` with what its rehearsal did, made smaller where that keeps its limits; in words what went wrong.
 
     One period and what leads to it and away are rehearsed: further periods repeat them. The design keeps a reserve of speed, so
-    that few have to be made smaller; whether its condition number is still what was asked for is for others to look at. Where
-    no smaller one keeps them either, for noise or gravity is in the way, the motion stays as large as it was designed.
-    Nothing is rehearsed without a model. Who stops a rehearsal keeps the design as it was before.
+    that few have to be made smaller. Where no smaller one keeps them either, for noise or gravity is in the way, the motion
+    stays as large as it was designed. Nothing is rehearsed without a model. Who stops a rehearsal keeps the design as it was
+    before.
     """
     first = None
     try:

@@ -1,7 +1,7 @@
 """What was found beside reference logs and is no change since then.
 
     asked = Before(case)                   how much of what a search finds the reference logs have
-    asked.shown(now, passed)               whether something stood before of what is seen beside what is far greater: asked.early
+    asked.shown(now, passed)               whether something stood before of what is seen beside what is greater: asked.early
     asked.ended(done)                      whether what was found last stood before: it is searched again beside that
     asked.stood(done)                      what did, and may be taken out with the rest that stands
     no_change(found, k, case, floor)       why step `k` is not believed to have changed

@@ -29,7 +29,7 @@ __all__ = ["Exact", "Named", "law_of", "number_moved"]
 
 _ARMS: list[tuple[Columns, Array, Arm]] = []  # the nominal ones made last
 _STANDING: list[tuple[tuple[object, ...], Array]] = []  # what stands beside them over a motion
-_KEEP = 4
+_KEEP = 8
 _FARTHEST = 0.5  # of ln shape, a step
 
 
@@ -99,9 +99,10 @@ class Exact:
         for columns, beta, arm in tuple(_ARMS):
             if columns is self.columns and beta is self.beta:
                 return arm
-        _ARMS.append((self.columns, self.beta, nominal_arm(self.columns, self.beta)))
+        made = nominal_arm(self.columns, self.beta)
+        _ARMS.append((self.columns, self.beta, made))
         del _ARMS[:-_KEEP]
-        return _ARMS[-1][2]
+        return made
 
     @cached_property
     def arm(self) -> Arm:
@@ -134,9 +135,10 @@ class Exact:
         for same, found in tuple(_STANDING):
             if all(a is b for a, b in zip(key, same, strict=True)):
                 return found
-        _STANDING.append((key, _added(self.standing, motion, self.nominal)))
+        made = _added(self.standing, motion, self.nominal)
+        _STANDING.append((key, made))
         del _STANDING[:-_KEEP]
-        return _STANDING[-1][1]
+        return made
 
     @property
     def core(self) -> int:

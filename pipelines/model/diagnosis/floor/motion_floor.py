@@ -41,8 +41,8 @@ __all__ = ["motion_floor", "noise_in"]
 Indices = npt.NDArray[np.intp]
 
 # Of each log: with one, whose reversals fall as they will, the root mean square scatters by 2 to 6 %, as that of the log itself
-# does, which it is held against; a third would take off a twentieth of what both scatter. Reference logs that are about as long as
-# the copies of the others together say as much with one; where it costs as much as two, they have two as well.
+# does, which it is held against; a third would take off a twentieth of what both scatter. Reference logs that are a third
+# longer than the others say nearly as much with one; where it costs as much as two, they have two as well.
 _COPIES = 2
 
 

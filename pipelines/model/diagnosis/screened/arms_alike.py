@@ -5,7 +5,8 @@
     arms = moving_alike(data, own)     (joints,) the same for what hangs on the friction and effects of that joint as well
     remember(data, arms)               columns have been laid for these
 
-Which arms were asked for before is part of the answer, then: by a hundredth of a column at most.
+Which arms were asked for before is part of the answer, then: by a hundredth of a column, and by some more of one that is smooth
+where much is left unexplained.
 
 A link in its gap is followed sample by sample over all logs, for every gap at every joint: half of what a first screening takes.
 An encoder that is not true changes the torque of the whole arm: half of any other. A cause that was found moves the base
@@ -36,9 +37,10 @@ Mask = npt.NDArray[np.bool_]
 # hundredth of what any cause is looked at for; at thirty times as much they are off by up to a half. Columns of a tilt, a link and
 # a delay are the same to 0.6 % then, those of an elastic joint to 0.8 %.
 _ALIKE = 1e-3
-# Of what the model leaves of the joint: to no more is an arm known where a great cause is yet to be found, or is looked for once
-# more because something that stands was taken out. Gains were the same to five digits at 0.005 of a torque of which much was left.
-_OF_LEFT = 0.02
+# The same of columns that are smooth, a tilt's say and no gap's, where much is left of the joint: to a fiftieth of that no arm is
+# known while a great cause is yet to be found, or is looked for once more because something that stands was taken out; of the
+# joint's torque at most. Such columns are off by 6 % then, and gain less by the square of that.
+_OF_LEFT, _FARTHEST = 0.02, 1e-2
 _MOST = 16  # arms that are remembered
 
 
@@ -65,9 +67,10 @@ _KNOWN: WeakKeyDictionary[Kept, list[tuple[_Places, Asked]]] = WeakKeyDictionary
 def alike(data: Data, own: Asked) -> tuple[Asked, ...]:
     """The first arm that has nearly the rigid torque of this one at a joint, and at all; else this one, and so where something
     changes how every torque is recorded."""
-    near = [(one, _near(data, one.rigid, own.rigid, own.left)) for one in _able(data, own)]
-    every = range(data.n_joints)
-    return tuple(next((one for one, same in near if same[joints].all()), own) for joints in (*every, list(every)))
+    able = _able(data, own)
+    near = [(one, _near(data, one.rigid, own.rigid)) for one in able]
+    alone = (next((one for one, same in near if same[joint]), own) for joint in range(data.n_joints))
+    return (*alone, next((one for one in able if _near(data, one.rigid, own.rigid, own.left).all()), own))
 
 
 def moving_alike(data: Data, own: Asked) -> tuple[Asked, ...]:
@@ -89,9 +92,10 @@ def remember(data: Data, arms: Iterable[Asked]) -> None:
     del kept[:-_MOST]
 
 
-def _near(data: Data, torque: Array, own: Array, left: Array) -> Mask:
+def _near(data: Data, torque: Array, own: Array, left: Array | float = 0.0) -> Mask:
     """(joints,) at which they differ by next to nothing, or by little of what is `left` (joints,) [N m]."""
-    return np.asarray(data.rms(torque - own) <= np.maximum(_ALIKE * data.rms(own), _OF_LEFT * left))
+    size = data.rms(own)
+    return np.asarray(data.rms(torque - own) <= np.maximum(_ALIKE * size, np.minimum(_OF_LEFT * left, _FARTHEST * size)))
 
 
 def _able(data: Data, own: Asked) -> list[Asked]:
