@@ -19,7 +19,7 @@ from pipelines import convert, inspect, run
 from pipelines.errors import Check, InputRejected, RrridError, UsageError
 from pipelines.log.files import write_log
 from pipelines.report.report import Report
-from pipelines.stage import Inputs, Request, Stage, read_logs, refuse_foreign, run_stage, tilde
+from pipelines.stage import Inputs, Request, Stage, read_logs, run_stage, tilde
 from tests.log.logs import ROBOT_TEXT, small_log
 
 
@@ -149,43 +149,6 @@ def test_an_error_names_the_path_as_it_was_given(logs: Path, monkeypatch: pytest
     with pytest.raises(InputRejected) as caught:
         run_stage(convert.STAGE, Request((Path("logs"),)), convert.Settings())
     assert caught.value.where == "logs/b.h5"
-
-
-def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> None:
-    """C05: not even with --force; an empty folder is fine."""
-    (tmp_path / "out").mkdir()
-    refuse_foreign(tmp_path / "out")
-    (tmp_path / "out/x").write_text("")
-    with pytest.raises(UsageError, match="RRID-C05"):
-        refuse_foreign(tmp_path / "out", force=True)
-    (tmp_path / "link").symlink_to(tmp_path / "out")
-    with pytest.raises(UsageError, match="RRID-C05"):
-        refuse_foreign(tmp_path / "link")
-
-
-@pytest.mark.parametrize(("inside", "out"), [(".", "."), ("figures", "..")])
-def test_the_folder_one_is_in_is_not_replaced_under_one(inside: str, out: str, tmp_path: Path,
-                                                        monkeypatch: pytest.MonkeyPatch) -> None:
-    """C05: the shell would stay in one that is gone, and find nothing there."""
-    (tmp_path / "out/figures").mkdir(parents=True)
-    monkeypatch.chdir(tmp_path / "out" / inside)
-    with pytest.raises(UsageError, match="RRID-C05 .*is the folder you are in"):
-        refuse_foreign(Path(out))
-    (tmp_path / "other").mkdir()
-    refuse_foreign(tmp_path / "other")
-
-
-def test_a_large_folder_of_somebody_else_is_not_walked_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """C05: three files that are not rrrid's are enough; `--out /usr` took seconds before it was refused."""
-    for number in range(30):
-        (tmp_path / f"out/folder-{number:02}").mkdir(parents=True)
-        (tmp_path / f"out/folder-{number:02}/file").write_text("")
-    seen: list[object] = []
-    look = os.listdir
-    monkeypatch.setattr("pipelines.log.places.os.listdir", lambda folder: seen.append(folder) or look(folder))
-    with pytest.raises(UsageError, match=r"RRID-C05 .*did not write there: folder-00/file, folder-01/file, folder-02/file\."):
-        refuse_foreign(tmp_path / "out")
-    assert len(seen) < 10
 
 
 @pytest.mark.parametrize(("out", "allowed", "code"), [("out/new", False, "RRID-F13"), ("logs/a.h5/new", True, "RRID-C05")])

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.answered.loud import loud_joint
+from pipelines.model.diagnosis.floor.thresholds import LOUDER
 from pipelines.model.diagnosis.result import Diagnosis, ResidualRms
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
@@ -35,9 +36,8 @@ _LITTLE = 1.9  # the same: of 114 arms in order none left more
 _HELD_OUT_FLOOR = ("An arm in order is the fitted rigid body and friction, simulated in the held-out experiments with the noise of "
                    "these drives")
 _LEFT_IN_ORDER = "an arm in order leaves"
-_TOO_HIGH = 4.0  # times what is left: of 1246 diagnoses of the bench no floor that was one stood higher than 2.3
 _JUDGED = (f"What is up to {_ORDER:g} times as much is in order; a little above it, up to {_LITTLE:g} times, some arms in order "
-           f"have been seen; what is more than {_TOO_HIGH:g} times the error itself is no measure of it")
+           f"have been seen; what is more than {LOUDER:g} times the error itself is no measure of it")
 _AND_BEFORE = ", and what the model left of the reference logs beyond that"
 
 
@@ -177,6 +177,6 @@ def _judged(errors: Sequence[float], floor: float) -> str:
     fine = [error <= _ORDER * floor for error in errors]
     times = [_times(error / floor) for error in errors]
     shown = " → ".join(dict.fromkeys(times[-1:] if fine[0] and fine[-1] else times))
-    if errors[-1] * _TOO_HIGH < floor:
+    if errors[-1] * LOUDER < floor:
         return f"{shown}, no measure"
     return f"{shown}, {'in order' if fine[-1] else 'a little above it' if errors[-1] <= _LITTLE * floor else 'above it'}"

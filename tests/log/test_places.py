@@ -1,12 +1,14 @@
-"""Names of files and folders: plain, short, told apart, and silent about where a user lives."""
+"""Names of files and folders: plain, short, told apart, and silent about where a user lives; and which folders stay as they are."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
-from pipelines.log.places import renamed, short_names, slug, tilde, told_apart
+from pipelines.errors import UsageError
+from pipelines.log.places import refuse_foreign, renamed, short_names, slug, tilde, told_apart
 from pipelines.stage import footer_of
 
 
@@ -52,3 +54,40 @@ def test_files_of_one_name_are_told_apart() -> None:
     foot = footer_of("compare", {"/x/a/model.json": "0" * 64, "/x/b/model.json": "1" * 64})
     assert {key: value for key, value in foot.items() if key.startswith("input")} == {
         "input a/model.json": "0" * 16, "input b/model.json": "1" * 16}
+
+
+def test_a_folder_without_our_provenance_is_never_replaced(tmp_path: Path) -> None:
+    """C05: not even with --force; an empty folder is fine."""
+    (tmp_path / "out").mkdir()
+    refuse_foreign(tmp_path / "out")
+    (tmp_path / "out/x").write_text("")
+    with pytest.raises(UsageError, match="RRID-C05"):
+        refuse_foreign(tmp_path / "out", force=True)
+    (tmp_path / "link").symlink_to(tmp_path / "out")
+    with pytest.raises(UsageError, match="RRID-C05"):
+        refuse_foreign(tmp_path / "link")
+
+
+@pytest.mark.parametrize(("inside", "out"), [(".", "."), ("figures", "..")])
+def test_the_folder_one_is_in_is_not_replaced_under_one(inside: str, out: str, tmp_path: Path,
+                                                        monkeypatch: pytest.MonkeyPatch) -> None:
+    """C05: the shell would stay in one that is gone, and find nothing there."""
+    (tmp_path / "out/figures").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "out" / inside)
+    with pytest.raises(UsageError, match="RRID-C05 .*is the folder you are in"):
+        refuse_foreign(Path(out))
+    (tmp_path / "other").mkdir()
+    refuse_foreign(tmp_path / "other")
+
+
+def test_a_large_folder_of_somebody_else_is_not_walked_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """C05: three files that are not rrrid's are enough; `--out /usr` took seconds before it was refused."""
+    for number in range(30):
+        (tmp_path / f"out/folder-{number:02}").mkdir(parents=True)
+        (tmp_path / f"out/folder-{number:02}/file").write_text("")
+    seen: list[object] = []
+    look = os.listdir
+    monkeypatch.setattr("pipelines.log.places.os.listdir", lambda folder: seen.append(folder) or look(folder))
+    with pytest.raises(UsageError, match=r"RRID-C05 .*did not write there: folder-00/file, folder-01/file, folder-02/file\."):
+        refuse_foreign(tmp_path / "out")
+    assert len(seen) < 10

@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.believed.oscillating import oscillation
 from pipelines.model.diagnosis.believed.pruned import Settled
 from pipelines.model.diagnosis.fitted.own_motion import following, lasting, standing_out
 from pipelines.model.diagnosis.fitted.refit import Refined
+from pipelines.model.diagnosis.floor.thresholds import LOUDER
 from pipelines.model.diagnosis.floor.twin import Twin
 from pipelines.model.diagnosis.named.verdict import Ruling, at_floor, held_out_high, takes_most, without_steps
 
@@ -42,8 +43,6 @@ _BOTH = 1.4
 # Times the noise in what a model leaves. No arm in order of the test bench, 286 and some of other kinds, was without a twin where
 # its controller was described; one with a load that sloshes left 18, 33 and 1400 times the noise of its joints.
 _NO_NOISE = 15.0
-# Times what the logs leave of a joint, that their twin does at most: of 1246 diagnoses of the bench none did more than 2.1.
-_LOUDER = 4.0
 _QUIET = 1.3  # times the floor that a twin gives, that an arm in order leaves of the fitted logs at most: of 147 none left more
 _MOST_LEFT = "what explains the fitted logs leaves more than half of what stands above the floor at its joint in those held out"
 # Times the spectrum beside it, and times the most of any replica, that a line of an oscillation has at least. Of 21 arms in order,
@@ -152,7 +151,7 @@ def louder_than_logs(done: Settled, floor: Array) -> Settled:
     if done.ruling.verdict != "nothing-wrong":
         return done
     times = floor / np.maximum(done.found.nominal.rms, 1e-300)
-    high = held_out_high(times, np.ones(len(times)), _LOUDER)
+    high = held_out_high(times, np.ones(len(times)), LOUDER)
     if not high:
         return done
     reason = (f"what looks like noise of the drives is none: with as much, the arm as it was fitted would leave {times.max():.2g} "

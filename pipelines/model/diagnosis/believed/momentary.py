@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.fitted.refit import Refined
+from pipelines.model.diagnosis.named.verdict import held_out_high
 
 __all__ = ["AT_OTHER_TIMES", "ONLY_THEN", "at_other_times", "only_then"]
 
@@ -24,7 +25,6 @@ AT_OTHER_TIMES = "what takes most of it happened once, and at other times someth
 
 _MOST = 0.8  # of its power
 _ACTS = 1e-3  # of its largest torque: less is the filter's
-_FAR = 3.0  # times the floor
 
 
 def only_then(final: Refined, place: int) -> bool:
@@ -41,7 +41,7 @@ def at_other_times(final: Refined, floor: Array) -> bool:
     """Whether a joint stands far above its floor (joints,) [N m] at other times, where every effect of the model is a moment."""
     if not final.model.effects or any(one.log is None for one in final.model.effects):
         return False
-    return bool((final.data.rms(np.where(_moments(final), 0.0, final.left)) > _FAR * floor).any())
+    return bool(held_out_high(final.data.rms(np.where(_moments(final), 0.0, final.left)), floor))
 
 
 def _moments(final: Refined) -> NDArray[np.bool_]:

@@ -26,7 +26,6 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["Before", "near_other_motion", "no_change"]
 
-_STEPS = 10  # of a fit
 _AS_MUCH = "its joint moves at other speeds than in the reference logs, and no more is left of it than they leave at such speeds"
 _UNCHANGED = "the reference logs may have had it: fitted to them alone, some of it is there as well"
 
@@ -49,8 +48,8 @@ class Before:
         first = max(passed, key=lambda one: one.gain[0]).joint
         for joint in sorted({one.joint for one in own if one.joint is not None} - {first}):
             best = max((one for one in own if one.joint == joint), key=lambda one: one.gain[0])
-            for steps in (0, _STEPS):  # to first order most of what is none is told
-                done = as_seen(self._case, now, best, steps)
+            for exactly in (False, True):  # to first order most of what is none is told
+                done = as_seen(self._case, now, best, exactly)
                 last = len(done.model.effects) - 1
                 if last not in self._able(done) or not self._share(done, last).stood:
                     break

@@ -53,11 +53,11 @@ def fitted(case: Case, now: Refined, one: Screened, error: HeldOut) -> Tried:
     return tried if tried.possible or not effect.free else _in_range(case, now, one, error) or tried
 
 
-def as_seen(case: Case, now: Refined, one: Screened, steps: int) -> Refined:
-    """The model with a cause as it was screened, fitted in so many steps: none leaves it as it was to first order."""
+def as_seen(case: Case, now: Refined, one: Screened, exactly: bool) -> Refined:
+    """The model with a cause as it was screened; to first order, or fitted exactly from there."""
     effect = one.shape[0]
     start = now.model.with_effect(effect, _amplitudes(now.fit, laid_whole(case.data, effect, now.model.arm)))
-    return refine(start, case.data, now.weight, steps)
+    return refine(start, case.data, now.weight) if exactly else refine(start, case.data, now.weight, steps=0)
 
 
 def plainer(case: Case, now: Refined, tried: Sequence[Tried], best: Tried, error: HeldOut) -> Tried | None:
