@@ -134,7 +134,7 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
-                  without=settings.without, doctor=said, memory=memory,
+                  without=settings.without, doctor=(*said, *found.checks), memory=memory,
                   laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name,
                   calibrated_with=() if given.calibration is None else tuple(one.name for one in given.calibration.origin.logs))
 
@@ -142,7 +142,7 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
 def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
     """Logs whose torque is late alike, before and after, show nothing that has changed: that they are late has to be said."""
     late = next((check for check in said if check.code == "RRID-T06"), None)
-    if found.verdict != "nothing-wrong" or late is None:
+    if found.verdict not in ("nothing-wrong", "cannot-judge") or late is None:
         return found
     words = f"in {Path(late.where.partition(',')[0]).name} {late.message}"
     return replace(found, reason=f"{found.reason}; {words}" if found.reason else words,

@@ -29,6 +29,7 @@ from pipelines.model.estimation.checks import consistency
 from pipelines.model.estimation.compare import compare
 from pipelines.model.estimation.floor import averaged, residuals
 from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, fit_logs, judge, with_cutoff
+from pipelines.model.estimation.negative_viscous import negative_viscous
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
@@ -118,6 +119,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     logs = (*identify, *validate)
     said_of_periods = [check for own, log in zip(scatter, logs, strict=True) if own is not None
                        for check in doubts(own.floor, log.source or log.name, settings.average)]
+    said += negative_viscous(fitted.estimate, arm.name)
     result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), doctor=(*said, *said_too, *said_of_periods),
                      noise_floor=residuals(scatter, fitted, judged, logs, settings.average))
     return result if not settings.compare else replace(

@@ -165,6 +165,8 @@ def _found_instead(diagnosed: Diagnosed) -> str:
     """What `diagnose` says, where it names nothing that a model could have."""
     if diagnosed.verdict == "unknown":
         return "diagnose found something wrong, and no cause for it"
+    if diagnosed.verdict == "cannot-judge":
+        return "diagnose cannot judge these logs"
     if diagnosed.findings:
         return "what diagnose found happens once, or is in doubt, and has no place in a model"
     changed = diagnosed.question == "what has changed"

@@ -34,7 +34,7 @@ WORDS: Final[dict[str, str]] = {
     "visibility": "share of its columns that the refitted model cannot absorb",
     "explained": "share of the residual that it explains",
     # findings
-    "verdict": "cause, nothing-wrong or unknown", "cause": "identifier of the cause, as commands take it",
+    "verdict": "cause, nothing-wrong, unknown or cannot-judge", "cause": "identifier of the cause, as commands take it",
     "title": "the cause in plain words", "standing": "effects that the reference logs show as well, at the same strength",
     "rejected": "hypotheses that came close and are not believed", "reason": "why, in words; empty where there is nothing to say",
     "detectable": "the smallest of each cause that would have been found on these logs, with 95 %",

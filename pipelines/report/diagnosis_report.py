@@ -53,7 +53,7 @@ __all__ = ["diagnosis_report"]
 _LEDGER = 40  # lines
 _IN_RUN = "--set diagnose.model=FILE"
 _OUT_OF_REACH = "A threshold above 100 % is told as a dash: an arm in order leaves so much of it that such logs cannot show it."
-_TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
+_TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention", "cannot-judge": "attention"}
 
 
 def diagnosis_report(result: Result) -> Report:
@@ -99,6 +99,9 @@ def _said(result: Result) -> str:
         return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}{doubt}"
     if result.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
+    if result.verdict == "cannot-judge":
+        anything = "has changed since the reference logs" if result.question == "what has changed" else "is wrong with this arm"
+        return f"Whether anything {anything} cannot be judged: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(_beside(more))}" if more else ""
