@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.fit.equations import Array, Block
+from pipelines.fit.equations import Array, Block, Flags
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
@@ -53,8 +53,7 @@ class Facts:
     torque: Array  # measured
     std: Array  # of the predicted torque, by the covariance of the parameters
     unresolved: str  # parameters that the logs do not separate, in words; empty: none
-    noise: Array  # of the residual, by repeated periods; 0 where none are recorded
-    floor_known: bool  # whether it is known how much a healthy arm leaves
+    floor_known: Flags  # (joints,) whether the residual can be held against a noise floor
     no_floor: str = ""  # why it is not, although the logs describe their controller
 
 
@@ -87,9 +86,8 @@ def cannot_judge(facts: Facts, config: JudgeableConfig | None = None) -> str:
     """Return why nothing can be said of the arm, and what to record; empty where it can be."""
     limit = (config or JudgeableConfig()).largest_share
     why = []
-    repeats = np.sqrt(np.maximum(np.square(facts.left) - np.square(facts.noise), 0.0))
-    misfit = _large(repeats, facts.torque, limit)
-    if misfit and not facts.floor_known:
+    misfit = _large(np.where(facts.floor_known, 0.0, facts.left), facts.torque, limit)
+    if misfit:
         no_floor = f" ({facts.no_floor})" if facts.no_floor else ""
         why.append(f"no noise floor is known{no_floor}, and on held-out motion the model leaves "
                    f"{misfit}, as a fault may and a healthy arm may; {_RECORD}")

@@ -16,6 +16,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.floor.repeated import unrepeated
+from pipelines.model.diagnosis.named.verdict import stands_high
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.estimation.estimate import Estimate, estimate
@@ -51,11 +52,12 @@ def nominal_estimate(prepared: Prepared) -> Estimate:
 def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
     """Return the errors of the nominal model on held-out motion, and the state of its floor."""
     judge = prepared.data if prepared.judge is None else prepared.judge
-    known = found.floor_origin != "blocks"
-    noise = np.zeros(judge.n_joints) if known else _noise(prepared)
-    return Facts(found.residual_rms.validate, judge.rms(judge.y),
-                 predicted_std(estimated, _blocks(judge)), unresolved(estimated), noise, known,
-                 found.no_twin)
+    left = found.residual_rms.validate
+    known = np.full(len(left), found.floor_origin != "blocks")
+    if not known.all():
+        known = ~stands_high(left, _noise(prepared))
+    return Facts(left, judge.rms(judge.y), predicted_std(estimated, _blocks(judge)),
+                 unresolved(estimated), known, found.no_twin)
 
 
 def _noise(prepared: Prepared) -> Array:
