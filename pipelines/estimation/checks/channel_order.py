@@ -1,0 +1,151 @@
+"""Find the order of the columns that a log's motion and torque fit.
+
+Every order is scored by the likelihood of the whole arm under its described gravity, on a few moments. Orders of positions and
+torques together come from columns that are named otherwise than the joints; orders of either alone from a column map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations, permutations
+
+import numpy as np
+
+from pipelines.estimation.checks.torque_rows import Array, GenericArm, Order
+from pipelines.model.rigid.chain import regressor
+from pipelines.model.row_fit import Sampled
+
+__all__ = ["ColumnOrder", "search_orders"]
+
+_ALL_UP_TO = {"q and tau": 6, "q": 4, "tau": 4}  # joints: 720 orders take a second; of more, orders are reached by swaps
+_BEAM = 12  # orders that are kept at each swap
+_AT_ONCE = 40  # orders whose regressors are formed together: 30 MB
+_RIDGE = 1e-8
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class ColumnOrder:
+    """Joint j takes column order[j] of the log, of the signals named."""
+
+    signal: str  # "q and tau", "q" or "tau"
+    order: Order
+    score: float  # log likelihood, of independent moments
+
+
+class _Scorer:
+    """Scores of orders, each formed once."""
+
+    def __init__(self, arm: GenericArm, motion: Sampled, gravity: Array, model_error: float) -> None:
+        self.arm, self.motion, self.model_error = arm, motion, model_error
+        self.gravity = gravity
+        tau = motion.tau / np.maximum(np.std(motion.tau, axis=0), 1e-12)
+        self.basis, self.tau = [], []
+        for k in range(tau.shape[1]):
+            own = np.stack([motion.ddq[:, k], motion.dq[:, k], motion.coulomb[:, k], np.ones(len(tau))], axis=-1)
+            q, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
+            self.basis.append(q)
+            self.tau.append(tau - q @ (q.T @ tau))
+        self.known: dict[Order, tuple[Array, Array, Array]] = {}
+
+    def prepare(self, orders: Iterable[Order]) -> None:
+        """Form the normal equations of `orders` of the positions."""
+        from dataclasses import replace
+
+        new = [order for order in dict.fromkeys(orders) if order not in self.known]
+        chain = replace(self.arm.chain, gravity=self.gravity)
+        moments, n = self.motion.q.shape
+        for first in range(0, len(new), _AT_ONCE):
+            part = new[first:first + _AT_ONCE]
+            q, dq, ddq = (np.concatenate([x[:, list(order)] for order in part])
+                          for x in (self.motion.q, self.motion.dq, self.motion.ddq))
+            y = regressor(chain, q, dq, ddq, self.arm.columns).reshape(len(part), moments, n, -1)
+            for order, columns in zip(part, y, strict=True):
+                self.known[order] = self._normal(order, columns)
+
+    def _normal(self, order: Order, columns: Array) -> tuple[Array, Array, Array]:
+        """Per joint: Gram matrix (n, p, p), products with every torque (n, p, n), power of every torque (n, n)."""
+        moments, n, p = columns.shape
+        gram, cross, power = np.empty((n, p, p)), np.empty((n, p, n)), np.empty((n, n))
+        for j, k in enumerate(order):
+            own = np.ascontiguousarray(columns[:, j])
+            own -= self.basis[k] @ (self.basis[k].T @ own)
+            gram[j], cross[j] = own.T @ own / moments, own.T @ self.tau[k] / moments
+            power[j] = np.mean(self.tau[k] ** 2, axis=0)
+        return gram, cross, power
+
+    def score(self, q_order: Order, tau_order: Order) -> float:
+        """Log likelihood a moment of an order of the positions, of those prepared, and one of the torques."""
+        gram, cross, power = self.known[q_order]
+        n = len(q_order)
+        right = cross[np.arange(n), :, list(tau_order)]
+        total = power[np.arange(n), list(tau_order)]
+        scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
+        scale[scale < 1e-10 * scale.max()] = np.inf
+        gram, right = gram / np.outer(scale, scale), right / scale
+        variance = np.ones(n)
+        for _ in range(_ROUNDS):
+            normal = np.einsum("jpq,j->pq", gram, 1.0 / variance)
+            ridge = _RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
+            phi = np.linalg.solve(normal + ridge, right.T @ (1.0 / variance))
+            left = total - 2.0 * right @ phi + np.einsum("p,jpq,q->j", phi, gram, phi)
+            variance = np.maximum(left, 0.0) + self.model_error**2
+        return -0.5 * float(np.sum(np.log(variance)))
+
+
+def search_orders(arm: GenericArm, motion: Sampled, gravity: Array, moving: Sequence[int], model_error: float,
+                  keep: int) -> tuple[ColumnOrder, ...]:
+    """Return at most `keep` orders that score better than the logged one, best first.
+
+    Args:
+        motion: a few moments.
+        gravity: (3,) [m/s^2] under which orders are compared.
+        moving: joints that move; the others keep their place.
+    """
+    scorer, n = _Scorer(arm, motion, gravity, model_error), motion.q.shape[1]
+    same: Order = tuple(range(n))
+    found = {(signal, order): score for signal in ("q and tau", "tau", "q")
+             for order, score in _best_of(scorer, signal, same, moving).items() if order != same}
+    logged = scorer.score(same, same)
+    found = {key: score for key, score in found.items() if score > logged}
+    best = sorted(found.items(), key=lambda item: -item[1])[:keep]
+    return tuple(ColumnOrder(signal, order, score) for (signal, order), score in best)
+
+
+def _best_of(scorer: _Scorer, signal: str, same: Order, moving: Sequence[int]) -> dict[Order, float]:
+    """Scores of the orders of one kind that were looked at."""
+    def score(orders: Iterable[Order]) -> dict[Order, float]:
+        orders = list(orders)
+        scorer.prepare(orders if "q" in signal else [same])
+        return {order: scorer.score(order if "q" in signal else same, order if "tau" in signal else same) for order in orders}
+
+    if len(moving) <= _ALL_UP_TO[signal]:
+        return score(_placed(same, moving))
+    known = score([same])
+    beam = [same]
+    for _ in range(len(moving) - 1):
+        near = {_swapped(order, a, b) for order in beam for a, b in combinations(moving, 2)} - set(known)
+        known |= score(sorted(near))
+        best = sorted(known, key=lambda order: -known[order])[:_BEAM]
+        if best == beam:
+            break
+        beam = best
+    return known
+
+
+def _placed(same: Order, moving: Sequence[int]) -> list[Order]:
+    """Every order of the joints that move."""
+    orders = []
+    for moved in permutations(moving):
+        whole = list(same)
+        for place, joint in zip(moving, moved, strict=True):
+            whole[place] = joint
+        orders.append(tuple(whole))
+    return orders
+
+
+def _swapped(order: Order, a: int, b: int) -> Order:
+    out = list(order)
+    out[a], out[b] = out[b], out[a]
+    return tuple(out)
