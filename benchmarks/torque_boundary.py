@@ -311,7 +311,7 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
         return out | {"none": True}
     blind = _vertical(draw(seed), np.array(truth["direction"]))
     out["sign"] = _field(found.sign, "signed" if truth["sign"] else "magnitude")
-    out["alarms"] = [name for name, said in (("order", found.reordered), ("gravity", found.without_gravity), ("turned", found.turned),
+    out["alarms"] = [name for name, said in (("order", bool(found.order.signal)), ("gravity", found.without_gravity), ("turned", found.turned),
                                              ("sign", found.sign == "magnitude"), ("friction", found.friction.present is False))
                      if said and name != {"permuted": "order", "no gravity": "gravity", "wall": "turned", "ceiling": "turned",
                                           "y-up": "turned", "magnitude": "sign", "no friction": "friction"}.get(kind)]
@@ -326,7 +326,7 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     out["direction"] = _told(near, True, blind) if truth["gravity"] else "right" if vector is None else "wrong"
     columns = None if found.order.columns is None else [k - 1 for k in found.order.columns]
     out["order"] = _told(columns, truth["order"], False)
-    out["gate"] = {"permuted": found.reordered, "no gravity": found.without_gravity, "wall": found.turned, "ceiling": found.turned,
+    out["gate"] = {"permuted": bool(found.order.signal), "no gravity": found.without_gravity, "wall": found.turned, "ceiling": found.turned,
                    "y-up": found.turned}.get(kind, True) or (blind and kind in ("no gravity", "ceiling"))
     return out
 

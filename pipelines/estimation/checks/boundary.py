@@ -49,69 +49,71 @@ _HELD = 0.02  # of the travel of the joint that moves most: a joint that moves l
 class Share:
     """How much of a part the torque holds; of gravity 1 is all of it, of friction the share of the torque's RMS."""
 
-    share: float | None
-    std: float | None
-    joints: tuple[float | None, ...] = ()
-    joint_std: tuple[float | None, ...] = ()
-    present: bool | None = None
-    upper: float | None = None  # two standard deviations above
-    reason: str = ""  # why something is not told
+    share: float | None  # of all joints; null: not identifiable
+    std: float | None  # standard deviation of `share`
+    joint_share: tuple[float | None, ...] = ()  # the same, joint by joint
+    joint_std: tuple[float | None, ...] = ()  # standard deviation of each joint's share
+    present: bool | None = None  # whether the torque holds that part; null: not identifiable
+    upper: float | None = None  # largest share that the log allows, two standard deviations above
+    reason: str = ""  # why something is not told; else empty
 
 
 @dataclass(frozen=True)
 class Direction:
-    """The gravity vector of the base [m/s^2]."""
+    """The gravity vector in the axes of the base."""
 
-    vector: tuple[float, ...] | None
-    std: float | None  # [rad]
-    described: tuple[float, ...]
+    vector: tuple[float, ...] | None  # [m/s^2] as the torque has it; null: not identifiable
+    std: float | None  # [rad] standard deviation of its direction
+    described: tuple[float, ...]  # [m/s^2] as the robot's description has it
     angle: float | None  # [rad] between the two
-    reason: str = ""
+    best: tuple[float, ...] = ()  # [m/s^2] the vector that fits best, however little the log tells others from it
+    reason: str = ""  # why something is not told; else empty
 
 
 @dataclass(frozen=True)
 class JointOrder:
-    """Column of the log (1-based) that each joint of the robot has."""
+    """Which column of the log belongs to which joint of the robot."""
 
-    columns: tuple[int, ...] | None
-    signal: str  # whose columns: "q and tau", "q", "tau"; "" where they are in order
-    reason: str = ""
+    columns: tuple[int, ...] | None  # column of the log, from 1, that each joint has; null: not identifiable
+    signal: str  # signals whose columns are out of order: "q and tau", "q" or "tau"; empty where none is
+    before: float | None = None  # residual over the torque with the columns as logged
+    after: float | None = None  # residual over the torque with the columns in order
+    reason: str = ""  # why something is not told; else empty
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of each joint's torque, and the torque over that of the described links."""
+    """The unit of the torque."""
 
-    units: tuple[str, ...]
-    scale: float | None
-    reason: str = ""
+    units: tuple[str, ...]  # of each joint's torque
+    scale: float | None  # torque over that of the described links; null: not identifiable
+    reason: str = ""  # why something is not told; else empty
 
 
 @dataclass(frozen=True)
 class NotIdentifiable:
-    """What no log of this kind tells, and what it is confused with."""
+    """What no log of this kind tells."""
 
-    what: str
-    reason: str
+    what: str  # quantity
+    reason: str  # what it is confused with, and what would tell
 
 
 @dataclass(frozen=True)
 class Boundary:
     """What the logged torque is."""
 
-    side: str | None  # "joint": without the friction of the drive; "motor": with it
-    sign: str | None  # "signed" | "magnitude"
-    gravity: Share
-    friction: Share
-    direction: Direction
-    order: JointOrder
-    unit: Unit
-    not_identifiable: tuple[NotIdentifiable, ...]
-    evidence: tuple[str, ...]
-    logs: tuple[str, ...]
-    reordered: bool = False  # findings, decided
-    without_gravity: bool = False
-    turned: bool = False
+    side: str | None  # "joint": without the friction of the drive; "motor": with it; null: not identifiable
+    sign: str | None  # "signed" or "magnitude"; null: not identifiable
+    gravity: Share  # share of the gravity torque
+    friction: Share  # share of friction
+    direction: Direction  # of gravity
+    order: JointOrder  # of the joints' columns
+    unit: Unit  # of the torque
+    not_identifiable: tuple[NotIdentifiable, ...]  # what no log of this kind tells
+    evidence: tuple[str, ...]  # what the answers rest on
+    fitted: tuple[str, ...]  # logs that were looked at
+    without_gravity: bool = False  # whether the torque lacks the gravity that the description has
+    turned: bool = False  # whether gravity points elsewhere than the description has it
 
 
 def torque_boundary(logs: Sequence[ExperimentLog], config: BoundaryConfig | None = None) -> Boundary | None:
@@ -209,8 +211,8 @@ def _estimated(robot: RobotDescription, arm: GenericArm, motions: Sequence[Sampl
     fits = _fits(arm, rows, described, config)
     evidence = [f"the torque of joint {', '.join(str(j + 1) for j, count in enumerate(touches) if count is None)} changes its sign"]
     order, fits = _ordered(arm, motions, rows, fits, described, config)
-    if order.reason:
-        evidence.append(order.reason)
+    if order.signal:
+        evidence.append(f"residual over the torque: {order.before:.2g} with the columns as logged, {order.after:.2g} in another order")
     gravity, direction, removed, turned = _gravity(fits, described, config)
     friction = _friction(fits, config)
     evidence += _in_words(fits, gravity, friction)
@@ -218,7 +220,7 @@ def _estimated(robot: RobotDescription, arm: GenericArm, motions: Sequence[Sampl
     if order.signal:
         removed = turned = False  # the order first: it is what the rest rests on
     return Boundary(side, "signed", gravity, friction, direction, order, _unit(robot, arm, rows, fits), _never(robot),
-                    tuple(evidence), names, bool(order.signal), removed, turned)
+                    tuple(evidence), names, removed, turned)
 
 
 def _ordered(arm: GenericArm, motions: Sequence[Sampled], rows: Sequence[Sampled], fits: _Fits, described: Array,
@@ -228,13 +230,14 @@ def _ordered(arm: GenericArm, motions: Sequence[Sampled], rows: Sequence[Sampled
     same = JointOrder(tuple(range(1, n + 1)), "")
     if n == 1 or fits.best.residual.max() < config.suspect:
         return same, fits
-    few = _thinned(motions, config.order_rows if n < 5 else config.order_rows_many)
+    few = _thinned(motions, config.order_rows)
     one = replace(few[0], **{name: np.concatenate([getattr(part, name) for part in few]) for name in
                              ("t", "q", "dq", "ddq", "coulomb")}, at=np.arange(sum(len(part.t) for part in few)),
                   torque=np.concatenate([part.tau for part in few]))
     travel = np.ptp(one.q, axis=0)
     moving = np.flatnonzero(travel > _HELD * travel.max()).tolist()
-    tried = search_orders(arm, one, described, moving, config.model_error, config.orders)
+    tried = search_orders(arm, one, described, moving, config.model_error,
+                          (config.orders, config.order_rows_many, fits.rms > config.lost))
     part = _thinned(motions, config.order_rows)
     here = _fits(arm, part, described, config) if tried else fits
     gains = [_gain(here, _fits(arm, part, described, config, *_applied(c)), c) for c in tried]
@@ -242,16 +245,13 @@ def _ordered(arm: GenericArm, motions: Sequence[Sampled], rows: Sequence[Sampled
         return same, fits
     top = int(np.argmax(gains))
     chosen, found = tried[top], _fits(arm, rows, described, config, *_applied(tried[top]))
+    if found.rms**2 > config.explained * fits.rms**2:
+        return same, fits
     alike = [c for c, gain in zip(tried, gains, strict=True) if gain > gains[top] - config.decisive]
-    words = f"columns of {chosen.signal} in the order {_columns(chosen.order)} leave {found.rms:.2g} of the torque, as logged {fits.rms:.2g}"
     if len(alike) > 1:
-        told = "; ".join(f"{c.signal} {_columns(c.order)}" for c in alike)
-        return JointOrder(None, chosen.signal, f"{words}; orders that do so alike: {told}"), found
-    return JointOrder(tuple(k + 1 for k in chosen.order), chosen.signal, words), found
-
-
-def _columns(order: Order) -> str:
-    return ",".join(str(k + 1) for k in order)
+        told = "; ".join(f"{c.signal} {','.join(str(k + 1) for k in c.order)}" for c in alike)
+        return JointOrder(None, chosen.signal, fits.rms, found.rms, f"several orders fit alike: {told}"), found
+    return JointOrder(tuple(k + 1 for k in chosen.order), chosen.signal, fits.rms, found.rms), found
 
 
 def _applied(column: ColumnOrder) -> tuple[Order | None, Order | None]:
@@ -287,12 +287,14 @@ def _gravity(fits: _Fits, described: Array, config: BoundaryConfig) -> tuple[Sha
                   reason="" if known else "not identifiable: no torque of this motion tells the size of gravity")
     if present:
         joints = _each_joint(model, best, config)
-        found = replace(found, joints=joints[0], joint_std=joints[1])
+        found = replace(found, joint_share=joints[0], joint_std=joints[1])
     if present is False:
-        return found, Direction(None, None, tuple(described.tolist()), None, "the torque holds no gravity"), removed, False
+        return found, Direction(None, None, tuple(described.tolist()), None, reason="the torque holds no gravity"), removed, False
     top = fits.turned[0]
-    turned = (not removed and _angle(top.gravity[0], described) > config.tilt
-              and float(np.sum(top.residual**2)) < config.explained * float(np.sum(fits.described.residual**2))
+    half = float(np.sum(top.residual**2)) < config.explained * float(np.sum(fits.described.residual**2))
+    # a gravity upside down is hardly seen where links of negative inertia take its place
+    turned = (not removed and (half or (_possible(model, top) and not _possible(model, fits.described)))
+              and _angle(top.gravity[0], described) > config.tilt
               and top.score > _around(model, described, config) + config.decisive)
     spread, why = _direction_spread(fits, config)
     told = spread is not None and spread < config.direction_std
@@ -300,7 +302,7 @@ def _gravity(fits: _Fits, described: Array, config: BoundaryConfig) -> tuple[Sha
     if not told and not why:
         why = "not identifiable: the direction is known to some degrees only"
     return found, Direction(tuple(map(float, pointing)) if told else None, spread if told else None, tuple(described.tolist()),
-                            _angle(pointing, described) if told else None, why), removed, turned
+                            _angle(pointing, described) if told else None, tuple(map(float, pointing)), why), removed, turned
 
 
 def _around(model: GravityModel, described: Array, config: BoundaryConfig) -> float:
@@ -377,9 +379,10 @@ def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
     upper = share + 2.0 * own
     present: bool | None = None
     reason = ""
-    if share > 3.0 * own and share > config.friction_absent:
+    read = std < config.friction_absent
+    if (each - 3.0 * std > config.friction_absent).any():
         present = True
-    elif upper < config.friction_absent:
+    elif read.any() and upper < config.friction_absent and (each + 2.0 * std < 2.0 * config.friction_absent)[read].all():
         present = False
         reason = ("compensated friction and a torque measured beyond the gear are one answer here: "
                   "they differ by the rotor inertia alone")
@@ -433,7 +436,7 @@ def _unread(robot: RobotDescription, sign: str | None, names: tuple[str, ...], *
     """A boundary of which nothing but the sign is known."""
     why = "not identifiable from magnitudes" if sign == "magnitude" else "not identifiable: no torque changes its sign"
     nothing = Share(None, None, reason=why)
-    return Boundary(None, sign, nothing, nothing, Direction(None, None, robot.gravity, None, why), JointOrder(None, "", why),
+    return Boundary(None, sign, nothing, nothing, Direction(None, None, robot.gravity, None, reason=why), JointOrder(None, "", reason=why),
                     Unit(_units(robot), None, why), _never(robot), evidence, names)
 
 

@@ -7,7 +7,7 @@ torques together come from columns that are named otherwise than the joints; ord
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
@@ -19,6 +19,7 @@ from pipelines.model.row_fit import Sampled
 __all__ = ["ColumnOrder", "search_orders"]
 
 _ALL_UP_TO = {"q and tau": 6, "q": 4, "tau": 4}  # joints: 720 orders take a second; of more, orders are reached by swaps
+_SIGNALS = ("q and tau", "tau", "q")
 _BEAM = 12  # orders that are kept at each swap
 _AT_ONCE = 40  # orders whose regressors are formed together: 30 MB
 _RIDGE = 1e-8
@@ -51,8 +52,6 @@ class _Scorer:
 
     def prepare(self, orders: Iterable[Order]) -> None:
         """Form the normal equations of `orders` of the positions."""
-        from dataclasses import replace
-
         new = [order for order in dict.fromkeys(orders) if order not in self.known]
         chain = replace(self.arm.chain, gravity=self.gravity)
         moments, n = self.motion.q.shape
@@ -95,38 +94,50 @@ class _Scorer:
 
 
 def search_orders(arm: GenericArm, motion: Sampled, gravity: Array, moving: Sequence[int], model_error: float,
-                  keep: int) -> tuple[ColumnOrder, ...]:
-    """Return at most `keep` orders that score better than the logged one, best first.
+                  config: tuple[int, int, bool]) -> tuple[ColumnOrder, ...]:
+    """Return the best orders that score better than the logged one, best first.
+
+    Exchanges of two columns come first; only where one of them fits better than the log, or `every` is asked for, all others.
 
     Args:
-        motion: a few moments.
+        motion: some hundred moments.
         gravity: (3,) [m/s^2] under which orders are compared.
         moving: joints that move; the others keep their place.
+        config: how many are returned at most; moments that all orders of many joints are compared with; whether to try every order.
     """
-    scorer, n = _Scorer(arm, motion, gravity, model_error), motion.q.shape[1]
-    same: Order = tuple(range(n))
-    found = {(signal, order): score for signal in ("q and tau", "tau", "q")
-             for order, score in _best_of(scorer, signal, same, moving).items() if order != same}
-    logged = scorer.score(same, same)
-    found = {key: score for key, score in found.items() if score > logged}
-    best = sorted(found.items(), key=lambda item: -item[1])[:keep]
+    keep, few, every = config
+    same: Order = tuple(range(motion.q.shape[1]))
+    exchanged = [_swapped(same, a, b) for a, b in combinations(moving, 2)]
+    scorer = _Scorer(arm, motion, gravity, model_error)
+    first = {(signal, order): score for signal in _SIGNALS for order, score in _scores(scorer, signal, [same, *exchanged]).items()}
+    logged = first["q and tau", same]
+    if not every and max(first.values()) <= logged:
+        return ()
+    if len(moving) > _ALL_UP_TO["q"]:
+        step = max(1, len(motion.t) // few)
+        thin = replace(motion, **{name: getattr(motion, name)[::step] for name in ("t", "q", "dq", "ddq", "coulomb", "at")})
+        scorer = _Scorer(arm, thin, gravity, model_error)
+    found = {(signal, order): score for signal in _SIGNALS for order, score in _all_of(scorer, signal, same, moving).items()}
+    logged = found["q and tau", same]
+    better = {key: score for key, score in found.items() if score > logged and key[1] != same}
+    best = sorted(better.items(), key=lambda item: -item[1])[:keep]
     return tuple(ColumnOrder(signal, order, score) for (signal, order), score in best)
 
 
-def _best_of(scorer: _Scorer, signal: str, same: Order, moving: Sequence[int]) -> dict[Order, float]:
-    """Scores of the orders of one kind that were looked at."""
-    def score(orders: Iterable[Order]) -> dict[Order, float]:
-        orders = list(orders)
-        scorer.prepare(orders if "q" in signal else [same])
-        return {order: scorer.score(order if "q" in signal else same, order if "tau" in signal else same) for order in orders}
+def _scores(scorer: _Scorer, signal: str, orders: Sequence[Order]) -> dict[Order, float]:
+    same: Order = tuple(range(len(orders[0])))
+    scorer.prepare(orders if "q" in signal else [same])
+    return {order: scorer.score(order if "q" in signal else same, order if "tau" in signal else same) for order in orders}
 
+
+def _all_of(scorer: _Scorer, signal: str, same: Order, moving: Sequence[int]) -> dict[Order, float]:
+    """Scores of every order of one kind; of many joints, of those that exchanges of two columns reach."""
     if len(moving) <= _ALL_UP_TO[signal]:
-        return score(_placed(same, moving))
-    known = score([same])
-    beam = [same]
+        return _scores(scorer, signal, _placed(same, moving))
+    known, beam = _scores(scorer, signal, [same]), [same]
     for _ in range(len(moving) - 1):
         near = {_swapped(order, a, b) for order in beam for a, b in combinations(moving, 2)} - set(known)
-        known |= score(sorted(near))
+        known |= _scores(scorer, signal, sorted(near)) if near else {}
         best = sorted(known, key=lambda order: -known[order])[:_BEAM]
         if best == beam:
             break

@@ -21,6 +21,7 @@ class BoundaryConfig:
     # Gain in log likelihood that decides between two models, after the residual's correlation is counted: odds of 20,000.
     decisive: float = 10.0
     explained: float = 0.5  # of the residual power under the described gravity is the most that another direction may leave
+    lost: float = 0.2  # of the torques' RMS: where all joints together leave more, every order is tried, and not only exchanges
     suspect: float = 0.08  # of a torque's RMS: where no joint leaves more, other orders of the columns are not tried
     tilt: float = 0.26  # [rad] 15 degrees: more than levelling leaves, so that the description is wrong, and not the mounting
     absent: float = 0.2  # of the gravity torque: a share below is none, what is left is an error of the compensation
