@@ -111,7 +111,8 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
         NothingMatched: C06, no log to fit.
         UsageError: C01, C02, settings that do not fit, logs of several robots, or a model or a calibration of another one.
         InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks gravity, has one of another
-            direction, or has no sign; S13, S14, S15, T06, torque and motion of a log do not belong together; T04, no stretch of a log can be used; T08, too few equations are left; D14, one recording in two roles.
+            direction, or has no sign; S13, S14, S15, T06, torque and motion of a log do not belong together; T04, no stretch of
+            a log can be used; T08, too few equations are left; D14, one recording in two roles.
     """
     _refuse_strange(settings)
     given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)

@@ -147,7 +147,8 @@ def exit_code(result: Result, check: bool) -> int:
 def report(result: Result) -> Report:
     """The verdict, what was found, what was looked at, and the signals of the first logs."""
     found = sorted((c for c in result.checks if c.level != "ok"), key=first_to_read)
-    sections = [*boundary_card(result.boundary), _found_section(found), _logs_section(result), _passed_section(result), _not_tested_section(result)]
+    sections = [*boundary_card(result.boundary), _found_section(found), _logs_section(result), _passed_section(result),
+                _not_tested_section(result)]
     sections = [section for section in sections if any(table.rows for table in section.tables)]
     sections += [_log_section(summary, preview) for summary, preview in _paired(result)]
     tone = level_tone(c.level for c in result.checks)

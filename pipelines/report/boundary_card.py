@@ -10,7 +10,8 @@ from pipelines.report.report import Cell, Section, Table, Tone
 __all__ = ["boundary_card"]
 
 _UNKNOWN = "not identifiable"
-_SIDES = {"joint": "joint side: beyond the friction of the drive, or compensated for it", "motor": "motor side: with the friction of the drive"}
+_SIDES = {"joint": "joint side: beyond the friction of the drive, or compensated for it",
+          "motor": "motor side: with the friction of the drive"}
 
 
 def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:

@@ -65,7 +65,8 @@ def diagnosis_report(result: Result) -> Report:
              for section in (finding_section(number, one, nominal, units=units, beside=result.findings,
                                              left=result.after_rms.validate),
                              numbers_section(number, one, units, result.findings))]
-    sections = [*boundary_card(result.boundary), *found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
+    sections = [*boundary_card(result.boundary), *found, *_unknown(result),
+                *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),
                   errors_table(now, result.after_rms, result.rated, floor, name,

@@ -151,6 +151,13 @@ def _thinned(motions: Sequence[Sampled], moments: int) -> list[Sampled]:
             for motion in motions]
 
 
+def _joined(parts: Sequence[Sampled]) -> Sampled:
+    """The moments of all logs as those of one."""
+    t, q, dq, ddq, coulomb, tau = (np.concatenate([getattr(part, name) for part in parts])
+                                   for name in ("t", "q", "dq", "ddq", "coulomb", "tau"))
+    return replace(parts[0], t=t, q=q, dq=dq, ddq=ddq, coulomb=coulomb, torque=tau, at=np.arange(len(t)))
+
+
 @dataclass(frozen=True, eq=False)
 class _Fits:
     """The fits of one order of columns."""
@@ -212,7 +219,8 @@ def _estimated(robot: RobotDescription, arm: GenericArm, motions: Sequence[Sampl
     evidence = [f"the torque of joint {', '.join(str(j + 1) for j, count in enumerate(touches) if count is None)} changes its sign"]
     order, fits = _ordered(arm, motions, rows, fits, described, config)
     if order.signal:
-        evidence.append(f"residual over the torque: {order.before:.2g} with the columns as logged, {order.after:.2g} in another order")
+        evidence.append(f"residual over the torque: {order.before:.2g} with the columns as logged, "
+                        f"{order.after:.2g} in another order")
     gravity, direction, removed, turned = _gravity(fits, described, config)
     friction = _friction(fits, config)
     evidence += _in_words(fits, gravity, friction)
@@ -230,10 +238,7 @@ def _ordered(arm: GenericArm, motions: Sequence[Sampled], rows: Sequence[Sampled
     same = JointOrder(tuple(range(1, n + 1)), "")
     if n == 1 or fits.best.residual.max() < config.suspect:
         return same, fits
-    few = _thinned(motions, config.order_rows)
-    one = replace(few[0], **{name: np.concatenate([getattr(part, name) for part in few]) for name in
-                             ("t", "q", "dq", "ddq", "coulomb")}, at=np.arange(sum(len(part.t) for part in few)),
-                  torque=np.concatenate([part.tau for part in few]))
+    one = _joined(_thinned(motions, config.order_rows))
     travel = np.ptp(one.q, axis=0)
     moving = np.flatnonzero(travel > _HELD * travel.max()).tolist()
     tried = search_orders(arm, one, described, moving, config.model_error,
@@ -370,7 +375,8 @@ def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
     size = np.sqrt(np.mean(speed**2, axis=1) * np.mean(rows.tau**2, axis=1))
     weights = np.zeros((n, n * c))
     for j in range(n):
-        weights[j, j * c + FRICTION.start:j * c + FRICTION.stop] = (rows.own[j, :, FRICTION] * speed[j][:, None]).mean(axis=0) / size[j]
+        power = rows.own[j, :, FRICTION] * speed[j][:, None]
+        weights[j, j * c + FRICTION.start:j * c + FRICTION.stop] = power.mean(axis=0) / size[j]
     each = weights @ coefficients.ravel()
     std = np.sqrt(np.maximum(np.einsum("jk,kl,jl->j", weights, covariance, weights), 0.0))
     sure = 1.0 / (std**2 + (0.25 * config.friction_absent) ** 2)  # a joint whose friction no motion tells has no say
@@ -436,8 +442,8 @@ def _unread(robot: RobotDescription, sign: str | None, names: tuple[str, ...], *
     """A boundary of which nothing but the sign is known."""
     why = "not identifiable from magnitudes" if sign == "magnitude" else "not identifiable: no torque changes its sign"
     nothing = Share(None, None, reason=why)
-    return Boundary(None, sign, nothing, nothing, Direction(None, None, robot.gravity, None, reason=why), JointOrder(None, "", reason=why),
-                    Unit(_units(robot), None, why), _never(robot), evidence, names)
+    return Boundary(None, sign, nothing, nothing, Direction(None, None, robot.gravity, None, reason=why),
+                    JointOrder(None, "", reason=why), Unit(_units(robot), None, why), _never(robot), evidence, names)
 
 
 def _magnitude(robot: RobotDescription, touches: tuple[int, ...], names: tuple[str, ...]) -> Boundary:

@@ -54,7 +54,7 @@ def _order(order: JointOrder, where: str) -> Check:
 def _turned(boundary: Boundary, where: str) -> Check:
     direction = boundary.direction
     vector = np.array(direction.best) * STANDARD_GRAVITY / np.linalg.norm(direction.best)
-    told = f"[{', '.join(f'{x:.2f}' for x in vector + 0.0)}]"
+    told = f"[{', '.join(f'{x:.2f}' for x in np.round(vector, 2) + 0.0)}]"
     described = f"[{', '.join(f'{x:.2f}' for x in direction.described)}]"
     known = "" if direction.vector is not None else ", of the directions that this motion does not tell apart one"
     return Check.of("S24", "warn", f"gravity points elsewhere: the torque has gravity = {told}{known}, the description {described}",

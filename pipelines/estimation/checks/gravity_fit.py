@@ -85,6 +85,10 @@ class GravityModel:
         score = -0.5 * float(self.effective @ np.log(variance)) - 0.5 * float(np.sum(each**2)) / (len(each) * LOOSE**2)
         return GravityFit(each, phi / self.scale, variance, np.sqrt(np.maximum(left, 0.0)), score)
 
+    def _equilibrated(self, fit: GravityFit) -> Array:
+        """The parameters (p,) of columns at unit length."""
+        return fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
+
     def _reduced(self, joint: int, transform: Array) -> tuple[Array, Array]:
         gram = self.gram[joint]
         return transform.T @ gram[:-1, :-1] @ transform, transform.T @ gram[:-1, -1]
@@ -111,7 +115,7 @@ class GravityModel:
             normal += weight * transform.T @ gram[:-1, :-1] @ transform
             cross += weight * transform.T @ gram[:-1, :-1] @ change
             inner += weight * change.T @ gram[:-1, :-1] @ change
-            left = gram[:-1, -1] - gram[:-1, :-1] @ (transform @ (fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0)))
+            left = gram[:-1, -1] - gram[:-1, :-1] @ (transform @ self._equilibrated(fit))
             slope += weight * change.T @ left
             rest += weight * transform.T @ left  # zero but for the reweighting that has not ended
         ridge = _RIDGE * np.trace(normal) / p * np.eye(p)
@@ -178,5 +182,5 @@ class GravityModel:
 
     def residuals(self, fit: GravityFit) -> Array:
         """(n, N) the residual over the RMS of each joint's torque."""
-        theta = fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
+        theta = self._equilibrated(fit)
         return np.stack([self.projected[j, :, -1] - self.rigid(j, fit) @ theta for j in range(len(fit.gravity))])

@@ -8,7 +8,10 @@ residual's correlation leaves is used instead.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
 from pipelines.estimation.checks.torque_rows import Array
@@ -19,17 +22,17 @@ _RIDGE = 1e-9  # of the largest eigenvalue of an equilibrated information matrix
 _BLOCKS = 20  # of all logs together
 
 
-def effective_moments(residuals: Array, starts: Array) -> Array:
+def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
     """Return the number of independent moments (n,) of residuals (n, N), `starts` the first of each log.
 
     ν = N / (1 + 2 Σ ρ_k), summed over the initial positive pairs of the autocorrelation (Geyer 1992).
     """
     n, total = residuals.shape
     edges = [*starts.tolist(), total]
-    length = max(b - a for a, b in zip(edges, edges[1:], strict=False))
+    length = max(b - a for a, b in pairwise(edges))
     size = 1 << (2 * length - 1).bit_length()
     centred = residuals - residuals.mean(axis=1, keepdims=True)
-    power = sum(np.abs(np.fft.rfft(centred[:, a:b], size, axis=1)) ** 2 for a, b in zip(edges, edges[1:], strict=False))
+    power = sum(np.abs(np.fft.rfft(centred[:, a:b], size, axis=1)) ** 2 for a, b in pairwise(edges))
     rho = np.fft.irfft(power, size, axis=1)[:, :length]
     rho = rho / np.maximum(rho[:, :1], 1e-300)
     pairs = rho[:, :length // 2 * 2].reshape(n, -1, 2).sum(axis=2)
