@@ -77,7 +77,7 @@ class GravityModel:
         for _ in range(_ROUNDS):
             normal = sum(g / v for (g, _), v in zip(grams, variance, strict=True))
             right = sum(b / v for (_, b), v in zip(grams, variance, strict=True))
-            phi = np.linalg.solve(normal + _RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal)), right)
+            phi = np.linalg.solve(normal + _ridge(normal), right)
             left = np.array([self.gram[j, -1, -1] - 2.0 * b @ phi + phi @ g @ phi for j, (g, b) in enumerate(grams)])
             before, variance = variance, np.maximum(left, 0.0) + self.model_error**2
             if np.abs(np.log(variance / before)).max() < _SETTLED:
@@ -118,7 +118,7 @@ class GravityModel:
             left = gram[:-1, -1] - gram[:-1, :-1] @ (transform @ self._equilibrated(fit))
             slope += weight * change.T @ left
             rest += weight * transform.T @ left  # zero but for the reweighting that has not ended
-        ridge = _RIDGE * np.trace(normal) / p * np.eye(p)
+        ridge = _ridge(normal)
         prior = groups.reshape(len(groups), -1) / (LOOSE * np.sqrt(len(fit.gravity)))
         inward = np.linalg.solve(normal + ridge, np.column_stack([cross, rest]))
         return (slope - cross.T @ inward[:, -1] - prior @ fit.gravity.ravel() / (LOOSE * np.sqrt(len(fit.gravity))),
@@ -184,3 +184,8 @@ class GravityModel:
         """(n, N) the residual over the RMS of each joint's torque."""
         theta = self._equilibrated(fit)
         return np.stack([self.projected[j, :, -1] - self.rigid(j, fit) @ theta for j in range(len(fit.gravity))])
+
+
+def _ridge(normal: Array) -> Array:
+    """What keeps a normal matrix (p, p) of equilibrated columns invertible; of an arm without any, too."""
+    return _RIDGE * max(float(np.trace(normal)) / len(normal), 1.0) * np.eye(len(normal))
