@@ -23,6 +23,7 @@ from pipelines.estimation.checks.torque_rows import (
     Array,
     GenericArm,
     Order,
+    TorqueRows,
     described_torque,
     generic_arm,
     torque_rows,
@@ -244,8 +245,7 @@ def _ordered(arm: GenericArm, motions: Sequence[Sampled], rows: Sequence[Sampled
     tried = search_orders(arm, one, described, moving, config.model_error,
                           (config.orders, config.order_rows_many, fits.rms > config.lost))
     part = _thinned(motions, config.order_rows)
-    here = _fits(arm, part, described, config) if tried else fits
-    gains = [_gain(here, _fits(arm, part, described, config, *_applied(c)), c) for c in tried]
+    gains = [_gain(fits, *_under(torque_rows(arm, part, *_applied(c)), described, config), c) for c in tried]
     if not tried or max(gains) < config.decisive:
         return same, fits
     top = int(np.argmax(gains))
@@ -264,11 +264,18 @@ def _applied(column: ColumnOrder) -> tuple[Order | None, Order | None]:
     return column.order if "q" in column.signal else None, column.order if "tau" in column.signal else None
 
 
-def _gain(logged: _Fits, other: _Fits, column: ColumnOrder) -> float:
+def _under(rows: TorqueRows, described: Array, config: BoundaryConfig) -> tuple[GravityFit, Array]:
+    """The best fit from the described gravity, and the independent moments of each joint."""
+    model = GravityModel(rows, config.model_error)
+    found = model.search(np.tile(described, (rows.n_joints, 1)), _whole(rows.n_joints))
+    return found, effective_moments(model.residuals(found), rows.start)
+
+
+def _gain(logged: _Fits, other: GravityFit, effective: Array, column: ColumnOrder) -> float:
     """Log likelihood of the other order beyond that of the logged one, by each torque's number of independent moments."""
     taken = list(column.order) if "tau" in column.signal else list(range(len(column.order)))
-    effective = np.minimum(logged.model.effective[taken], other.model.effective)
-    return 0.5 * float(effective @ np.log(logged.best.variance[taken] / other.best.variance))
+    moments = np.minimum(logged.model.effective[taken], effective)
+    return 0.5 * float(moments @ np.log(logged.best.variance[taken] / other.variance))
 
 
 def _gravity(fits: _Fits, described: Array, config: BoundaryConfig) -> tuple[Share, Direction, bool, bool]:

@@ -62,23 +62,28 @@ class GravityModel:
         """T (P, p) of one gravity (3,): columns of the model = [Y_0 Y_x Y_y Y_z] T."""
         p, m = self.rows.inertial.shape[2], len(self.rows.heavy)
         out = np.zeros((p + 3 * m, p))
-        out[:p] = np.eye(p)
+        out[np.arange(p), np.arange(p)] = 1.0 / self.scale
         for k in range(3):
-            out[p + k * m + np.arange(m), self.rows.heavy] = gravity[k]
-        return out / self.scale
+            out[p + k * m + np.arange(m), self.rows.heavy] = gravity[k] / self.scale[self.rows.heavy]
+        return out
+
+    def _parts(self, each: Array, weights: Array) -> list[tuple[Array, Array]]:
+        """Joints of one gravity together: their T, and their weighted Gram matrix."""
+        if (each == each[0]).all():
+            return [(self._transform(each[0]), np.tensordot(weights, self.gram, 1))]
+        return [(self._transform(a), w * gram) for a, w, gram in zip(each, weights, self.gram, strict=True)]
 
     def fit(self, gravity: Array, variance: Array | None = None) -> GravityFit:
         """Fit the parameters under `gravity`, (3,) or of each joint (n, 3), from the `variance` (n,) of a fit nearby."""
         each = np.broadcast_to(gravity, (self.rows.n_joints, 3))
-        same = bool((each == each[0]).all())
-        transforms = [self._transform(each[0])] if same else [self._transform(a) for a in each]
-        grams = [self._reduced(j, transforms[0 if same else j]) for j in range(len(each))]
         variance = np.ones(len(each)) if variance is None else variance
         for _ in range(_ROUNDS):
-            normal = sum(g / v for (g, _), v in zip(grams, variance, strict=True))
-            right = sum(b / v for (_, b), v in zip(grams, variance, strict=True))
+            parts = self._parts(each, 1.0 / variance)
+            normal = sum((t.T @ g[:-1, :-1] @ t for t, g in parts), np.zeros(()))
+            right = sum((t.T @ g[:-1, -1] for t, g in parts), np.zeros(()))
             phi = np.linalg.solve(normal + _ridge(normal), right)
-            left = np.array([self.gram[j, -1, -1] - 2.0 * b @ phi + phi @ g @ phi for j, (g, b) in enumerate(grams)])
+            model = np.broadcast_to(np.stack([np.append(t @ phi, -1.0) for t, _ in parts]), (len(each), len(self.gram[0])))
+            left = np.einsum("jp,jp->j", model, np.matmul(self.gram, model[:, :, None])[:, :, 0])
             before, variance = variance, np.maximum(left, 0.0) + self.model_error**2
             if np.abs(np.log(variance / before)).max() < _SETTLED:
                 break
@@ -89,12 +94,9 @@ class GravityModel:
         """The parameters (p,) of columns at unit length."""
         return fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
 
-    def _reduced(self, joint: int, transform: Array) -> tuple[Array, Array]:
-        gram = self.gram[joint]
-        return transform.T @ gram[:-1, :-1] @ transform, transform.T @ gram[:-1, -1]
-
     def curvature(self, fit: GravityFit, groups: Array) -> tuple[Array, Array]:
-        """Gradient and Hessian of the negative log likelihood over the gravity, the parameters projected out.
+        """Gradient and Hessian of the log likelihood over the gravity, the parameters projected out; its sign such that a step is
+        the Hessian's inverse times the gradient.
 
         Args:
             groups: (k, n, 3) directions in which the joints' gravity is changed.
@@ -105,22 +107,23 @@ class GravityModel:
         p, m = self.rows.inertial.shape[2], len(self.rows.heavy)
         normal, cross = np.zeros((p, p)), np.zeros((p, len(groups)))
         inner, slope, rest = np.zeros((len(groups), len(groups))), np.zeros(len(groups)), np.zeros(p)
-        for j, gravity in enumerate(fit.gravity):
-            weight = self.effective[j] / fit.variance[j]
-            transform = self._transform(gravity)
-            gram = self.gram[j]
+        alike = bool((groups == groups[:, :1]).all() and (fit.gravity == fit.gravity[0]).all())
+        weights, theta = self.effective / fit.variance, self._equilibrated(fit)
+        parts = self._parts(fit.gravity, weights) if alike else [
+            (self._transform(a), w * gram) for a, w, gram in zip(fit.gravity, weights, self.gram, strict=True)]
+        for j, (transform, gram) in enumerate(parts):
             change = np.zeros((p + 3 * m, len(groups)))
             for k in range(3):
                 change[p + k * m:p + (k + 1) * m] = np.outer(fit.parameters[self.rows.heavy], groups[:, j, k])
-            normal += weight * transform.T @ gram[:-1, :-1] @ transform
-            cross += weight * transform.T @ gram[:-1, :-1] @ change
-            inner += weight * change.T @ gram[:-1, :-1] @ change
-            left = gram[:-1, -1] - gram[:-1, :-1] @ (transform @ self._equilibrated(fit))
-            slope += weight * change.T @ left
-            rest += weight * transform.T @ left  # zero but for the reweighting that has not ended
-        ridge = _ridge(normal)
+            onto = gram[:-1, :-1] @ np.column_stack([transform, change])
+            normal += transform.T @ onto[:, :p]
+            cross += transform.T @ onto[:, p:]
+            inner += change.T @ onto[:, p:]
+            left = gram[:-1, -1] - onto[:, :p] @ theta
+            slope += change.T @ left
+            rest += transform.T @ left  # zero but for the reweighting that has not ended
         prior = groups.reshape(len(groups), -1) / (LOOSE * np.sqrt(len(fit.gravity)))
-        inward = np.linalg.solve(normal + ridge, np.column_stack([cross, rest]))
+        inward = np.linalg.solve(normal + _ridge(normal), np.column_stack([cross, rest]))
         return (slope - cross.T @ inward[:, -1] - prior @ fit.gravity.ravel() / (LOOSE * np.sqrt(len(fit.gravity))),
                 inner - cross.T @ inward[:, :-1] + prior @ prior.T)
 
@@ -163,18 +166,6 @@ class GravityModel:
                 if damping > 1e6:
                     break
         return best
-
-    def row_residual(self) -> Array:
-        """(n,) RMS residual over that of the torque where each joint has parameters, and a gravity, of its own."""
-        left = []
-        for gram in self.gram:
-            scale = np.sqrt(np.maximum(np.diag(gram)[:-1], 1e-300))
-            seen = scale > 1e-10 * scale.max()
-            values, vectors = np.linalg.eigh(gram[:-1, :-1][np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen]))
-            part = vectors.T @ (gram[:-1, -1][seen] / scale[seen])
-            kept = values > 1e-8 * values[-1]
-            left.append(gram[-1, -1] - np.sum(part[kept] ** 2 / values[kept]))
-        return np.asarray(np.sqrt(np.maximum(left, 0.0)))
 
     def rigid(self, joint: int, fit: GravityFit) -> Array:
         """(N, p) equilibrated columns of the rigid body under the gravity of `fit`, own columns projected out."""
