@@ -290,19 +290,17 @@ def _gravity(fits: _Fits, described: Array, config: BoundaryConfig) -> tuple[Sha
     across = float(np.sqrt(max(np.trace(covariance) - along @ covariance @ along, 0.0))) / STANDARD_GRAVITY
     share = size / STANDARD_GRAVITY
     known = std < config.undetermined and across < config.wide
-    removed = (known and share + 2.0 * std < config.absent and bool(np.any(described))
-               and fits.none.score > fits.described.score + config.decisive)
-    present: bool | None = None
-    if known:
-        present = True if share - 2.0 * std > config.absent else False if share + 2.0 * std < config.absent else None
+    top, none = fits.turned[0], fits.none
+    present = _present(top, none, (share, std) if known else None, config)
+    known = known and present is not None
+    removed = present is False and bool(np.any(described)) and none.score > fits.described.score + config.decisive
     found = Share(share if known else None, std if known else None, present=present,
-                  reason="" if known else "not identifiable: no torque of this motion tells the size of gravity")
-    if present:
+                  reason="" if known else "not identifiable: this motion does not tell the size of gravity")
+    if present and known:
         joints = _each_joint(model, best, config)
         found = replace(found, joint_share=joints[0], joint_std=joints[1])
     if present is False:
         return found, Direction(None, None, tuple(described.tolist()), None, reason="the torque holds no gravity"), removed, False
-    top = fits.turned[0]
     half = float(np.sum(top.residual**2)) < config.explained * float(np.sum(fits.described.residual**2))
     # a gravity upside down is hardly seen where links of negative inertia take its place
     turned = (not removed and (half or (_possible(model, top) and not _possible(model, fits.described)))
@@ -315,6 +313,17 @@ def _gravity(fits: _Fits, described: Array, config: BoundaryConfig) -> tuple[Sha
         why = "not identifiable: the direction is known to some degrees only"
     return found, Direction(tuple(map(float, pointing)) if told else None, spread if told else None, tuple(described.tolist()),
                             _angle(pointing, described) if told else None, tuple(map(float, pointing)), why), removed, turned
+
+
+def _present(top: GravityFit, none: GravityFit, share: tuple[float, float] | None, config: BoundaryConfig) -> bool | None:
+    """Whether the torque holds gravity: by its share, and by whether gravity of its whole size, or none, explains the torque."""
+    half = float(np.sum(top.residual**2)) < config.explained * float(np.sum(none.residual**2))
+    if share is None:
+        return True if half and top.score > none.score + config.decisive else None
+    low, high = share[0] - 2.0 * share[1], share[0] + 2.0 * share[1]
+    if high < config.absent:
+        return False if none.score > top.score + config.decisive else None  # balanced links have no gravity either
+    return True if low > config.absent else None
 
 
 def _around(model: GravityModel, described: Array, config: BoundaryConfig) -> float:
