@@ -7,7 +7,9 @@ import math
 from pipelines.estimation.checks.boundary import Boundary, Share
 from pipelines.report.report import Cell, Section, Table, Tone
 
-__all__ = ["boundary_card"]
+__all__ = ["CARD", "boundary_card"]
+
+CARD = "What the logged torque is"
 
 _UNKNOWN = "not identifiable"
 _SIDES = {"joint": "joint side: beyond the friction of the drive, or compensated for it",
@@ -21,7 +23,7 @@ def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
     rows = [_sign(boundary), _gravity(boundary), _direction(boundary), _friction(boundary), _order(boundary), _unit(boundary)]
     table = Table(("quantity", "found", "remark"), tuple(row for row, _ in rows), tones=tuple(tone for _, tone in rows))
     hidden = "; ".join(f"{one.what}: {one.reason}" for one in boundary.not_identifiable)
-    return (Section("What the logged torque is", (f"Rests on: {'; '.join(boundary.evidence)}." if boundary.evidence else "",
+    return (Section(CARD, (f"Rests on: {'; '.join(boundary.evidence)}." if boundary.evidence else "",
                                                  f"Not identifiable from such logs: {hidden}."), (table,)),)
 
 
