@@ -30,7 +30,10 @@ __all__ = ["KINDS", "Machine", "case", "draw", "main"]
 Array = npt.NDArray[np.float64]
 DOWN = np.array([0.0, 0.0, -9.81])
 KINDS = ("whole", "no gravity", "no friction", "magnitude", "wall", "ceiling", "y-up", "permuted")
-FAULTS = ("healthy", "spring", "cogging", "payload", "tilt", "offset", "gain", "lag", "encoder", "longer link", "counterbalance", "flip", "scale", "delay")
+FAULTS = ("healthy", "spring", "cogging", "payload", "tilt", "offset", "gain", "lag", "encoder", "longer link",
+          "counterbalance", "flip", "scale", "delay")
+CLAIM = {"no gravity": "gravity", "no friction": "friction", "magnitude": "sign", "wall": "turned", "ceiling": "turned",
+         "y-up": "turned", "permuted": "order"}  # what is right to claim of each kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +60,19 @@ def _dh(family: str, rng: np.random.Generator) -> tuple[list[tuple[float, float,
     """(a, alpha, d, type) of each joint, and the mean posture."""
     h, u = np.pi / 2, rng.uniform
     if family == "rrr":
-        return [(0, h, u(.3, .6), "revolute"), (u(.15, .5), 0, u(0, .2), "revolute"), (u(.15, .5), 0, u(0, .1), "revolute")], [0, -.8, .6]
+        return [(0, h, u(.3, .6), "revolute"), (u(.15, .5), 0, u(0, .2), "revolute"),
+                (u(.15, .5), 0, u(0, .1), "revolute")], [0, -.8, .6]
     if family == "scara":
         return [(u(.2, .4), 0, u(.2, .4), "revolute"), (u(.2, .4), np.pi, 0, "revolute"), (0, 0, 0, "prismatic"),
                 (0, 0, u(.05, .1), "revolute")], [0, .5, .15, 0]
     if family == "ur":
         s = u(.6, 1.5)
-        return [(0, h, .09 * s, "revolute"), (-.425 * s, 0, 0, "revolute"), (-.392 * s, 0, 0, "revolute"), (0, h, .11 * s, "revolute"),
-                (0, -h, .095 * s, "revolute"), (0, 0, .08 * s, "revolute")], [0, -1.2, 1.2, -1.5, -1.5, 0]
+        return [(0, h, .09 * s, "revolute"), (-.425 * s, 0, 0, "revolute"), (-.392 * s, 0, 0, "revolute"),
+                (0, h, .11 * s, "revolute"), (0, -h, .095 * s, "revolute"), (0, 0, .08 * s, "revolute")], [0, -1.2, 1.2, -1.5, -1.5, 0]
     if family == "six":
         s = u(.6, 2.0)
-        return [(.1 * s, -h, .4 * s, "revolute"), (.4 * s, 0, 0, "revolute"), (.03 * s, -h, 0, "revolute"), (0, h, .4 * s, "revolute"),
-                (0, -h, 0, "revolute"), (0, 0, .08 * s, "revolute")], [0, -1.2, .3, 0, .6, 0]
+        return [(.1 * s, -h, .4 * s, "revolute"), (.4 * s, 0, 0, "revolute"), (.03 * s, -h, 0, "revolute"),
+                (0, h, .4 * s, "revolute"), (0, -h, 0, "revolute"), (0, 0, .08 * s, "revolute")], [0, -1.2, .3, 0, .6, 0]
     if family == "seven":
         s = u(.7, 1.2)
         return [(0, -h, .34 * s, "revolute"), (0, h, 0, "revolute"), (0, h, .4 * s, "revolute"), (0, -h, 0, "revolute"),
@@ -102,8 +106,8 @@ def draw(seed: int) -> Machine:
     speed = np.sqrt(np.mean(dq**2, axis=0))
     level = rng.uniform(.02, .06, n) if direct else rng.uniform(.08, .4, n)
     share = rng.uniform(.3, .8, n)
-    friction = {"coulomb": level * share * size, "viscous": level * (1 - share) * size / speed, "width": rng.uniform(.005, .03, n) * speed,
-                "slow": rng.uniform(.05, .2, n) * speed}
+    friction = {"coulomb": level * share * size, "viscous": level * (1 - share) * size / speed,
+                "width": rng.uniform(.005, .03, n) * speed, "slow": rng.uniform(.05, .2, n) * speed}
     law = str(rng.choice(["tanh", "tanh", "stribeck", "concave", "load", "asymmetric"]))
     inertia = np.array([_inverse_dynamics(robot, q[:1], 0 * q[:1], np.eye(n)[k:k + 1], 0 * DOWN)[0, k] for k in range(n)])
     rotor = inertia * (rng.uniform(0, .05, n) if direct else rng.uniform(.1, 1.5, n))
@@ -119,8 +123,9 @@ def _link(a: float, d: float, mass: float, rng: np.random.Generator) -> LinkPara
     own = mass / 5 * np.diag([radii[1]**2 + radii[2]**2, radii[0]**2 + radii[2]**2, radii[0]**2 + radii[1]**2])
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     about = turn @ own @ turn.T + mass * (com @ com * np.eye(3) - np.outer(com, com))
-    i = about
-    return LinkParameters(float(mass), tuple(map(float, com)), tuple(map(float, (i[0, 0], i[1, 1], i[2, 2], -i[0, 1], -i[0, 2], -i[1, 2]))))
+    xx, yy, zz, xy, xz, yz = (float(about[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    x, y, z = map(float, com)
+    return LinkParameters(float(mass), (x, y, z), (xx, yy, zz, -xy, -xz, -yz))
 
 
 def _as_described(link: LinkParameters | None, how: str, rng: np.random.Generator) -> LinkParameters | None:
@@ -142,9 +147,10 @@ def _motion(rng: np.random.Generator, n: int, home: Array, revolute: Array) -> t
         order = np.arange(1, 6)
         c = rng.normal(size=(n, 5, 2)) / order[:, None]
         arg = base * np.outer(t, order)
-        q = np.einsum("nk,tk->tn", c[..., 0], np.sin(arg)) + np.einsum("nk,tk->tn", c[..., 1], np.cos(arg))
-        dq = np.einsum("nk,tk->tn", c[..., 0] * order * base, np.cos(arg)) - np.einsum("nk,tk->tn", c[..., 1] * order * base, np.sin(arg))
-        ddq = -np.einsum("nk,tk->tn", c[..., 0] * (order * base)**2, np.sin(arg)) - np.einsum("nk,tk->tn", c[..., 1] * (order * base)**2, np.cos(arg))
+        sine, cosine, rate = np.sin(arg).T, np.cos(arg).T, order * base
+        q = (c[..., 0] @ sine + c[..., 1] @ cosine).T
+        dq = ((c[..., 0] * rate) @ cosine - (c[..., 1] * rate) @ sine).T
+        ddq = -((c[..., 0] * rate**2) @ sine + (c[..., 1] * rate**2) @ cosine).T
         scale = reach / np.abs(q).max(axis=0)
         return t, home + q * scale, dq * scale, ddq * scale
     moves = int(rng.integers(8, 16))
@@ -311,10 +317,9 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
         return out | {"none": True}
     blind = _vertical(draw(seed), np.array(truth["direction"]))
     out["sign"] = _field(found.sign, "signed" if truth["sign"] else "magnitude")
-    out["alarms"] = [name for name, said in (("order", bool(found.order.signal)), ("gravity", found.without_gravity), ("turned", found.turned),
-                                             ("sign", found.sign == "magnitude"), ("friction", found.friction.present is False))
-                     if said and name != {"permuted": "order", "no gravity": "gravity", "wall": "turned", "ceiling": "turned",
-                                          "y-up": "turned", "magnitude": "sign", "no friction": "friction"}.get(kind)]
+    claims = {"order": bool(found.order.signal), "gravity": found.without_gravity, "turned": found.turned,
+              "sign": found.sign == "magnitude", "friction": found.friction.present is False}
+    out["alarms"] = [name for name, claimed in claims.items() if claimed and name != CLAIM.get(kind)]
     if kind == "magnitude":
         return out
     out["gravity"] = _told(found.gravity.present, truth["gravity"], blind)
@@ -326,8 +331,7 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     out["direction"] = _told(near, True, blind) if truth["gravity"] else "right" if vector is None else "wrong"
     columns = None if found.order.columns is None else [k - 1 for k in found.order.columns]
     out["order"] = _told(columns, truth["order"], False)
-    out["gate"] = {"permuted": bool(found.order.signal), "no gravity": found.without_gravity, "wall": found.turned, "ceiling": found.turned,
-                   "y-up": found.turned}.get(kind, True) or (blind and kind in ("no gravity", "ceiling"))
+    out["gate"] = claims.get(CLAIM.get(kind, ""), True) or (blind and kind in ("no gravity", "ceiling"))
     return out
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,8 @@ def imported(case: Path, out: Path) -> Path:
     tau = [name for name in header if name.endswith("_effort") or name.startswith("tau_")]
     recipe = out / "recipe.toml"
     out.mkdir()
-    recipe.write_text(RECIPE.format(time=header[0], q=json.dumps(q), tau=json.dumps(tau)).replace("arm.urdf", str(case / "arm.urdf")))
+    text = RECIPE.format(time=header[0], q=json.dumps(q), tau=json.dumps(tau))
+    recipe.write_text(text.replace("arm.urdf", str(case / "arm.urdf")))
     run_stage(import_log.STAGE, Request((), out / "logs", no_report=True), import_log.Settings(recipe=str(recipe), source=case))
     return out / "logs"
 
@@ -87,8 +89,6 @@ def test_a_compensated_torque_may_be_fitted_by_an_arm_that_is_described_without_
     logs = imported(shared / "cases" / "34-gravity-compensated-torque", tmp_path / "compensated")
     paths, _ = find_logs([logs])
     one = open_log(paths[0]).log
-    from dataclasses import replace
-
     weightless = replace(one, robot_text=format_robot(replace(one.robot, gravity=(0.0, 0.0, 0.0))))
     found = torque_boundary([weightless])
     assert found is not None
@@ -103,7 +103,8 @@ def unsigned(shared: Path, motion: str) -> ExperimentLog:
     t = 1e-6 * np.array([float(row["timestamp"]) for row in rows])
     q, tau = (np.array([json.loads(row[name]) for row in rows]) for name in ("positions", "torques"))
     keep = np.concatenate([[True], np.diff(t) > 0.0])
-    signals = {"t": Signal(t[keep], "s", "time"), "q": Signal(q[keep], "rad", "position"), "tau": Signal(tau[keep], "N m", "effort")}
+    signals = {"t": Signal(t[keep], "s", "time"), "q": Signal(q[keep], "rad", "position"),
+               "tau": Signal(tau[keep], "N m", "effort")}
     robot = load_robot(folder / "so101.urdf")
     return ExperimentLog(motion, "free", "identify", "measured", robot.name, float(np.median(np.diff(t))), format_robot(robot),
                          signals, torque="measured")

@@ -307,6 +307,8 @@ def _gravity(fits: _Fits, described: Array, config: BoundaryConfig) -> tuple[Sha
               and _angle(top.gravity[0], described) > config.tilt
               and top.score > _around(model, described, config) + config.decisive)
     spread, why = _direction_spread(fits, config)
+    if across >= config.wide:  # only its size, which is known, would tell the part along the joints' axes
+        spread, why = None, "not identifiable: the part along the joints' axes acts on no joint"
     told = spread is not None and spread < config.direction_std
     pointing = top.gravity[0]
     if not told and not why:

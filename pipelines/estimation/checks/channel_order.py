@@ -20,6 +20,7 @@ __all__ = ["ColumnOrder", "search_orders"]
 
 _ALL_UP_TO = {"q and tau": 6, "q": 4, "tau": 4}  # joints: 720 orders take a second; of more, orders are reached by swaps
 _SIGNALS = ("q and tau", "tau", "q")
+_AGAIN = 40  # orders that are compared once more, on more moments
 _BEAM = 12  # orders that are kept at each swap
 _AT_ONCE = 40  # orders whose regressors are formed together: 30 MB
 _RIDGE = 1e-8
@@ -113,15 +114,18 @@ def search_orders(arm: GenericArm, motion: Sampled, gravity: Array, moving: Sequ
     logged = first["q and tau", same]
     if not every and max(first.values()) <= logged:
         return ()
+    coarse = scorer
     if len(moving) > _ALL_UP_TO["q"]:
         step = max(1, len(motion.t) // few)
         thin = replace(motion, **{name: getattr(motion, name)[::step] for name in ("t", "q", "dq", "ddq", "coulomb", "at")})
-        scorer = _Scorer(arm, thin, gravity, model_error)
-    found = {(signal, order): score for signal in _SIGNALS for order, score in _all_of(scorer, signal, same, moving).items()}
-    logged = found["q and tau", same]
+        coarse = _Scorer(arm, thin, gravity, model_error)
+    found = {(signal, order): score for signal in _SIGNALS for order, score in _all_of(coarse, signal, same, moving).items()}
+    if coarse is not scorer:  # the best of them once more, on all moments
+        best = sorted(found, key=lambda key: -found[key])[:_AGAIN]
+        found = {(signal, order): _scores(scorer, signal, [order])[order] for signal, order in best}
     better = {key: score for key, score in found.items() if score > logged and key[1] != same}
-    best = sorted(better.items(), key=lambda item: -item[1])[:keep]
-    return tuple(ColumnOrder(signal, order, score) for (signal, order), score in best)
+    ranked = sorted(better.items(), key=lambda item: -item[1])[:keep]
+    return tuple(ColumnOrder(signal, order, score) for (signal, order), score in ranked)
 
 
 def _scores(scorer: _Scorer, signal: str, orders: Sequence[Order]) -> dict[Order, float]:
