@@ -68,7 +68,8 @@ def _dh(family: str, rng: np.random.Generator) -> tuple[list[tuple[float, float,
     if family == "ur":
         s = u(.6, 1.5)
         return [(0, h, .09 * s, "revolute"), (-.425 * s, 0, 0, "revolute"), (-.392 * s, 0, 0, "revolute"),
-                (0, h, .11 * s, "revolute"), (0, -h, .095 * s, "revolute"), (0, 0, .08 * s, "revolute")], [0, -1.2, 1.2, -1.5, -1.5, 0]
+                (0, h, .11 * s, "revolute"), (0, -h, .095 * s, "revolute"),
+                (0, 0, .08 * s, "revolute")], [0, -1.2, 1.2, -1.5, -1.5, 0]
     if family == "six":
         s = u(.6, 2.0)
         return [(.1 * s, -h, .4 * s, "revolute"), (.4 * s, 0, 0, "revolute"), (.03 * s, -h, 0, "revolute"),

@@ -45,7 +45,9 @@ class _Scorer:
         tau = motion.tau / np.maximum(np.std(motion.tau, axis=0), 1e-12)
         self.basis, self.tau = [], []
         for k in range(tau.shape[1]):
-            own = np.stack([motion.ddq[:, k], motion.dq[:, k], motion.coulomb[:, k], np.ones(len(tau))], axis=-1)
+            speed, sign = motion.dq[:, k], motion.coulomb[:, k]
+            own = np.stack([motion.ddq[:, k], sign, speed, speed * np.abs(speed), sign * np.abs(tau[:, k]), np.ones(len(tau))],
+                           axis=-1)
             q, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
             self.basis.append(q)
             self.tau.append(tau - q @ (q.T @ tau))

@@ -14,7 +14,7 @@ class BoundaryConfig:
     rows: int = 1500  # moments of all logs together; a regressor of seven joints then takes a tenth of a second
     order_rows: int = 600  # moments with which other orders of up to four joints are compared
     order_rows_many: int = 120  # of more joints, which have hundreds of orders: seven torques a moment then tell enough
-    orders: int = 6  # other orders that are fitted in full
+    orders: int = 12  # other orders that are fitted in full
     # No rigid-body model predicts a torque better than this share of its RMS: the best published fits of recorded arms leave
     # 1.4 % (Gaz et al. 2019). A smaller residual is no evidence for one model against another.
     model_error: float = 0.01
