@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.estimation.checks.boundary import Boundary, torque_boundary
+from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.fit.identifiability import hard_to_see
 from pipelines.log.canonical import digest_of
 from pipelines.log.covariance_file import read_covariance, write_covariance
@@ -95,7 +97,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     Raises:
         NothingMatched: C06, no log to fit.
         UsageError: C02, settings that do not fit, logs of several robots, or a model of another one.
-        InputRejected: the doctor rejects a log: its first reason; S13, S14, S15, T06, torque and motion of a log do not belong
+        InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks gravity, has one of another
+            direction, or has no sign; S13, S14, S15, T06, torque and motion of a log do not belong
             together; T04, no stretch of a log can be used; T08, too few
             equations are left; D14, a log that is fitted shall judge as well.
     """
@@ -109,8 +112,10 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
         refuse_unfit(settings, log)
-    motions, said = _examined(identify, settings)
-    judges, said_too = _examined(validate, settings)
+    subjects, judging = _accepted(identify), _accepted(validate)
+    boundary, said_of_torque = _boundary(identify, settings)
+    motions, said = _examined(identify, subjects, settings, said_of_torque)
+    judges, said_too = _examined(validate, judging, settings, said_of_torque)
     recipe = with_cutoff(recipe, motions)
     means, scatter = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
     fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
@@ -120,7 +125,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     said_of_periods = [check for own, log in zip(scatter, logs, strict=True) if own is not None
                        for check in doubts(own.floor, log.source or log.name, settings.average)]
     said += negative_viscous(fitted.estimate, arm.name)
-    result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), doctor=(*said, *said_too, *said_of_periods),
+    result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), boundary=boundary,
+                     doctor=(*said_of_torque, *said, *said_too, *said_of_periods),
                      noise_floor=residuals(scatter, fitted, judged, logs, settings.average))
     return result if not settings.compare else replace(
         result, comparison=compare(fitted, judged, settings.blocks, settings.weighted),
@@ -136,17 +142,43 @@ def _rigid_body_alone(fitted: Fitted, means: Motions, settings: Settings) -> tup
     return tuple(map(float, judge(alone, means[identify:], settings.blocks).errors.rms))
 
 
-def _examined(logs: list[ExperimentLog], settings: Settings) -> tuple[Motions, tuple[Check, ...]]:
-    """The motion of every log, and what the doctor says of it; of what the logs do not show, D09, the estimate itself knows."""
-    motions, said = [], []
+def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
+    """What the doctor says of every log; of what the logs do not show, D09, the estimate itself knows.
+
+    Raises:
+        InputRejected: the first reason to reject one.
+    """
+    subjects = []
     for log in logs:
         subject = Subject(recording(log))
         checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
         if reject := next((check for check in checks if check.level == "reject"), None):
             raise reject.as_error()
-        against = mismatches(subject)
+        subjects.append((subject, checks))
+    return subjects
+
+
+def _boundary(logs: list[ExperimentLog], settings: Settings) -> tuple[Boundary | None, tuple[Check, ...]]:
+    """What the torque of the logs is, and what of it is told, where a mismatch is allowed."""
+    boundary = torque_boundary([recording(log) for log in logs])
+    findings = boundary_findings(boundary, logs[0].source or logs[0].name)
+    if findings and not settings.allow_mismatch:
+        raise _with_way_out(findings[0]).as_error()
+    return boundary, findings
+
+
+def _with_way_out(gate: Check) -> Check:
+    return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch")
+
+
+def _examined(logs: list[ExperimentLog], subjects: list[tuple[Subject, list[Check]]], settings: Settings,
+              findings: tuple[Check, ...]) -> tuple[Motions, tuple[Check, ...]]:
+    """The motion of every log, and what is said of it."""
+    motions, said = [], []
+    for log, (subject, checks) in zip(logs, subjects, strict=True):
+        against = without_followers(mismatches(subject), findings)
         if not settings.allow_mismatch and (gate := next((check for check in against if check.gate), None)):
-            raise replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch").as_error()
+            raise _with_way_out(gate).as_error()
         motions.append((log, reconstruct(log, settings.reconstruction, subject.good)))
         said += [*checks, *against]
     return tuple(motions), tuple(said)

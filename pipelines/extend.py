@@ -117,7 +117,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was not done", where=inputs.label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     memory = (inputs.material.memory if isinstance(inputs.material, Diagnosed) else None) or Memory()  # none of one taken back
-    said = memory.examined(chosen, settings.allow_mismatch)
+    said, _ = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
                                min_speed=settings.min_speed)
     found = extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)

@@ -11,6 +11,7 @@ from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.floor import Beside
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
+from pipelines.report.boundary_card import boundary_card
 from pipelines.report.bps import convergence_figure, torque_figure
 from pipelines.report.bps_balance import balance_table, balance_words
 from pipelines.report.figure_words import figure_in_words as plain
@@ -32,6 +33,7 @@ def bps_report(result: Result) -> Report:
     sections = [_parameter_section(result), _course_section(result), _trust_section(result)]
     if result.noise_floor:
         sections.insert(2, _noise_section(result))
+    sections = [*boundary_card(result.boundary), *sections]
     if result.comparison:
         sections.append(_comparison_section(result))
     return Report("Base parameters", _verdict(result), _tone(result), _key_figures(result), tuple(sections),

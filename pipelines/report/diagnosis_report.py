@@ -14,6 +14,7 @@ from pipelines.model.diagnosis.result import Finding, Rejected, Trial
 from pipelines.model.diagnosis.searched.ledger import WEAKER
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
+from pipelines.report.boundary_card import boundary_card
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_floor import (
     above_in_order,
@@ -64,7 +65,8 @@ def diagnosis_report(result: Result) -> Report:
              for section in (finding_section(number, one, nominal, units=units, beside=result.findings,
                                              left=result.after_rms.validate),
                              numbers_section(number, one, units, result.findings))]
-    sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
+    sections = [*boundary_card(result.boundary), *found, *_unknown(result),
+                *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),
                   errors_table(now, result.after_rms, result.rated, floor, name,

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pipelines.errors import Check
+from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.experiment import Array
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
@@ -298,5 +299,6 @@ class Diagnosis:
     unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
     without_limit: tuple[WithoutLimit, ...] = ()  # causes of the library that no other list has
     fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart
+    boundary: Boundary | None = None  # what the logged torque is; null where no log moves the arm enough to tell
     no_twin: str = ""  # why a floor "blocks" is that of no twin, although the logs describe their controller; else empty
     checks: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False)  # of the nominal model
