@@ -36,7 +36,7 @@ from pipelines.model.estimation.result import Result
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
 from pipelines.model.mean_period import doubts
-from pipelines.model.motion import Reconstructed, reconstruct
+from pipelines.model.motion import Reconstructed, for_equations, reconstruct
 from pipelines.model.parameter import Uncertainty
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
@@ -110,8 +110,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         refuse_unfit(settings, log)
     motions, said = _examined(identify, settings)
     judges, said_too = _examined(validate, settings)
-    recipe = with_cutoff(recipe, motions)
-    means, scatter = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
+    even = for_equations((*motions, *judges))
+    recipe = with_cutoff(recipe, even[:len(motions)])
+    means, scatter = averaged(even, settings.reconstruction, recipe.cutoff_hz)
     fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
     judged = judge(fitted, means[len(motions):], settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
