@@ -32,6 +32,7 @@ from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, fit
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
+from pipelines.model.estimation.rests import without_stiction
 from pipelines.model.estimation.result import Result
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
@@ -113,6 +114,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     even = for_equations((*motions, *judges))
     recipe = with_cutoff(recipe, even[:len(motions)])
     means, scatter = averaged(even, settings.reconstruction, recipe.cutoff_hz)
+    means = without_stiction(means, len(motions), columns, recipe, settings.weighted)
     fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
     judged = judge(fitted, means[len(motions):], settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)

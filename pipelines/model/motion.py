@@ -51,6 +51,7 @@ class Reconstructed:
     good: Usable  # which samples, stretches and masks
     derived: bool  # taken from the log instead of computed
     mean: Mean | None = None  # where the log is the mean period of another
+    stuck: Mask | None = None  # (kept samples, joints) where dry friction holds a joint: its own equations are left out
     even: tuple[ExperimentLog, Reconstructed] | None = None  # of an uneven clock: the log on an even grid, for equations
 
     @property

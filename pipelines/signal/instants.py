@@ -41,6 +41,7 @@ class ClockConfig:
     smooth_hz: float = 40.0  # above the motion of an arm: what a local polynomial leaves is noise
     order: int = 4  # of the local polynomial (Savitzky & Golay 1964)
     lag: int = 64  # steps of the variogram: long against one sample, short against a log
+    sure: float = 3.0  # standard deviations, from which on a walk is none by chance
     around: int = 16  # samples before and after a long interval that tell whether one is lost
     passes: int = 3  # of the weights: they are known to a per cent then
     closest: float = 0.25  # of a step: nearer samples count as one, their mean
@@ -101,11 +102,12 @@ def ticks(stamps: Array, config: ClockConfig | None = None) -> tuple[Array, floa
     if lag < 2:
         return stamps, 0.0
     near, far = (float(np.mean((x[m:] - x[:-m]) ** 2)) for m in (1, lag))
-    walk = max(0.0, (far - near) / (lag - 1))
+    chance = near * np.sqrt(2.0 / len(x))  # standard deviation of far - near without a walk
+    walk = (far - near) / (lag - 1) if far - near > config.sure * chance else 0.0
     white = 0.5 * (near - walk)
     if white <= 0.0:
         return stamps, 0.0
-    level = _level(x, white / walk) if walk > 1e-6 * white else np.zeros_like(x)
+    level = _level(x, white / walk) if walk > 0.0 else np.zeros_like(x)
     e = x - level
     return stamps - e, float(np.sqrt(np.mean(e**2)))
 
