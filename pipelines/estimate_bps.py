@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
-from pipelines.fit.identifiability import hard_to_see
+from pipelines.fit.identifiability import hard_to_see, not_separated
 from pipelines.log.canonical import digest_of
 from pipelines.log.covariance_file import read_covariance, write_covariance
 from pipelines.log.derive import derive, recording
@@ -179,6 +179,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
         unresolved=found.unresolved.told(columns_in_words(names)),
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
+        not_separated=not_separated(found.solution, found.std, names),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
         arm=arm, model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),
