@@ -14,7 +14,7 @@ from pathlib import Path
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
-from pipelines.fit.identifiability import hard_to_see
+from pipelines.fit.identifiability import hard_to_see, not_separated
 from pipelines.log.canonical import digest_of
 from pipelines.log.covariance_file import read_covariance, write_covariance
 from pipelines.log.derive import derive, recording
@@ -35,11 +35,12 @@ from pipelines.model.estimation.negative_viscous import negative_viscous
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
+from pipelines.model.estimation.rests import without_stiction
 from pipelines.model.estimation.result import Result
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
 from pipelines.model.mean_period import doubts
-from pipelines.model.motion import Reconstructed, reconstruct
+from pipelines.model.motion import Reconstructed, for_equations, reconstruct
 from pipelines.model.parameter import Uncertainty
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
@@ -116,8 +117,10 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     boundary, said_of_torque = _boundary(identify, settings)
     motions, said = _examined(identify, subjects, settings, said_of_torque)
     judges, said_too = _examined(validate, judging, settings, said_of_torque)
-    recipe = with_cutoff(recipe, motions)
-    means, scatter = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
+    even = for_equations((*motions, *judges))
+    recipe = with_cutoff(recipe, even[:len(motions)])
+    means, scatter = averaged(even, settings.reconstruction, recipe.cutoff_hz)
+    means = without_stiction(means, len(motions), columns, recipe, settings.weighted)
     fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
     judged = judge(fitted, means[len(motions):], settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
@@ -210,6 +213,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
         unresolved=found.unresolved.told(columns_in_words(names)),
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
+        not_separated=not_separated(found.solution, found.std, names),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
         arm=arm, model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),

@@ -11,6 +11,7 @@ from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.floor import Beside
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
+from pipelines.model.estimation.words import column_in_words
 from pipelines.report.boundary_card import boundary_card
 from pipelines.report.bps import convergence_figure, torque_figure
 from pipelines.report.bps_balance import balance_table, balance_words
@@ -77,7 +78,7 @@ def _seen(p: Estimated) -> str:
 def _verdict(result: Result) -> str:
     judged = "held-out logs" if result.held_out == "logs" else "blocks held out of the fitted logs (for none has role validate)"
     if result.unresolved:
-        return f"These logs do not determine the model: {result.unresolved}."
+        return " ".join((f"These logs do not determine the model: {result.unresolved}.", *_together(result)))
     seen = [_seen(p) for p in result.parameters]
     small, error, noise = seen.count("known to be small"), result.relative_error["validate"], _beside_noise(result)
     worst = ", ".join(f"{name} {_percent(own)}" for name, own in _worst_joints(result))
@@ -87,8 +88,14 @@ def _verdict(result: Result) -> str:
                  f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
                  f"{f', {small} known to be small' if small else ''}.",
                  *(("No links that could exist have these parameters: some would need negative mass or inertia.",)
-                   if result.physically_consistent is False else ()))
+                   if result.physically_consistent is False else ()), *_together(result))
     return " ".join(sentences)
+
+
+def _together(result: Result) -> tuple[str, ...]:
+    """"mz5 and torque offset at joint 5 are determined only together.", a sentence for each group."""
+    groups = [[column_in_words(name) for name in group] for group in result.not_separated]
+    return tuple(f"{', '.join(group[:-1])} and {group[-1]} are determined only together." for group in groups)
 
 
 def _beside_noise(result: Result) -> str:

@@ -42,6 +42,7 @@ class Result:
     balance: Balance | None
     unresolved: str  # words; empty where everything shows
     hard_to_see: tuple[Direction, ...]
+    not_separated: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)  # parameters determined only together
     comparison: tuple[Compared, ...]
     rigid_body_alone: tuple[float, ...] | None = field(default=None, kw_only=True)  # [torque_units] held-out rms, no friction
     boundary: Boundary | None = field(default=None, kw_only=True)  # what the logged torque is; null: no log tells
