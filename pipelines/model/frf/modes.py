@@ -37,7 +37,6 @@ _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
 _NARROW = 0.5  # of the resolution, the least width 2 ζ f of a mode
 _STUCK = 3.0  # misfit that a search which found the modes hardly leaves
-_BEYOND = 1.25  # times the upper end of the band: the flank of a resonance up to there tells where it is
 _SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
 _LONGEST = 0.05  # [s] no delay is longer
 _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
@@ -95,12 +94,12 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
         InputRejected: T08, too few frequencies in the band.
     """
     relative = relative_acceleration(measured)
+    relative = relative.where(measured.excited.holds(relative.frequency))
     part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
     fit = _fitted(part)
-    moving = _moving(measured, part, fit)
-    modes = _inside(tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution)), fit.band[1])
-    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m, part.resolution)
-                   and m.frequency.value <= fit.band[1])
+    moving = [(m, to) for m, to in _moving(measured, part, fit) if measured.excited.holds(np.array(m.frequency.value))]
+    modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution))
+    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m, part.resolution))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
@@ -177,19 +176,9 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
     return np.asarray(found), np.sqrt(np.diag(inverse) * correlated * max(misfit, 1.0))
 
 
-def _inside(modes: tuple[Mode, ...], top: float) -> tuple[Mode, ...]:
-    """Those up to `top` [Hz]; where the last is an antiresonance, with the resonance that follows it, of which the flank is seen.
-
-    What gives way has both, and a light motor has them far apart.
-    """
-    count = sum(m.frequency.value <= top for m in modes)
-    following = 0 < count < len(modes) and modes[count - 1].kind == "antiresonance" and modes[count].kind == "resonance"
-    return modes[:count + 1] if following else modes[:count]
-
-
 def _is_mode(mode: Mode, resolution: float) -> bool:
     """One that is known, and not narrower than what the spectrum resolves."""
-    f, damping = mode.frequency, abs(mode.damping.value)
+    f, damping = mode.frequency, mode.damping.value
     return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value and 2.0 * damping * f.value > _NARROW * resolution
 
 
@@ -199,12 +188,12 @@ def _is_trace(mode: Mode, resolution: float) -> bool:
 
 def _moving(measured: Measured, part: FrequencyResponse, fit: Rational) -> list[tuple[Mode, Mode]]:
     """Each mode as the fit has it, and as uncertain as its movement along the turn makes it: what parts scatter beyond noise."""
-    modes = fit.modes(_BEYOND)
+    modes = fit.modes()
     along = along_turn(measured, part.frequency)
     if along is None or not modes:
         return [(m, m) for m in modes]
     relative = along.response / _rigid(measured, part.frequency)
-    seen = scattered(fit, part.frequency, relative, part.variance).modes(_BEYOND)
+    seen = scattered(fit, part.frequency, relative, part.variance).modes()
 
     def wider(mean: Known, one: Known) -> Known:
         return Known(mean.value, float(np.sqrt(mean.std**2 + max(one.std**2 - along.noise * mean.std**2, 0.0))))
@@ -241,8 +230,8 @@ def _rise_std(pairs: tuple[Pair, ...]) -> float:
 
 def _inertia(measured: Measured, level: Known) -> Known | None:
     """u/τ is one number per joint, D̂ or 1: the inertia is that over the level."""
-    torque = measured.compliance.within(*_CONSTANT)
-    plant = measured.plant.within(*_CONSTANT)
+    torque, plant = (one.where(measured.excited.holds(one.frequency)).within(*_CONSTANT)
+                     for one in (measured.compliance, measured.plant))
     if not len(torque.frequency) or len(torque.frequency) != len(plant.frequency):
         return None
     ratio = plant.response / torque.response  # τ/u

@@ -24,6 +24,7 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
 from pipelines.signal.cross_spectra import cross_spectra
+from pipelines.signal.excited_band import ExcitedBand, excited_band
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
 from pipelines.signal.local_polynomial import local_polynomial
 from pipelines.signal.multisine_response import DetectionLines, MultisineResponses, multisine_responses
@@ -37,6 +38,7 @@ _HIGHEST = 0.45  # of the rate
 _LOWEST = 0.5  # [Hz]
 _SEGMENTS = 4  # at least, for Welch's coherence and variance
 _NO_POWER = 1e-12  # of the strongest bin of the source
+_DENSITY = 1.0  # [s] of the segments that show where v has power
 _SMOOTH = 25  # lines over which distortion is compared with noise
 
 
@@ -63,6 +65,7 @@ class Measured:
 
     turned: tuple[Turned, ...]  # its logs
     plant: FrequencyResponse  # u → q by Φ_vq/Φ_vu
+    excited: ExcitedBand  # where it exists: nothing is fitted, judged or named outside
     direct: FrequencyResponse
     indirect: FrequencyResponse | None  # None: the log does not describe the controller
     continuous: FrequencyResponse | None  # what (29) gives with k_p + k_d jω: shown, never used
@@ -122,8 +125,22 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     sampled = sampled_controller(first.controller, first.joint, plant.frequency, first.sample_time)
     smooth = continuous_controller(first.controller, first.joint, plant.frequency) if first.controller else None
     both = [None if c is None else indirect(sensitivity.times(shift), c / shift) for c in (sampled, smooth)]
-    return Measured(turned, plant, _direct([s.signals for s in stretches], turned, how), both[0], both[1],
+    return Measured(turned, plant, _band(several, stretches, first.rate), _direct([s.signals for s in stretches], turned, how), both[0], both[1],
                     closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion, detected)
+
+
+def _band(several: Responses, stretches: Sequence[Stretch], rate: float) -> ExcitedBand:
+    """Where v has power, and both its responses are known."""
+    segment = min(round(_DENSITY * rate), *(len(s.signals) for s in stretches))
+    spectra = cross_spectra([s.signals[:, [V]] for s in stretches], rate, segment)
+    density = np.interp(several.frequency, spectra.frequency, spectra.density[:, 0, 0].real)
+    return excited_band(_outputs(several, (INPUT - 1, POSITION - 1)), density)
+
+
+def _outputs(several: Responses, which: tuple[int, ...]) -> Responses:
+    kept = list(which)
+    return replace(several, response=several.response[:, kept], covariance=several.covariance[:, kept][:, :, kept],
+                   coherence=several.coherence[:, kept])
 
 
 def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch],
