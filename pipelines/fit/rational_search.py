@@ -16,7 +16,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.fit.rational import Array, Complex, Rational, known_part, product
 
-__all__ = ["fit_rational", "scattered"]
+__all__ = ["FEWEST", "fit_rational", "scattered"]
 
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # tried for a new pair of poles
 _FREQUENCIES = 150  # tried for it
@@ -28,7 +28,7 @@ _ROUGH = (12, 1e-3)  # steps and relative decrease of a trial
 _STEPS = 60  # of Gauss and Newton at most
 _STOP = 1e-7  # relative decrease of the sum of squares below which they end
 _PATIENCE = 2  # sections more that do not pay before the search ends
-_FEWEST = 18  # bins
+FEWEST = 18  # bins
 _EXACT = 1e-12  # of the square of the response: a variance below this is rounding
 
 
@@ -117,7 +117,7 @@ def _prepare(frequency: Array, response: Complex, variance: Array, integrators: 
                             remedy="excite the frequencies that are asked for")
     frequency = frequency[good]
     s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-    if len(frequency) < _FEWEST:
+    if len(frequency) < FEWEST:
         raise InputRejected("T08", f"{len(frequency)} frequencies are too few for a mode",
                             remedy="record longer, or ask for a finer resolution or a wider band")
     known = known_part(s, integrators, hold)

@@ -1,7 +1,7 @@
 """One "frf" log as signals for spectra: v, the plant's input, the deviation from the reference, torque; reversal left out.
 
     turned = turned_joint(log)
-    turned.stretches[0].signals        (samples, 4): v, u, q - q_ref, τ of the joint
+    turned.stretches[0].signals        (samples, 3 + joints): v, u, q - q_ref, τ of the joint; q - q_ref of all others
 
 Kostić et al. 2004, Section IV.D. The joint turns slowly, so that friction does not stick, and at constant speed, so that the
 mean of its friction is a constant that no spectrum shows. Where it starts, reverses and stops, friction jumps: those samples
@@ -23,7 +23,7 @@ from pipelines.log.limits import LARGEST_JITTER, percent
 
 __all__ = ["INPUT", "POSITION", "TORQUE", "Stretch", "Turned", "V", "excitation_period", "turned_joint"]
 
-V, INPUT, POSITION, TORQUE = range(4)  # channels of a stretch
+V, INPUT, POSITION, TORQUE = range(4)  # channels of a stretch; behind them the positions of the other joints
 
 _PLATEAU = 0.02  # of the largest speed: what counts as constant
 _WANDERING = 0.2  # the same, where the speed is only reconstructed
@@ -42,7 +42,7 @@ class Stretch:
     start: int  # of the log
     stop: int
     direction: int  # 1, -1; 0 where the joint does not turn
-    signals: Array  # (samples, 4)
+    signals: Array  # (samples, 3 + joints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Turned:
     swing: float  # [rad/s] std of its speed about that, by the excitation
     period: int | None  # [samples] of v; None: it does not repeat
     stretches: tuple[Stretch, ...]
-    whole: Array  # (samples, 4) the log with its reversal
+    whole: Array  # (samples, 3 + joints) the log with its reversal
     left_out: float  # share of the samples
     mean_input: tuple[float | None, float | None]  # of the input, forwards and backwards: what friction and load leave
 
@@ -113,8 +113,8 @@ def turned_joint(log: ExperimentLog) -> Turned:
         if not np.isfinite(channel).any() or float(np.nanstd(channel)) <= 0.0:
             raise InputRejected("D04", f"{name} of joint {joint} is constant while v excites it", where=log.source or log.name,
                                 remedy="look at this channel in the recording")
-    reference = mended["q_ref"][:, j] if "q_ref" in mended else _straight(mended.q[:, j])
-    signals = np.column_stack([v, mended[quantity][:, j], mended.q[:, j] - reference, mended.tau[:, j]])
+    position = mended.q - (mended["q_ref"] if "q_ref" in mended else np.column_stack([_straight(q) for q in mended.q.T]))
+    signals = np.column_stack([v, mended[quantity][:, j], position[:, j], mended.tau[:, j], np.delete(position, j, axis=1)])
     speed = mended["dq_ref"][:, j] if "dq_ref" in mended else _speed(mended.q[:, j], log.sample_time)
     width = _PLATEAU if "dq_ref" in mended else _WANDERING
     stretches = tuple(_stretches(good, signals, speed, width, log.sample_time))

@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.fit.rational import Known, Mode, Rational
-from pipelines.fit.rational_search import fit_rational, scattered
+from pipelines.fit.rational_search import FEWEST, fit_rational, scattered
 from pipelines.log.experiment import Array
 from pipelines.model.frf.along import along_turn
 from pipelines.model.frf.controller import Complex, loop_delay
 from pipelines.model.frf.responses import Measured, double_integrator
 from pipelines.signal.frequency_response import FrequencyResponse
 
-__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration"]
+__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration", "tells"]
 
 BAND = (4.0, 250.0)  # [Hz] below it friction and gravity are at work, above it hardly any log has signal
 _OF_RATE = 0.3  # highest, of the rate
@@ -76,8 +76,11 @@ class Modes:
 
 
 def relative_acceleration(measured: Measured, response: FrequencyResponse | None = None) -> FrequencyResponse:
-    """`response` (default: the plant's) over the double integrator, sampled and delayed as the loop was."""
-    response = response or measured.plant
+    """`response` over the double integrator, sampled and delayed as the loop was.
+
+    By default that of the plant, with the other joints held where they are not.
+    """
+    response = response or measured.held or measured.plant
     return response.times(np.asarray(1.0 / _rigid(measured, response.frequency)))
 
 
@@ -87,6 +90,17 @@ def _rigid(measured: Measured, frequency: Array) -> Complex:
     return np.asarray(double_integrator(frequency, first.sample_time, delay), dtype=np.complex128)
 
 
+def tells(measured: Measured, band: tuple[float, float] = BAND) -> bool:
+    """Whether enough of `band` [Hz] is excited for a fit."""
+    return len(_in_band(measured, relative_acceleration(measured), band).frequency) >= FEWEST
+
+
+def _in_band(measured: Measured, response: FrequencyResponse, band: tuple[float, float]) -> FrequencyResponse:
+    """What is excited of `band` [Hz], and sampled well enough."""
+    inside = response.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
+    return inside.where(measured.excited.holds(inside.frequency))
+
+
 def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     """Modes of the plant within `band` [Hz].
 
@@ -94,8 +108,8 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
         InputRejected: T08, too few frequencies in the band.
     """
     relative = relative_acceleration(measured)
+    part = _in_band(measured, relative, band)
     relative = relative.where(measured.excited.holds(relative.frequency))
-    part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
     fit = _fitted(part)
     moving = [(m, to) for m, to in _moving(measured, part, fit) if measured.excited.holds(np.array(m.frequency.value))]
     modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution))

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
+from pipelines.model.frf.others_held import others_held
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
 from pipelines.signal.cross_spectra import cross_spectra
 from pipelines.signal.excited_band import ExcitedBand, excited_band
@@ -38,6 +39,7 @@ _HIGHEST = 0.45  # of the rate
 _LOWEST = 0.5  # [Hz]
 _SEGMENTS = 4  # at least, for Welch's coherence and variance
 _NO_POWER = 1e-12  # of the strongest bin of the source
+_COUPLED = 4.0  # [Hz] from where on friction and gravity of the other joints matter less than their inertia
 _DENSITY = 1.0  # [s] of the segments that show where v has power
 _SMOOTH = 25  # lines over which distortion is compared with noise
 
@@ -65,6 +67,7 @@ class Measured:
 
     turned: tuple[Turned, ...]  # its logs
     plant: FrequencyResponse  # u → q by Φ_vq/Φ_vu
+    held: FrequencyResponse | None  # the same in the excited band, were the other joints held; None where that is all one
     excited: ExcitedBand  # where it exists: nothing is fitted, judged or named outside
     direct: FrequencyResponse
     indirect: FrequencyResponse | None  # None: the log does not describe the controller
@@ -125,7 +128,8 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     sampled = sampled_controller(first.controller, first.joint, plant.frequency, first.sample_time)
     smooth = continuous_controller(first.controller, first.joint, plant.frequency) if first.controller else None
     both = [None if c is None else indirect(sensitivity.times(shift), c / shift) for c in (sampled, smooth)]
-    return Measured(turned, plant, _band(several, stretches, first.rate), _direct([s.signals for s in stretches], turned, how), both[0], both[1],
+    band = _band(several, stretches, first.rate)
+    return Measured(turned, plant, _held(several, first, band), band, _direct([s.signals for s in stretches], turned, how), both[0], both[1],
                     closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion, detected)
 
 
@@ -135,6 +139,15 @@ def _band(several: Responses, stretches: Sequence[Stretch], rate: float) -> Exci
     spectra = cross_spectra([s.signals[:, [V]] for s in stretches], rate, segment)
     density = np.interp(several.frequency, spectra.frequency, spectra.density[:, 0, 0].real)
     return excited_band(_outputs(several, (INPUT - 1, POSITION - 1)), density)
+
+
+def _held(several: Responses, first: Turned, band: ExcitedBand) -> FrequencyResponse | None:
+    """Of a joint whose input is its torque; computed torque uncouples the joints."""
+    if first.quantity != "tau":
+        return None
+    inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
+    rigid = np.asarray(double_integrator(inside.frequency, first.sample_time), dtype=np.complex128)
+    return others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])))
 
 
 def _outputs(several: Responses, which: tuple[int, ...]) -> Responses:
@@ -147,7 +160,7 @@ def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch],
              how: How) -> tuple[Responses, float | None, tuple[float | None, float | None]]:
     """v → (u, q, τ), the distortion where there are realisations, and what detection lines show."""
     first, signals = turned[0], [s.signals for s in stretches]
-    outputs = (INPUT, POSITION, TORQUE)
+    outputs = range(1, signals[0].shape[1])
     periods = {one.period for one in turned}
     whole = [x for x in signals if first.period is not None and len(x) >= 2 * first.period]
     periodic = len(periods) == 1 and first.period is not None and bool(whole)
