@@ -24,6 +24,7 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.frf.findings import Findings, frf_findings
+from pipelines.model.frf.grouping import FLAT, advance
 from pipelines.model.frf.modes import BAND
 from pipelines.model.frf.responses import How, Measured
 from pipelines.model.frf.result import Classified, Method, Posture, Undecided, classified, methods_of, posture_of, undecided
@@ -35,6 +36,7 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 _RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans "
            "one, at home or where --home says")
+_UNFOLDED = "log all signals by one clock at the controller's own rate; or thin them out behind the same low-pass"
 _RELIABLE = 0.7
 _SWING = 0.25  # of the turning speed: beyond it friction now and then turns its sign
 
@@ -128,9 +130,22 @@ def _complaints(found: Findings, settings: Settings) -> list[Check]:
     """D13, coherence too low; D09, friction that turns its sign."""
     said = []
     for one in found.unusable:
-        said.append(Check.of("D13", "warn", f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: no "
-                             "frequency can be relied on, no mode is looked for", where=_logs_of(one), gate=True,
+        if one.aliased:
+            said.append(Check.of("T09", "warn", f"torque of joint {one.joint} was sampled, and v has power up to half the rate: "
+                                 "what is faster has folded back (aliasing), and no mode can be told", where=_logs_of(one),
+                                 gate=True, remedy=_UNFOLDED))
+            continue
+        said.append(Check.of("D13", "warn", f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: "
+                             "no frequency can be relied on, no mode is looked for", where=_logs_of(one), gate=True,
                              remedy="excite more strongly, record longer, or look for what disturbs the joint"))
+    for joint in sorted({seen.measured.joint for seen in found.seen}):
+        own = [seen for seen in found.seen if seen.measured.joint == joint]
+        first = own[0].measured.first
+        early = advance([seen.modes for seen in own], first.sample_time, first.held)
+        if early is not None and max(seen.modes.flat for seen in own) < FLAT:
+            said.append(Check.of("T06", "warn", f"joint {joint} moves {-1e3 * early.value:.3g} ms before its torque: torque and "
+                                 "position have different clocks, or what is faster has folded back (aliasing)",
+                                 where=", ".join(_logs_of(seen.measured) for seen in own), gate=True, remedy=_UNFOLDED))
     for seen in found.seen:
         m = seen.measured
         inside = m.plant.within(*seen.modes.band)

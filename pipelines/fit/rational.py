@@ -9,8 +9,9 @@
 
 Products of sections, with s in units of the middle of the band, keep the fit well conditioned at any order, and every section is
 a mode: ω = 1/√a, ζ = b / (2√a). Both a and b are positive: poles are stable and every damping is positive, as of a passive
-structure that is moved and measured at one place (all zeros of such a response are minimum phase, too). Maximum likelihood: the sum of |Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System
-Identification, §9.11); the number of sections is that of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
+structure that is moved and measured at one place (all zeros of such a response are minimum phase, too). Maximum likelihood: the
+sum of |Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System Identification, §9.11); the number of sections is that
+of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
 """
 
 from __future__ import annotations
@@ -102,7 +103,8 @@ class Rational:
         """ω = 1/√a, ζ = b/(2√a); δω/ω = -δ(log a)/2, δζ/ζ = δ(log b) - δ(log a)/2. None for two real roots."""
         at = slice(2 + 2 * section, 4 + 2 * section)
         log_b, log_a = self.parameters[at]
-        c, hertz, damping = self.covariance[at, at], self.unit * np.exp(-0.5 * log_a) / (2.0 * np.pi), 0.5 * np.exp(log_b - 0.5 * log_a)
+        c, damping = self.covariance[at, at], 0.5 * np.exp(log_b - 0.5 * log_a)
+        hertz = self.unit * np.exp(-0.5 * log_a) / (2.0 * np.pi)
         if damping >= 1.0:
             return None
         gradient = damping * np.array([1.0, -0.5])

@@ -35,7 +35,7 @@ _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
-_NARROW = 0.5  # of the resolution, the least width 2 ζ f of a mode
+_NARROW = 0.25  # of the resolution, the least width 2 ζ f of a mode
 _STUCK = 3.0  # misfit that a search which found the modes hardly leaves
 _SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
 _LONGEST = 0.05  # [s] no delay is longer
@@ -87,12 +87,12 @@ def relative_acceleration(measured: Measured, response: FrequencyResponse | None
 def _rigid(measured: Measured, frequency: Array) -> Complex:
     first = measured.first
     _, delay = loop_delay(first.controller, first.quantity)
-    return np.asarray(double_integrator(frequency, first.sample_time, delay), dtype=np.complex128)
+    return np.asarray(double_integrator(frequency, first.sample_time, delay, first.held), dtype=np.complex128)
 
 
 def tells(measured: Measured, band: tuple[float, float] = BAND) -> bool:
-    """Whether enough of `band` [Hz] is excited for a fit."""
-    return len(_in_band(measured, relative_acceleration(measured), band).frequency) >= FEWEST
+    """Whether enough of `band` [Hz] is excited for a fit, and nothing has folded into it."""
+    return not measured.aliased and len(_in_band(measured, relative_acceleration(measured), band).frequency) >= FEWEST
 
 
 def _in_band(measured: Measured, response: FrequencyResponse, band: tuple[float, float]) -> FrequencyResponse:

@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from pipelines.log.experiment import Array
 from pipelines.model.frf.controller import Complex
@@ -38,7 +37,7 @@ class HeldConfig:
 
     poles: int = 2
     frequencies: int = 60
-    dampings: tuple[float, ...] = (0.01, 0.02, 0.04, 0.1)
+    dampings: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
     gain: float = 1.0 / 3.0
     floor: float = 0.01
     fewest: int = 20
@@ -90,7 +89,8 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
                                coherence=responses.coherence[:, [torque, position]]))
 
 
-def _taking(responses: Responses, coupling: Complex, rigid: Complex, torque: int, position: int, others: tuple[int, ...]) -> Complex:
+def _taking(responses: Responses, coupling: Complex, rigid: Complex, torque: int, position: int,
+            others: tuple[int, ...]) -> Complex:
     """From all outputs to the torque less that of the other joints, and the position (bins, 2, outputs)."""
     to = np.zeros((len(rigid), 2, responses.response.shape[1]), dtype=np.complex128)
     to[:, 0, torque], to[:, 1, position] = 1.0, 1.0
@@ -100,25 +100,26 @@ def _taking(responses: Responses, coupling: Complex, rigid: Complex, torque: int
 
 def _with_poles(rows: _Rows, config: HeldConfig) -> _Fit:
     """A pair of poles more as long as that explains most of what is left."""
-    hertz = np.abs(rows.s) / (2.0 * np.pi)
-    grid = [(w, z) for w in np.log(2.0 * np.pi * np.geomspace(hertz[0], hertz[-1], config.frequencies))
-            for z in np.log(config.dampings)]
     best = _least_squares(rows, (), None)
     for number in range(config.poles):
-        def tried(x: Array, by: int | None, known: tuple[Complex, ...] = best.sections) -> _Fit:
-            w, z = np.exp(np.minimum(x, (np.inf, np.log(config.dampings[-1]))))
-            return _least_squares(rows, (*known, 1.0 + 2.0 * z * rows.s / w + (rows.s / w) ** 2), by)
-
-        several = []
-        for by in (None, *range(number + 1)):
-            start = min(grid, key=lambda x, by=by: tried(x, by).cost)  # type: ignore[misc]
-            found = minimize(lambda x, by=by: np.log(tried(x, by).cost), start, method="Nelder-Mead",  # type: ignore[misc]
-                             options={"xatol": 1e-4, "fatol": 1e-4, "maxfev": 150})
-            several.append(tried(found.x, by))
-        more = min(several, key=lambda fit: fit.cost)
+        more = min((_pole_more(rows, best, by, config) for by in (None, *range(number + 1))), key=lambda fit: fit.cost)
         if more.cost > config.gain * best.cost:
             break
         best = more
+    return best
+
+
+def _pole_more(rows: _Rows, known: _Fit, filtered: int | None, config: HeldConfig) -> _Fit:
+    """The best pair of poles more: over the whole band, then nearer and nearer to the best."""
+    omega = np.abs(rows.s)
+    frequencies, dampings = np.geomspace(omega[0], omega[-1], config.frequencies), np.array(config.dampings)
+    step, best = np.log(frequencies[1] / frequencies[0]), known
+    for narrower in (0.5, 0.25, 0.125, 0.0625, 0.0312, 0.0156):
+        tried = [(_least_squares(rows, (*known.sections, 1.0 + 2.0 * z * rows.s / w + (rows.s / w) ** 2), filtered), w, z)
+                 for w in frequencies for z in dampings]
+        best, w, z = min(tried, key=lambda one: one[0].cost)
+        frequencies = w * np.exp(narrower * step * np.array([-1.0, 0.0, 1.0]))
+        dampings = np.minimum(z * 2.0 ** (narrower * np.array([-1.0, 0.0, 1.0])), config.dampings[-1])
     return best
 
 
