@@ -1,11 +1,12 @@
 """Friction that changes in time: whether it does, along which course, and by how much.
 
-    τ_f(v, t) = f(v) + c(t) (α f(v) + β v)
+    τ_f(v, t) = f(v) + α c(t) g(v),    g = f, v or sign v
 
 c(t) is a trend 1 - exp(-(t - t0)/T) that begins anew in every log, as a joint warms up, or a step at one instant. Both are tried
-on rows that slide, beside inertia, gravity and a smooth curve of friction, each way apart, so that no law is assumed and
-what a curve can hold is no drift. The test of no change is that of Wald with a covariance of blocks of time (Liang & Zeger 1986;
-small numbers of blocks by F, Bell & McCaffrey 2002), at one family-wise error for all courses (Bonferroni).
+on rows that slide, beside inertia, gravity and a free curve of friction (sliding.py), so that no law is assumed and what
+a curve can hold is no drift. The course that leaves least must predict blocks of time that were held out better than no change
+does: logarithms of the ratio of their squared errors, in closed form by leverage, against draws of their signs
+(fit/flips.py). A course that costs a number and gains nothing loses there.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
+from pipelines.fit.flips import by_flips
 from pipelines.model.friction.weak_form import Course, Stretch
 from pipelines.model.rigid.body import Array
 
-__all__ = ["DriftConfig", "drift_of", "smooth_curve"]
+__all__ = ["DriftConfig", "drift_of"]
 
+_FORMS = ("whole", "viscous", "coulomb")
 _PULLED = 1e-3  # the least that 1 - leverage may be
 _RANK = 1e-7  # singular values of unit columns below it: two columns that are one
 
@@ -29,14 +31,13 @@ _RANK = 1e-7  # singular values of unit columns below it: two columns that are o
 class DriftConfig:
     """Numbers that decide whether friction drifts."""
 
-    error: float = 1e-3  # family-wise, of all courses of a joint: none in a hundred healthy joints, with room for their number
+    chance: float = 1e-3  # that a joint without drift gains as much in blocks held out: none in a hundred joints
     block: float = 1.0  # [s] of rows whose errors may depend on one another
     fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
-    humps: tuple[float, ...] = (0.03, 0.1, 0.3)  # of the fastest speed, widths of what falls from standstill
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
     steps: int = 40  # instants of a step that are tried
     ends: float = 0.08  # of all rows, that lie before and after a step
-    times: tuple[float, ...] = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 5.0)  # time constants of a trend over the duration; 5: straight
+    times: tuple[float, ...] = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 5.0)  # time constants over the duration; 5: straight
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
 
 
@@ -55,29 +56,25 @@ def drift_of(stretches: Sequence[Stretch], y: Array, known: Array, config: Drift
     blocks = _blocks(t, log, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
         return None
-    friction = np.stack([np.sign(speed), speed], axis=1)
+    side = np.stack([np.sign(speed), speed], axis=1)
+    level = np.linalg.lstsq(side, y, rcond=None)[0]
+    shapes = {"whole": side @ level, "viscous": speed, "coulomb": np.sign(speed)}
     courses = [*_trends(stretches, config), *_steps(stretches, t, log, config)]
-    columns = [_outside(course, stretches, friction, basis) for course in courses]
+    columns = [_outside(course, stretches, shapes[course.form], basis) for course in courses]
     rests = [_rest(one, left) for one in columns]
     best = int(np.argmin(rests))
-    chance, change = _wald(columns[best], left, basis, blocks)
-    level = float(np.median(np.abs(friction @ np.linalg.lstsq(friction, y, rcond=None)[0])))
-    size = abs(courses[best].whole) * float(np.median(np.abs(friction @ change)))
-    sure = chance * len(courses) <= config.error
-    return courses[best] if sure and size >= config.least * level else None
+    own = columns[best]
+    gains = np.log(_held_out(basis, y, blocks) / _held_out(np.hstack([basis, _basis(own)]), y, blocks))
+    change = np.linalg.lstsq(own, left, rcond=_RANK)[0]
+    size = abs(courses[best].whole) * float(np.median(np.abs(shapes[courses[best].form] * change)))
+    large = size >= config.least * float(np.median(np.abs(shapes["whole"])))
+    return courses[best] if large and by_flips(gains) <= config.chance else None
 
 
-def smooth_curve(speed: Array, config: DriftConfig) -> Array:
-    """Columns of any smooth curve of friction, each way apart (rows, columns): 1, |v|, v², and humps exp(-(v/v_s)²)."""
-    share = np.abs(speed) / max(float(np.abs(speed).max()), 1e-12)
-    parts = [np.ones_like(share), share, share**2, *(np.exp(-((share / width) ** 2)) for width in config.humps)]
-    return np.stack([part * side for side in (speed > 0.0, speed <= 0.0) for part in parts], axis=1)
-
-
-def _outside(course: Course, stretches: Sequence[Stretch], friction: Array, basis: Array) -> Array:
-    """c(t) by Coulomb and viscous friction (rows, 2), without what all else could take of it."""
+def _outside(course: Course, stretches: Sequence[Stretch], shape: Array, basis: Array) -> Array:
+    """c(t) g(v) (rows, 1), without what all else could take of it."""
     value = np.concatenate([course.at(part, stretch.middle[2]) for part, stretch in enumerate(stretches)])
-    columns = value[:, None] * friction
+    columns = (value * shape)[:, None]
     return np.asarray(columns - basis @ (basis.T @ columns))
 
 
@@ -100,42 +97,27 @@ def _blocks(t: Array, log: Array, length: float) -> Array:
     return np.unique(code, return_inverse=True)[1]
 
 
-def _wald(columns: Array, left: Array, basis: Array, blocks: Array) -> tuple[float, Array]:
-    """Chance of as large a change without any, and the change (2,).
-
-    Each block enters with what it leaves when it is left out, (I - H_bb)⁻¹ e_b, H over all columns: CR3 of Bell & McCaffrey
-    2002, Survey Methodology 28, p. 169. The freedom is that of as many blocks as share the evidence
-    evenly, (Σ i_b)²/Σ i_b²: a change that few blocks show is not sure, however little these leave.
-    """
-    count, size = int(blocks.max()) + 1, columns.shape[1]
-    bread = np.linalg.pinv(columns.T @ columns, rcond=_RANK**2, hermitian=True)
-    change = bread @ (columns.T @ left)
-    rest = left - columns @ change
-    whole = np.hstack([basis, _basis(columns)])
-    meat, shares = np.zeros((size, size)), np.zeros(count)
-    for block in range(count):
-        here = blocks == block
-        values, vectors = np.linalg.eigh(whole[here].T @ whole[here])
-        pulled = np.maximum(1.0 - values, _PULLED)
-        alone = rest[here] + whole[here] @ (vectors @ ((vectors.T @ (whole[here].T @ rest[here])) / pulled))
-        score = columns[here].T @ alone
-        meat += np.outer(score, score)
-        shares[block] = float(np.sum((columns[here] @ bread) * columns[here]))
-    covariance = bread @ meat @ bread
-    statistic = float(change @ np.linalg.pinv(covariance, rcond=_RANK**2, hermitian=True) @ change)
-    freedom = max(float(shares.sum() ** 2 / max(float(shares @ shares), 1e-300)) - size, 1.0)
-    return float(stats.f.sf(statistic * freedom / (size * (freedom + size - 1.0)), size, freedom)), change
+def _held_out(basis: Array, y: Array, blocks: Array) -> Array:
+    """Sum of squares of every block as the other blocks predict it (blocks,): e_b = (I - H_bb)⁻¹ r_b, H over `basis`."""
+    rest, found = y - basis @ (basis.T @ y), []
+    for block in range(int(blocks.max()) + 1):
+        own, here = basis[blocks == block], rest[blocks == block]
+        values, vectors = np.linalg.eigh(own.T @ own)
+        push = (vectors.T @ (own.T @ here)) / np.maximum(1.0 - values, _PULLED)
+        found.append(float(np.sum(np.square(here + own @ (vectors @ push)))))
+    return np.maximum(np.array(found), 1e-300)
 
 
 def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
     starts = tuple(float(stretch.t[0]) for stretch in stretches)
     duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in stretches)
-    return [Course("trend", starts, share * duration, 0.5 * duration, duration) for share in config.times]
+    return [Course("trend", form, starts, share * duration, 0.5 * duration, duration) for share in config.times for form in _FORMS]
 
 
 def _steps(stretches: Sequence[Stretch], t: Array, log: Array, config: DriftConfig) -> list[Course]:
     """Steps between rows; a step lasts until the end of the last log."""
     starts = tuple(float(stretch.t[0]) for stretch in stretches)
     rows = np.unique(np.linspace(config.ends * len(t), (1.0 - config.ends) * (len(t) - 1), config.steps).astype(np.intp))
-    return [Course("step", starts, float(t[row] - starts[log[row]]), 0.0, float(t[row] - starts[log[row]]), int(log[row]))
-            for row in rows]
+    since = [float(t[row] - starts[log[row]]) for row in rows]
+    return [Course("step", form, starts, when, 0.0, when, int(log[row]))
+            for row, when in zip(rows, since, strict=True) for form in _FORMS]

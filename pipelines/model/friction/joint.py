@@ -17,7 +17,7 @@ from pipelines.fit.varpro import SeparableFit
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.break_away import BreakAway, break_away, held_at_least
 from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
-from pipelines.model.friction.drift import DriftConfig, drift_of, smooth_curve
+from pipelines.model.friction.drift import DriftConfig, drift_of
 from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.fit_law import fit_law
 from pipelines.model.friction.ladder import Judge, Ladder, climb
@@ -27,8 +27,8 @@ from pipelines.model.friction.one_joint import OneJoint, gravity_columns
 from pipelines.model.friction.postures import alike
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
-from pipelines.model.friction.sliding import Sliding, SlidingConfig, left_out, sliding_rows
 from pipelines.model.friction.simulate import Simulated, simulate_joint
+from pipelines.model.friction.sliding import Sliding, SlidingConfig, free_curve, left_out, sliding_rows
 from pipelines.model.friction.speed_map import SpeedMap, speed_map
 from pipelines.model.friction.weak_form import Course, Stretch, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
@@ -90,7 +90,7 @@ class JointFit:
     beside_ripple: SeparableFit | None  # the law and the rigid numbers, the rigid ones first, with the ripple known
 
 
-def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: SlidingConfig = SlidingConfig()) -> JointFit:
+def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: SlidingConfig | None = None) -> JointFit:
     """Fit `law`, or choose one.
 
     Args:
@@ -100,11 +100,12 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     arm = OneJoint.of(robot, logs.joint)
     resolution = max(float(encoder_resolution(found.good)[logs.joint - 1]) for _, found in logs.identify)
     beside = _swaying(logs)
+    config = config or SlidingConfig()
     rows = _usable_rows(logs, window, beside, arm, config)
     stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
     if rows.sliding.doubtful and not _followed(stretches, fit, rows.sliding, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
-    course = _course(stretches, rows, arm, DriftConfig())
+    course = _course(stretches, rows, arm, config, DriftConfig())
     stretches = _along(stretches, course, fit)
     identify, validate = stretches[:rows.fitted], stretches[rows.fitted:]
     judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
@@ -124,7 +125,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     at_rest = [stretch for stretch in _stretches(logs.hold, logs.joint, rows.window, beside)
                if any(alike(stretch.posture, posture) for posture in final.postures)]
     return JointFit(logs, final, ladder, identify, driven, covered, unseen(covered, ladder), speed_map(identify, final),
-                    break_away((*identify, *at_rest), final), held_at_least(at_rest, final), rows.window, ripple, rows.sliding, course,
+                    break_away((*identify, *at_rest), final), held_at_least(at_rest, final), rows.window, ripple,
+                    rows.sliding, course,
                     None if ripple is None else refitted(LawEquations.of(identify, arm), final, ripple))
 
 
@@ -139,17 +141,14 @@ class _Rows:
 
 
 def _usable_rows(logs: JointLogs, window: float, beside: tuple[int, ...], arm: OneJoint, config: SlidingConfig) -> _Rows:
-    """The shortest windows over which the encoder shows the acceleration; of a measured torque, when a sample of it acts."""
+    """The shortest windows over which the encoder shows the acceleration."""
     found: _Rows | None = None
     for factor in config.windows:
         identify, validate = (_stretches(part, logs.joint, factor * window, beside) for part in (logs.identify, logs.validate))
         if not identify:
             break
         both = tuple(replace(stretch, part=k) for k, stretch in enumerate((*identify, *validate)))
-        ways = [both, tuple(replace(stretch, held=True) for stretch in both)]
-        tried = [_Rows(way, len(identify), factor * window, sliding_rows(way, arm, config))
-                 for way in (ways if not all(stretch.held for stretch in both) else ways[:1])]
-        found = min(tried, key=lambda rows: rows.sliding.mean_square)
+        found = _Rows(both, len(identify), factor * window, sliding_rows(both, arm, config))
         if found.sliding.attenuation <= config.attenuation:
             break
     if found is None:
@@ -175,29 +174,26 @@ def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, con
     return float(np.mean(np.square(residual[~sliding.slides]))) <= config.worse * sliding.mean_square
 
 
-def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, drift: DriftConfig) -> Course | None:
+def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
+            drift: DriftConfig) -> Course | None:
     """How friction changes in time over the logs that are fitted."""
     slides = rows.sliding.slides
     if all(stretch.sticks is None for stretch in stretches):
         stretches = left_out(stretches, slides)
     fitted = stretches[:rows.fitted]
     equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
-    return drift_of(fitted, equations.y, np.hstack([equations.fixed, smooth_curve(speed, drift)]), drift)
+    return drift_of(fitted, equations.y, np.hstack([equations.fixed, free_curve(speed, config)]), drift)
 
 
 def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -> tuple[Stretch, ...]:
     """The stretches with columns of `course`, a change of the curve of `fit`."""
-    if course is None:
+    if course is None or not stretches:
         return stretches
     fastest = max(float(np.abs(stretch.dq).max()) for stretch in stretches)
     side = fastest * np.geomspace(1e-4, 1.0, _CURVE)
     speed = np.concatenate([-side[::-1], side])
     own = replace(course, curve=(speed, fit.curve(speed)))
-    found = []
-    for stretch in stretches:
-        fresh = replace(stretch, course=own)
-        found.append(fresh)
-    return tuple(found)
+    return tuple(replace(stretch, course=own) for stretch in stretches)
 
 
 def _swaying(logs: JointLogs) -> tuple[int, ...]:

@@ -34,7 +34,8 @@ class SlidingConfig:
     """Numbers that decide which rows slide."""
 
     rest: float = 3.0  # standard deviations: a slower speed is not told from zero (two-sided .003)
-    worse: float = 4.0  # mean square of a class over that of the rows before: twice their rms, beyond any chance of a few rows
+    worse: float = 4.0  # median square of a class over that of the rows before: twice their size, beyond chance of a few rows
+    rows: int = 4  # for every column of the free curve, that the first class has at least
     margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel)
     classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
     decades: int = 4  # of speed; slower rows are one class
@@ -62,22 +63,23 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     equations = LawEquations.of(stretches, joint)
     travel = np.concatenate([_travel(stretch, config)[stretch.kept] for stretch in stretches])
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
-    columns = np.hstack([equations.fixed, free_curve(speed, config), _free_course(speed, config)])
+    steady = np.hstack([equations.fixed, free_curve(speed, config)])
+    columns = np.hstack([steady, _free_course(speed, config)])
     moving = travel > 0.0
     if not moving.any():
         return Sliding(moving, ~moving, travel, 0.0, 0.0, np.inf, True)
-    reach = start = float(np.median(travel[moving]))
+    most = max(float(np.sort(travel)[-min(len(travel), config.rows * columns.shape[1])]), np.nextafter(0.0, 1.0))
+    reach = start = min(float(np.median(travel[moving])), most)
     slides = travel >= reach
-    left, count = _left(columns[slides], equations.y[slides])
     while reach > 0.0:
         lower = reach / config.halving if (moving & (travel < reach)).any() else 0.0
         wider = moving & (travel >= lower)
-        more = int(wider.sum() - slides.sum())
-        if more:
-            left_wider, count_wider = _left(columns[wider], equations.y[wider])
-            if (left_wider - left) / max(count_wider - count, 1) > config.worse * left / max(count, 1):
+        more = wider & ~slides
+        if more.any():
+            square = np.square(_residual(columns[wider], equations.y[wider]))
+            if np.median(square[more[wider]]) > config.worse * np.median(square[~more[wider]]):
                 break
-            slides, left, count = wider, left_wider, count_wider
+            slides = wider
         reach = lower
     reach = min(config.margin * reach, start)
     slides &= travel >= reach
@@ -87,7 +89,7 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     rest = int((~slides).sum())
     doubtful = rest > 0 and (whole - left) / max(count_whole - count, 1) > config.worse * mean_square
     return Sliding(slides, ~moving, travel, reach, mean_square,
-                   _attenuation(stretches, columns[slides], slides, len(equations.postures)), bool(doubtful))
+                   _attenuation(stretches, steady[slides], slides, len(equations.postures)), bool(doubtful))
 
 
 def left_out(stretches: Sequence[Stretch], slides: Mask) -> tuple[Stretch, ...]:
@@ -133,9 +135,15 @@ def _free_course(speed: Array, config: SlidingConfig) -> Array:
 def _left(columns: Array, y: Array) -> tuple[float, int]:
     """Sum of squares that least squares leaves, and its degrees of freedom."""
     scale = np.linalg.norm(columns, axis=0)
-    solution, _, rank, _ = np.linalg.lstsq(columns / np.where(scale > 0.0, scale, 1.0), y, rcond=1e-9)
-    residual = y - columns / np.where(scale > 0.0, scale, 1.0) @ solution
-    return float(residual @ residual), len(y) - int(rank)
+    residual = _residual(columns, y)
+    return float(residual @ residual), len(y) - int(np.sum(scale > 0.0))
+
+
+def _residual(columns: Array, y: Array) -> Array:
+    """What least squares leaves (rows,)."""
+    scale = np.linalg.norm(columns, axis=0)
+    unit = columns[:, scale > 0.0] / scale[scale > 0.0]
+    return np.asarray(y - unit @ np.linalg.lstsq(unit, y, rcond=1e-9)[0])
 
 
 def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask, postures: int) -> float:

@@ -66,15 +66,16 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Friction that changes in time by c(t) (α f(v) + β v), and the curve f that it is a change of."""
+    """Friction that changes in time by α c(t) g(v)."""
 
     kind: str  # "trend" | "step"
+    form: str  # g: "whole", the curve of friction; "viscous", v; "coulomb", its sign
     starts: tuple[float, ...]  # [s] first instant of every stretch
     time: float  # [s] since the start: of a step when; of a trend its time constant
     holds: float  # [s] since the start: where c is zero, of a trend
     until: float  # [s] duration of a trend's log; of a step when
     part: int = 0  # stretch of a step
-    curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of f
+    curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
 
     def at(self, part: int, t: Array) -> Array:
         """c(t) in one of the stretches."""
@@ -88,13 +89,16 @@ class Course:
         """c at the end less c at the start."""
         return 1.0 if self.kind == "step" else float(-np.expm1(-self.until / self.time))
 
+    def shape(self, v: Array) -> Array:
+        """g(v) [N m], [rad/s] or 1."""
+        if self.form == "viscous":
+            return v
+        return np.sign(v) if self.form == "coulomb" or self.curve is None else np.interp(v, *self.curve)
+
     def columns(self, part: int, t: Array, dq: Array) -> Array:
-        """c f and c v over the step after each sample (samples, 2); the last row is zero."""
-        if self.curve is None:
-            return np.zeros((len(t), 0))
-        v = 0.5 * (dq[1:] + dq[:-1])
-        value = self.at(part, 0.5 * (t[1:] + t[:-1]))
-        return np.vstack([np.stack([value * np.interp(v, *self.curve), value * v], axis=1), np.zeros((1, 2))])
+        """c(t) g(v) over the step after each sample (samples, 1); the last row is zero."""
+        value = self.at(part, 0.5 * (t[1:] + t[:-1])) * self.shape(0.5 * (dq[1:] + dq[:-1]))
+        return np.append(value, 0.0)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +122,7 @@ class Stretch:
     sticks: npt.NDArray[np.bool_] | None = None  # (windows,) the joint does not slide: no row of a sliding law
 
     course: Course | None = None  # of friction that changes in time
+    untimed: bool = False  # the torque is measured: when within its step it acted is not known
     part: int = 0  # which of its stretches this is
 
     def without(self, rows: npt.NDArray[np.bool_]) -> Stretch:
@@ -199,11 +204,18 @@ class Stretch:
 
     @cached_property
     def sway(self) -> Array:
-        """Columns of the joints that are held and sway, and of friction that changes in time, over the step after each sample
-        (samples, columns).
+        """Columns beside inertia and gravity over the step after each sample (samples, columns).
+
+        Of joints that are held and sway; of a torque sample that may act a part of a step later or earlier, its change over
+        the step; and of friction that changes in time.
         """
-        sway = sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)
-        return sway if self.course is None else np.hstack([sway, self.course.columns(self.part, self.t, self.dq)])
+        parts = [sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)]
+        if self.untimed:
+            known = np.where(np.isfinite(self.tau), self.tau, 0.0)
+            parts.append(np.append(np.diff(known), 0.0)[:, None])
+        if self.course is not None:
+            parts.append(self.course.columns(self.part, self.t, self.dq))
+        return np.hstack(parts)
 
     @cached_property
     def swayed(self) -> Array:
@@ -266,8 +278,9 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
             doubt = float(np.nanmedian(speed))
         measured = np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j])
         stretch = Stretch(log.name, good.log.t[run], measured, good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
-                          np.where(np.isfinite(dq), dq, 0.0), spoilt, log.torque != "measured", size,
-                          log.robot.joints[j].revolute, others, sways, doubt, weighs)
+                          np.where(np.isfinite(dq), dq, 0.0), spoilt, True, size,
+                          log.robot.joints[j].revolute, others, sways, doubt, weighs,
+                          untimed=log.torque == "measured")
         if len(stretch.edges) > _FEWEST and stretch.rows >= _FEWEST:
             stretches.append(stretch)
     return tuple(stretches)

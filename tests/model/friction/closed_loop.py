@@ -88,7 +88,8 @@ def reference(machine: Machine) -> tuple[Array, Array]:
     rng = np.random.default_rng([502, KINDS.index(machine.kind), machine.seed])
     t = np.arange(round(machine.seconds * _INTEGRATION)) / _INTEGRATION
     if machine.kind == "closed-loop" and rng.random() < 0.5:
-        speed = sum(np.sin(2.0 * np.pi * f * t + p) for f, p in zip((0.11, 0.23, 0.41, 0.77), rng.uniform(0, 2 * np.pi, 4), strict=True))
+        phases = rng.uniform(0, 2 * np.pi, 4)
+        speed = sum(np.sin(2.0 * np.pi * f * t + p) for f, p in zip((0.11, 0.23, 0.41, 0.77), phases, strict=True))
         speed = 1.5 * np.clip(t / 2.0, 0.0, 1.0) * (0.55 - 0.45 * np.cos(2.0 * np.pi * t / machine.seconds)) * speed / 1.6
     else:
         knots, values, now = [0.0], [0.0], 0.3
