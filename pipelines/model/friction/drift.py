@@ -37,7 +37,7 @@ class DriftConfig:
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
     steps: int = 40  # instants of a step that are tried
     ends: float = 0.08  # of all rows, that lie before and after a step
-    times: tuple[float, ...] = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 5.0)  # time constants over the duration; 5: straight
+    times: tuple[float, ...] = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 5.0)  # over the duration; 5: straight
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
 
 

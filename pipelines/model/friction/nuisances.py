@@ -1,4 +1,4 @@
-"""What else friction logs show, in words: friction that drifts, rows that stick, an encoder too coarse, viscosity below zero."""
+"""Report nuisances of friction logs: friction that drifts, rows that stick, a coarse encoder, negative viscous friction."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _COARSE = 0.05  # of the inertia, its bias by errors in variables: beyond it is 
 
 
 def drift_in_words(drift: Drift | None, name: str) -> str:
-    """What changed, by how much, and which friction the law is; empty where nothing does."""
+    """Say how friction drifts, by how much, and at what time the law holds; empty without a drift."""
     if drift is None or drift.change.std is None:
         return ""
     percent, std = 100.0 * drift.change.value, 100.0 * drift.change.std
@@ -25,14 +25,14 @@ def drift_in_words(drift: Drift | None, name: str) -> str:
     part = {"viscous": "Viscous friction", "coulomb": "Coulomb friction"}.get(drift.form, "Friction")
     size += "" if drift.form == "whole" else f" of all friction at {plain_number(drift.speed)} rad/s"
     if drift.kind == "step":
-        return (f"{part} of {name} {size} at once, {plain_number(drift.when)} s into {drift.log}; the law is that before, and each "
-                "number of it holds until then.")
-    return (f"{part} of {name} {size} in the course of each log, with a time constant of {plain_number(drift.when)} s; the law is "
-            f"that at {plain_number(drift.holds_at)} s.")
+        return (f"{part} of {name} {size} at once, {plain_number(drift.when)} s into {drift.log}; the law "
+                "is that before.")
+    return (f"{part} of {name} {size} in the course of each log, with a time constant of "
+            f"{plain_number(drift.when)} s; the law is that at {plain_number(drift.holds_at)} s.")
 
 
 def sticking_in_words(sticking: Sticking | None, name: str) -> str:
-    """What was left out, and why."""
+    """Say how many rows are left out, and why."""
     if sticking is None:
         return ""
     words = (f"{plain_number(100.0 * sticking.share)} % of the rows of {name} are left out: the joint rests or bends its contacts "
@@ -68,8 +68,9 @@ def _negative_viscous(joint: JointFit, where: str) -> Check | None:
             continue
         for number in one.fit.numbers:
             if number.name == "viscous.coefficient" and number.value < -_SURE * number.std:
-                return Check.of("S14", "warn", f"viscous friction of joint {joint.logs.joint} comes out negative, {number.value:.3g} ± "
-                                f"{number.std:.2g} {number.unit}: torque falls as speed rises", where=where,
-                                remedy="look at the sign of this torque, at torque that a regenerating drive does not log, at "
-                                       "friction that warms up while speeds rise, or add slower speeds for a Stribeck law")
+                return Check.of(
+                    "S14", "warn", f"viscous friction of joint {joint.logs.joint} comes out negative, {number.value:.3g} ± "
+                    f"{number.std:.2g} {number.unit}: torque falls as speed rises", where=where,
+                    remedy="look at the sign of this torque, at torque that a regenerating drive does not log, at friction "
+                           "that warms up while speeds rise, or add slower speeds for a Stribeck law")
     return None

@@ -33,9 +33,9 @@ Mask = npt.NDArray[np.bool_]
 class SlidingConfig:
     """Numbers that decide which rows slide."""
 
-    rest: float = 3.0  # standard deviations: a slower speed is not told from zero (two-sided .003)
+    rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
     worse: float = 4.0  # median square of a class over that of the rows before: twice their size, beyond chance of a few rows
-    rows: int = 4  # for every column of the free curve, that the first class has at least
+    rows: int = 3  # for every column of the free curve, that the first class has at least
     margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel)
     classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
     decades: int = 4  # of speed; slower rows are one class
@@ -54,7 +54,7 @@ class Sliding:
     travel: Array  # (rows,) [rad] since the last rest or reversal, or until the next
     distance: float  # [rad] of travel from which rows slide
     mean_square: float  # [N² m²] that the free curve leaves of them
-    attenuation: float  # noise of the acceleration over acceleration (variance), beside all other columns
+    attenuation: float  # noise of the acceleration over acceleration (variance), outside all other columns
     doubtful: bool  # whether some rows do not follow the free curve
 
 
@@ -68,9 +68,11 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     moving = travel > 0.0
     if not moving.any():
         return Sliding(moving, ~moving, travel, 0.0, 0.0, np.inf, True)
-    most = max(float(np.sort(travel)[-min(len(travel), config.rows * columns.shape[1])]), np.nextafter(0.0, 1.0))
-    reach = start = min(float(np.median(travel[moving])), most)
+    reach = start = float(np.median(travel[moving]))
     slides = travel >= reach
+    while slides.sum() < min(config.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()):
+        reach = start = reach / config.halving
+        slides = moving & (travel >= reach)
     while reach > 0.0:
         lower = reach / config.halving if (moving & (travel < reach)).any() else 0.0
         wider = moving & (travel >= lower)
@@ -140,7 +142,7 @@ def _left(columns: Array, y: Array) -> tuple[float, int]:
 
 
 def _residual(columns: Array, y: Array) -> Array:
-    """What least squares leaves (rows,)."""
+    """Return the residual of least squares (rows,)."""
     scale = np.linalg.norm(columns, axis=0)
     unit = columns[:, scale > 0.0] / scale[scale > 0.0]
     return np.asarray(y - unit @ np.linalg.lstsq(unit, y, rcond=1e-9)[0])

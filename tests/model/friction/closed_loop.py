@@ -54,7 +54,7 @@ class Machine:
         return np.where(v >= 0.0, forth, -back)
 
     def scale(self, t: Array) -> Array:
-        """What friction is multiplied by at time t."""
+        """Return the factor of friction at time t."""
         if self.kind == "step":
             return np.where(t >= self.when, 1.0 + self.drift, 1.0)
         return 1.0 + self.drift * -np.expm1(-t / self.when) if self.kind == "trend" else np.ones_like(t)
