@@ -24,7 +24,7 @@ CODES: Final[dict[str, str]] = {
     "D14": "same recording fitted and judged by",
     "D15": "not physically consistent", "D16": "a held joint moves", "D17": "the simulated arm runs away",
     "D18": "torque without its compensation", "D19": "the model misses held-out torque", "D20": "feed-forward does not help",
-    "D21": "torque that depends on the angle alone",
+    "D21": "torque that depends on the angle alone", "D26": "friction that changes in time",
     "F01": "empty file", "F02": "truncated or damaged file", "F03": "not closed, or the reading library failed",
     "F04": "checksum mismatch", "F05": "integrity", "F06": "not a log", "F07": "truncated Parquet", "F08": "damaged MAT file",
     "F09": "torn lines in a text file", "F10": "missing HDF5 filter", "F11": "newer format version", "F12": "not a regular file",
