@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from pipelines.log.files import ENDINGS, open_log
 from pipelines.log.robot import Joint, RobotDescription, parse_robot
 from pipelines.log.shipped import shipped
 from pipelines.log.text import read_small_text
+from pipelines.log.toml_text import TomlError, parse_toml
 
 __all__ = ["load_robot", "robot_at_hand", "robot_sources"]
 
@@ -69,8 +69,8 @@ def _file_of(source: str | Path) -> Path:
 def _table_of(text: str) -> dict[str, Any]:
     """The table of a TOML text; empty where it is none, which `parse_robot` says better."""
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError):
+        return parse_toml(text)
+    except TomlError:
         return {}
 
 
