@@ -40,7 +40,8 @@ DOORS = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": "pipelines.log",
     "pandas": "pipelines.log", "pyarrow": "pipelines.log", "filterpy": "pipelines.signal.kalman", "mujoco": "pipelines.bench",
     "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody", "pydantic": "pipelines.log", "pydantic_core": "pipelines.log",
-    "rich": "rrrid_cli", "tomllib": "pipelines.log.toml_text", "pebble": "pipelines.batch", "dask": "pipelines.batch", "distributed": "pipelines.batch",
+    "tomllib": "pipelines.log.toml_text",
+    "rich": "rrrid_cli", "pebble": "pipelines.batch", "dask": "pipelines.batch", "distributed": "pipelines.batch",
 }
 NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy alone
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NoReturn
 
-from pipelines.errors import InputRejected, RrridError, UsageError, did_you_mean
+from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
 from pipelines.log.toml_text import TomlError, parse_toml
 
 __all__ = ["Drive", "Joint", "LinkParameters", "RobotDescription", "format_robot", "parse_robot"]
@@ -94,6 +94,7 @@ class RobotDescription:
     urdf_text: str | None = None  # kinematics of a URDF, meshes left out
     tip_link: str | None = None  # last link, where a URDF branches
     drive: Drive | None = None
+    checks: tuple[Check, ...] = field(default=(), compare=False)  # what its file was warned of; no part of the robot
 
     @property
     def n_joints(self) -> int:

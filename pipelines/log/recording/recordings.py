@@ -19,13 +19,14 @@ from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
 from pipelines.log.recording.repair import Recording
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Drive, RobotDescription, parse_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.log.robot_files import load_robot, split_tip
 from pipelines.log.shipped import shipped, shipped_names
 from pipelines.log.text import read_small_text
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 
 _RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy")
+_BESIDE_USE = ("name", "gravity", "tip_link")
 
 Map = Mapping[str, Mapping[int, str]]
 
@@ -153,19 +154,23 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
 
         return parse_robot(tomli_w.dumps(table), where=path), ()
     for key in table:
-        if key not in ("name", "gravity"):
-            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, ('name', 'gravity'))}", where=path,
-                             remedy="beside use, name and gravity can be given; write the rest in the description")
+        if key not in _BESIDE_USE:
+            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, _BESIDE_USE)}", where=path,
+                             remedy=f"beside use, {', '.join(_BESIDE_USE)} can be given; write the rest in the description")
+    tip = table.get("tip_link")
+    if not isinstance(tip, str | None):
+        raise UsageError("C02", "'robot.tip_link' must name a link", where=path, remedy="write tip_link = \"last link\"")
     if not isinstance(use, str) or not use.strip():
         raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path,
                          remedy="fill it in")
+    use, after_colon = split_tip(use)
     found = next((place / use for place in (folder, path.parent) if (place / use).is_file()), None)
     if found is None and Path(use).suffix and use not in shipped_names("robots"):
         places = " nor ".join(dict.fromkeys((f"in {folder}", f"in {path.parent}")))
         raise UsageError("C04", f"the robot '{use}' that the recipe names lies neither {places}" if folder != path.parent
                          else f"the robot '{use}' that the recipe names does not lie in {folder}", where=path,
                          remedy="copy it to the recordings, give their folder with --source, or another robot with --robot")
-    robot = load_robot(found if found is not None else use)
+    robot = load_robot(found if found is not None else use, tip or after_colon)
     files = () if found is None else (found,)
     if "name" in table:
         robot = replace(robot, name=str(table["name"]))
