@@ -236,7 +236,7 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
     """The logs named by `inputs`: files as they are, folders searched below.
 
     Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is named: then its logs
-    are meant. Links that lead out of a folder are passed over with a warning.
+    are meant. A link to a log is that log; links to folders, and those that lead nowhere, are passed over with a warning.
 
     Raises:
         UsageError: an input does not exist.
@@ -252,7 +252,7 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
             continue
         own = (path / PROVENANCE).is_file()
         root = path / "logs" if own else path
-        found += sorted(_below(root, root.resolve(), checks))
+        found += sorted(_below(root, checks))
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
         raise nothing_there(", ".join(map(str, inputs)), checks)
@@ -269,18 +269,18 @@ def nothing_there(where: object, checks: Sequence[Check]) -> NothingMatched:
     return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
 
 
-def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
+def _below(folder: Path, checks: list[Check]) -> list[Path]:
     try:
-        there = entries(folder, root, checks)
+        there = entries(folder, checks)
     except FileNotFoundError:
         return []
     except OSError as problem:
         raise fault_of(problem, folder) from None
-    return [path for entry in there for path in (_below(entry, root, checks) if entry.is_dir() else [entry])]
+    return [path for entry in there for path in (_below(entry, checks) if entry.is_dir() else [entry])]
 
 
-def entries(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
-    """Logs in `folder` and folders to look into, in order; links that lead out of `root` are passed over with a word (X11).
+def entries(folder: Path, checks: list[Check]) -> list[Path]:
+    """Logs in `folder` and folders to look into, in order; links to folders and to nothing are passed over with a word (X11).
 
     Raises:
         OSError: the folder cannot be read.
@@ -289,9 +289,13 @@ def entries(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
     for entry in sorted(folder.iterdir()):
         if entry.name.startswith("."):
             continue
-        if entry.is_symlink() and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
-            checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry,
+        if entry.is_symlink() and entry.is_dir():
+            checks.append(Check.of("X11", "warn", "link to a folder passed over", where=entry,
                                    remedy="give what it leads to by its own path, if that is meant"))
+        elif entry.is_symlink() and not entry.exists():
+            if entry.suffix.lower() in ENDINGS:
+                checks.append(Check.of("X11", "warn", "link that leads nowhere, or in a circle, passed over", where=entry,
+                                       remedy="remove it, or let it lead to a log"))
         elif entry.is_dir():
             if not (entry / PROVENANCE).is_file():
                 found.append(entry)
