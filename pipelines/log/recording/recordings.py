@@ -80,12 +80,13 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
             read[name] = read_table(filenames.inside(folder, name, path), recipe.format, name)
         return read[name]
 
-    hits = {name: hit for name in names if (hit := _case(cases, name)) is not None}
+    fits = filenames.matches([*(case.match for case in cases), *(spec.match for spec in recipe.table)], names, path)
+    hits = {name: hit for name in names if (hit := _case(cases, fits, name)) is not None}
     companions = {other for name, (_, groups) in hits.items() for other in _files_of(recipe, groups, name, path) if other != name}
     sources = [_source(case, groups, name, recipe, table_of, names, path)
                for name, (case, groups) in hits.items() if name not in companions]
-    tables = [(spec, groups, table_of(name)) for name in names for spec in recipe.table
-              if (groups := filenames.match(spec.match, name)) is not None]
+    tables = [(spec, fit[name], table_of(name)) for name in names
+              for spec, fit in zip(recipe.table, fits[len(cases):], strict=True) if name in fit]
     if not sources and not tables:
         patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
         there = filenames.lying_there(names, _RECORDINGS)
@@ -114,10 +115,10 @@ def _folder(recipe: Path, source: Path | None) -> Path:
     return source
 
 
-def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] | None:
-    for case in cases:
-        if (groups := filenames.match(case.match, name)) is not None:
-            return None if case.skip else (case, groups)
+def _case(cases: list[FileSpec], fits: list[dict[str, dict[str, str]]], name: str) -> tuple[FileSpec, dict[str, str]] | None:
+    for case, fit in zip(cases, fits, strict=False):
+        if name in fit:
+            return None if case.skip else (case, fit[name])
     return None
 
 
