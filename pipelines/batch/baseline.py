@@ -58,7 +58,7 @@ def against(record: Record, baseline: ModelFile) -> Record:
 
 
 def _limited(about: str, words: Sequence[str]) -> str:
-    return clean(f"{about}: {'; '.join(words)}.", 1000)
+    return clean(f"{about}: {'; '.join(words)}.", None)
 
 
 def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: bool = False) -> tuple[Check, ...]:

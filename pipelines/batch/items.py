@@ -59,7 +59,7 @@ def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tu
     checks: list[Check] = []
     _walk(root, folders, faults, checks)
     if not folders and not faults:
-        raise nothing_there(root, checks)
+        raise nothing_there(root, checks, [root])
     items = [Item(_name(folder, root), (folder,), (), fault) for folder, fault in faults.items()]
     for folder, logs in folders.items():
         if each_log:

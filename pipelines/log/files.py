@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import glob
 import hashlib
@@ -25,9 +26,10 @@ from pipelines.log.log_reader import read_guarded
 from pipelines.log.robot import RobotDescription
 from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_format
 
-__all__ = ["ENDINGS", "PROVENANCE", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there", "open_log",
-           "regular_file", "write_log"]
+__all__ = ["ENDINGS", "PROVENANCE", "RECORDINGS", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there",
+           "open_log", "regular_file", "write_log"]
 
+RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy")  # endings of what `import` reads
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -183,7 +185,8 @@ def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
                          remedy="unpack it, and give the logs or their folder")
     else:
         raise InputRejected("F06", "neither HDF5 nor Parquet", where=path,
-                            remedy="a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe")
+                            remedy="a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe, "
+                            "which 'rrrid import --guess FILE' drafts")
     if ENDINGS.get(path.suffix.lower()) == container:
         return container, []
     return container, [Check.of("F06", "warn", f"named '{path.suffix}', but its content is {container}; read as that", where=path,
@@ -255,18 +258,31 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
         found += sorted(_below(root, checks))
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
-        raise nothing_there(", ".join(map(str, inputs)), checks)
+        raise nothing_there(", ".join(map(str, inputs)), checks, [path for path in inputs if os.path.isdir(path)])
     return tuple(dict.fromkeys(found)), tuple(checks)
 
 
-def nothing_there(where: object, checks: Sequence[Check]) -> NothingMatched:
-    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie."""
+def nothing_there(where: object, checks: Sequence[Check], folders: Sequence[Path]) -> NothingMatched:
+    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie, or which
+    recordings lie there that `import` makes logs of.
+    """
     links = [str(check.where) for check in checks if check.code == "RRID-X11"]
     passed, remedy = "", "logs end in .h5 or .parquet"
     if links:
         passed = f"; {len(links)} link{'s' * (len(links) > 1)} passed over, {'first ' * (len(links) > 1)}{links[0]}"
         remedy = "give what a link leads to by its own path"
+    elif recorded := next((path for folder in folders for path in _recordings(folder)), None):
+        passed = f", but recordings such as {recorded.name}"
+        remedy = f"make logs of them: 'rrrid import --guess {recorded}' drafts the recipe that does"
     return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
+
+
+def _recordings(folder: Path) -> list[Path]:
+    """The recorded files in `folder`, and in the folders in it."""
+    with contextlib.suppress(OSError):
+        return [path for pattern in ("*", "*/*") for path in sorted(folder.glob(pattern))
+                if path.suffix.lower() in RECORDINGS and path.is_file()]
+    return []
 
 
 def _below(folder: Path, checks: list[Check]) -> list[Path]:
