@@ -26,6 +26,7 @@ __all__ = ["warm_up"]
 _NEEDED: Final = ("pipelines.batch.newborn", "pipelines.batch.work", "h5py")
 
 
+_DEEPEST: Final = 36  # characters; of 104 for a socket, 67 are "/.rrrid-tmp-…/pymp-…/listener-…"
 _AFTER_ALL: Final = -200  # priority at exit; `multiprocessing` removes its own temporary folder at -100
 
 
@@ -47,7 +48,13 @@ def warm_up(module: str) -> ForkServerContext:
 
 @contextmanager
 def _own_temporary_folder() -> Iterator[None]:
-    """Let `multiprocessing` make its temporary folder inside one that the next batch sweeps away where this process is killed."""
+    """Let `multiprocessing` make its temporary folder inside one that the next batch sweeps away where this process is killed.
+
+    Where the system's own lies so deep that the name of a socket in it would be too long, nothing is changed.
+    """
+    if len(tempfile.gettempdir()) > _DEEPEST:
+        yield
+        return
     folder = temporary_folder()
     Finalize(None, remove_folder, args=[folder], exitpriority=_AFTER_ALL)
     before, tempfile.tempdir = tempfile.tempdir, str(folder)
