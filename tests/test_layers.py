@@ -42,6 +42,7 @@ DOORS = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": "pipelines.log",
     "pandas": "pipelines.log", "pyarrow": "pipelines.log", "filterpy": "pipelines.signal.kalman", "mujoco": "pipelines.bench",
     "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody", "pydantic": "pipelines.log", "pydantic_core": "pipelines.log",
+    "tomllib": "pipelines.log.toml_text",
     "rich": "rrrid_cli", "pebble": "pipelines.batch", "dask": "pipelines.batch", "distributed": "pipelines.batch",
 }
 NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy alone

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -20,6 +19,7 @@ from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.fit.differences import difference
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredValue
+from pipelines.log.result_figures import name_in
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.parameter_names import quantity_of
 from pipelines.report.diagnosis_words import title_of
@@ -58,7 +58,7 @@ def against(record: Record, baseline: ModelFile) -> Record:
 
 
 def _limited(about: str, words: Sequence[str]) -> str:
-    return clean(f"{about}: {'; '.join(words)}.", 1000)
+    return clean(f"{about}: {'; '.join(words)}.", None)
 
 
 def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: bool = False) -> tuple[Check, ...]:
@@ -126,7 +126,7 @@ def _warned(message: str, remedy: str, gate: bool = False) -> Check:
 
 def _robot(baseline: ModelFile) -> str:
     """The name of the robot that the baseline is of; empty where it says none."""
-    return str(tomllib.loads(baseline.robot).get("name", ""))
+    return name_in(baseline.robot)
 
 
 def known_figures(baseline: ModelFile, names: Iterable[str]) -> dict[str, tuple[float, float]]:

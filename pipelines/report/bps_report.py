@@ -25,6 +25,7 @@ __all__ = ["bps_report"]
 _GOOD = 0.1  # relative torque error that is worth calling good
 _POOR = 0.5  # one that explains too little to be used
 _SURE = 3.0  # standard deviations: a value that is clearly visible
+_ABOVE_NOISE = 10.0  # times what the noise between periods leaves, as in a diagnosis: beyond it the model lacks something
 _STANDS_OUT = 2.0  # times the overall relative error: a joint worth naming
 _ALIKE = 0.02  # of the better error: less is no difference worth speaking of
 
@@ -43,8 +44,10 @@ def bps_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     error = result.relative_error["validate"]
-    return "bad" if result.unresolved or result.physically_consistent is False or error >= _POOR else \
-        "good" if error < _GOOD and not _worst_joints(result) else "attention"
+    if result.unresolved or result.physically_consistent is False or error >= _POOR:
+        return "bad"
+    above, _ = _above_noise(result)
+    return "good" if error < _GOOD and not _worst_joints(result) and above <= _ABOVE_NOISE else "attention"
 
 
 def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
@@ -100,15 +103,19 @@ def _together(result: Result) -> tuple[str, ...]:
 
 def _beside_noise(result: Result) -> str:
     """"the residual of the fitted logs is at most 1.1 times what the noise between periods leaves"; empty without periods."""
-    ratios = [(float(ratio), result.joints[j]) for log in result.noise_floor if log.role == "identify"
-              for j, ratio in enumerate(log.ratio) if math.isfinite(ratio)]
-    if not ratios:
+    worst, joint = _above_noise(result)
+    if not joint:
         return ""
-    worst, joint = max(ratios)
     several = len(result.joints) > 1
     return (f"the residual of the fitted logs is {'at most ' if several else ''}{worst:.2g} times what the noise between periods "
             f"leaves"
             f"{f' ({joint})' if several else ''}")
+
+
+def _above_noise(result: Result) -> tuple[float, str]:
+    """Return the largest residual of the fitted logs over the noise between periods, and its joint; (0, "") without periods."""
+    return max(((float(ratio), result.joints[j]) for log in result.noise_floor if log.role == "identify"
+                for j, ratio in enumerate(log.ratio) if math.isfinite(ratio)), default=(0.0, ""))
 
 
 def _periods_of(log: Beside) -> str:

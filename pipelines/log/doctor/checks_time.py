@@ -36,6 +36,12 @@ def length(s: Subject) -> list[Check]:
                       f"{log.n_samples} samples, fewer than the {FEWEST} that any check needs",
                       signal="t",
                       remedy="record a longer log")]
+    if log.n_samples < SHORTEST:
+        return [s.say("T08", "warn",
+                      f"{log.n_samples} samples, {recorded_span(log.signals['t'].values, log.sample_time):.3g} s: too short for "
+                      f"any fit, which needs {SHORTEST} at least, {SHORTEST * log.sample_time:.3g} s at this rate",
+                      signal="t",
+                      remedy="record longer, some seconds of the motion at least")]
     time = s.good.log.t
     duration = recorded_span(time, log.sample_time)
     if log.period is not None and shorter_than_period(time, log.sample_time, log.period):

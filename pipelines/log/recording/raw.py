@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -170,5 +169,9 @@ def _upright(name: str, array: npt.NDArray[np.generic], source: str, checks: lis
 
 def header_unit(name: str) -> tuple[str, str]:
     """("q1", "deg") from "q1 [deg]" or "q1 (deg)"; the unit is empty where the header says none."""
-    found = re.fullmatch(r"\s*(.*?)\s*[\[(]\s*([^\[\]()]{1,20})\s*[\])]\s*", name)
-    return (found.group(1), found.group(2)) if found and found.group(1) else (name.strip(), "")
+    text = name.strip()
+    stem, bracket, rest = text.rpartition(max("[(", key=text.rfind))
+    unit = rest[:-1].strip()
+    if bracket and stem.strip() and rest[-1:] in ("]", ")") and 0 < len(unit) <= 20 and not set(unit) & set("[]()"):
+        return stem.strip(), unit
+    return text, ""

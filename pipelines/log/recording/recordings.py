@@ -10,6 +10,7 @@ import numpy as np
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError, did_you_mean
 from pipelines.log.experiment import Array
+from pipelines.log.files import RECORDINGS
 from pipelines.log.recording import filenames
 from pipelines.log.recording.clock import time_of
 from pipelines.log.recording.joint_side import drive_of, si_of, unit_declared
@@ -19,13 +20,13 @@ from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
 from pipelines.log.recording.repair import Recording
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Drive, RobotDescription, parse_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.log.robot_files import load_robot, split_tip
 from pipelines.log.shipped import shipped, shipped_names
 from pipelines.log.text import read_small_text
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 
-_RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy")
+_BESIDE_USE = ("name", "gravity", "tip_link")
 
 Map = Mapping[str, Mapping[int, str]]
 
@@ -79,19 +80,20 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
             read[name] = read_table(filenames.inside(folder, name, path), recipe.format, name)
         return read[name]
 
-    hits = {name: hit for name in names if (hit := _case(cases, name)) is not None}
+    fits = filenames.matches([*(case.match for case in cases), *(spec.match for spec in recipe.table)], names, path)
+    hits = {name: hit for name in names if (hit := _case(cases, fits, name)) is not None}
     companions = {other for name, (_, groups) in hits.items() for other in _files_of(recipe, groups, name, path) if other != name}
     sources = [_source(case, groups, name, recipe, table_of, names, path)
                for name, (case, groups) in hits.items() if name not in companions]
-    tables = [(spec, groups, table_of(name)) for name in names for spec in recipe.table
-              if (groups := filenames.match(spec.match, name)) is not None]
+    tables = [(spec, fit[name], table_of(name)) for name in names
+              for spec, fit in zip(recipe.table, fits[len(cases):], strict=True) if name in fit]
     if not sources and not tables:
         patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
-        there = filenames.lying_there(names, _RECORDINGS)
+        there = filenames.lying_there(names, RECORDINGS)
         raise NothingMatched("C06", f"no file matches {patterns}; {there}", where=folder, remedy="correct match in the recipe" + (
             "" if source else ", or give the folder of the recordings with --source"))
     return Material(recipe, path, folder, replace(arm, drive=drive), drive, tuple(sources), tuple(tables),
-                    tuple(name for name in names if name not in read and Path(name).suffix.lower() in _RECORDINGS),
+                    tuple(name for name in names if name not in read and Path(name).suffix.lower() in RECORDINGS),
                     (path, *described, *(folder / name for name in read)),
                     hashes={folder / name: table.sha256 for name, table in read.items()})
 
@@ -113,10 +115,10 @@ def _folder(recipe: Path, source: Path | None) -> Path:
     return source
 
 
-def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] | None:
-    for case in cases:
-        if (groups := filenames.match(case.match, name)) is not None:
-            return None if case.skip else (case, groups)
+def _case(cases: list[FileSpec], fits: list[dict[str, dict[str, str]]], name: str) -> tuple[FileSpec, dict[str, str]] | None:
+    for case, fit in zip(cases, fits, strict=False):
+        if name in fit:
+            return None if case.skip else (case, fit[name])
     return None
 
 
@@ -153,19 +155,23 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
 
         return parse_robot(tomli_w.dumps(table), where=path), ()
     for key in table:
-        if key not in ("name", "gravity"):
-            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, ('name', 'gravity'))}", where=path,
-                             remedy="beside use, name and gravity can be given; write the rest in the description")
+        if key not in _BESIDE_USE:
+            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, _BESIDE_USE)}", where=path,
+                             remedy=f"beside use, {', '.join(_BESIDE_USE)} can be given; write the rest in the description")
+    tip = table.get("tip_link")
+    if not isinstance(tip, str | None):
+        raise UsageError("C02", "'robot.tip_link' must name a link", where=path, remedy="write tip_link = \"last link\"")
     if not isinstance(use, str) or not use.strip():
         raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path,
                          remedy="fill it in")
+    use, after_colon = split_tip(use)
     found = next((place / use for place in (folder, path.parent) if (place / use).is_file()), None)
     if found is None and Path(use).suffix and use not in shipped_names("robots"):
         places = " nor ".join(dict.fromkeys((f"in {folder}", f"in {path.parent}")))
         raise UsageError("C04", f"the robot '{use}' that the recipe names lies neither {places}" if folder != path.parent
                          else f"the robot '{use}' that the recipe names does not lie in {folder}", where=path,
                          remedy="copy it to the recordings, give their folder with --source, or another robot with --robot")
-    robot = load_robot(found if found is not None else use)
+    robot = load_robot(found if found is not None else use, tip or after_colon)
     files = () if found is None else (found,)
     if "name" in table:
         robot = replace(robot, name=str(table["name"]))

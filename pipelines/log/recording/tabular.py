@@ -24,6 +24,7 @@ Line = tuple[int, str]
 
 _MOST_DAMAGED = 10  # lines
 _DAMAGED_SHARE = 1e-3
+_WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
 
@@ -39,6 +40,9 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     if not lines:
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy="record again, or copy the file again")
     dialect = find_dialect(lines, source, given)
+    if dialect.width > _WIDEST:
+        raise InputRejected("F16", f"{dialect.width} cells in a line, {dialect.words}: not a table of columns", where=source,
+                            remedy="give delimiter and decimal under [format], or one row a sample")
     if (dialect.delimiter, dialect.decimal) not in ((",", "."), ("\t", "."), ("", ".")) and given.delimiter is None:
         checks.append(Check.of("F16", "warn", f"read as: {dialect.words}", where=source, remedy="say so under [format] to be sure"))
     names, units, body = _header(lines, text, dialect, source, given, checks)
@@ -57,8 +61,9 @@ def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     """Columns "q_1", "q_2", … may be asked for together as "q"."""
     groups: dict[str, list[str]] = {}
     for name in names:
-        if found := re.fullmatch(r"(.*?)_?(\d+)", name):
-            groups.setdefault(found.group(1), []).append(name)
+        stem = name.rstrip("0123456789")
+        if stem != name:
+            groups.setdefault(stem.removesuffix("_"), []).append(name)
     return {stem: tuple(found) for stem, found in groups.items()}
 
 
@@ -103,9 +108,10 @@ def _named(cells: tuple[str, ...], source: str, line: int) -> tuple[tuple[str, .
     """S03: names and units; two columns of one name are refused, both named."""
     pairs = [header_unit(cell) for cell in cells]
     names = tuple(name or f"column_{j + 1}" for j, (name, _) in enumerate(pairs))
+    first: dict[str, int] = {}
     for j, name in enumerate(names):
-        if name in names[:j]:
-            raise InputRejected("S03", f"columns {names.index(name) + 1} and {j + 1} are both named '{name}'",
+        if first.setdefault(name, j) != j:
+            raise InputRejected("S03", f"columns {first[name] + 1} and {j + 1} are both named '{name[:80]}'",
                                 where=f"{source}, line {line}",
                                 remedy="rename one of them in the file")
     return names, {name: unit for name, (_, unit) in zip(names, pairs, strict=True) if unit}
