@@ -3,8 +3,8 @@
     python -m benchmarks.recorded_estimates ../shared/real
 
 Fixed rows: the torque of the model and of the log through a zero-phase low-pass of 10 Hz, all
-samples but for what the README of the logs cuts, whatever the program filters or leaves out
-itself. Of kr300 each log is held out once, and the mean is quoted.
+samples but the cuts of the README of the logs, regardless of the program's own filter and rows.
+Of kr300 each log is held out once, and the mean is quoted.
 """
 
 from __future__ import annotations

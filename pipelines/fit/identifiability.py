@@ -23,7 +23,8 @@ from pipelines.fit.equations import Array
 from pipelines.fit.least_squares import Solution
 from pipelines.fit.statistics import Statistics
 
-__all__ = ["Direction", "Separation", "Unresolved", "condition_number", "hard_to_see", "not_separated", "resolved_rank", "typical_size", "unresolved",
+__all__ = ["Direction", "Separation", "Unresolved", "condition_number", "hard_to_see", "not_separated",
+           "resolved_rank", "typical_size", "unresolved",
            "visibility", "visible"]
 
 _WHOLE = 3.0  # a direction is lost if three standard deviations of it are as large as all that was measured
@@ -153,9 +154,9 @@ def not_separated(solution: Solution, std: Array, names: Sequence[str],
     weak = shares[values[0] / floor >= config.index]
     power = np.square(solution.scale * np.where(np.isfinite(std), std, np.inf))  # of its torque, in units of the residual's
     uncertain = power >= config.torque**2 * solution.errors.samples
-    members = np.flatnonzero((weak.sum(axis=0) >= config.share) & uncertain & solution.acting) if len(weak) else []
+    members = np.flatnonzero((weak.sum(axis=0) >= config.share) & uncertain & solution.acting)
     groups: list[tuple[set[int], set[int]]] = []  # parameters, dependencies
-    for k in members:
+    for k in members.tolist():
         own, dependencies = {int(k)}, set(np.flatnonzero(weak[:, k] >= config.linked).tolist())
         for group in [g for g in groups if g[1] & dependencies]:
             groups.remove(group)

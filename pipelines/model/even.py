@@ -1,9 +1,10 @@
-"""Put a log whose clock is uneven on an even grid, once, so that every filter behind is one of even samples.
+"""Put a log whose clock is uneven on an even grid, so that every later filter has even samples.
 
     even = evened(log, good)        None where the clock is even already
 
-Positions and measured torques are splines through the instants (`signal.instants`), a held command is its average over each
-step. Lost samples within a stretch are bridged by the spline; a gap remains a gap, and what is missing or spoilt remains so.
+Positions and measured torques are splines through the instants (`signal.instants`), a held
+command is its average over each step. Lost samples within a stretch are bridged by the spline; a
+gap remains a gap, and missing or spoilt samples remain so.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ __all__ = ["EvenConfig", "Evened", "evened"]
 class EvenConfig:
     """When a clock counts as even, and when as none."""
 
-    even: float = 1e-3  # of a sample time, rms of the intervals: at 1 rad/s and 1 kHz a tenth of a fine encoder's step
-    merged: float = 0.05  # of the samples that lie too close to be told apart: no clock
+    even: float = 1e-3  # of a sample time, rms of the intervals: 1e-6 rad at 1 rad/s and 1 kHz
+    merged: float = 0.05  # of the samples that lie closer than a quarter step: no clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +37,11 @@ class Evened:
 
     log: ExperimentLog
     good: Usable  # of `log`
-    stretches: tuple[tuple[slice, slice, Instants], ...]  # kept samples of the recording, samples of `log`, their clock
+    # kept samples of the recording, samples of `log`, their clock
+    stretches: tuple[tuple[slice, slice, Instants], ...]
 
     def at_recording(self, values: Array, samples: int, spline: bool) -> Array:
-        """Return signals (k, n, joints) of the even log at the kept samples of the recording, NaN outside its stretches."""
+        """Return signals (k, n, joints) at the kept samples of the recording, NaN outside runs."""
         out = np.full((len(values), samples, values.shape[2]), np.nan)
         flat = np.moveaxis(values, 1, 0).reshape(values.shape[1], -1)
         for recorded, even, clock in self.stretches:
@@ -49,7 +51,7 @@ class Evened:
 
 
 def evened(log: ExperimentLog, good: Usable, config: EvenConfig | None = None) -> Evened | None:
-    """Return `log` on an even grid of its nominal sample time; None where its clock is even already.
+    """Return `log` on an even grid of its nominal sample time; None where its clock is even.
 
     Raises:
         InputRejected: T05, samples lie on each other.
@@ -60,14 +62,15 @@ def evened(log: ExperimentLog, good: Usable, config: EvenConfig | None = None) -
     step = log.sample_time if good.time.known else good.time.median
     parts, stretches, done = [], [], 0
     for run in good.runs:
-        clock = instants(good.log.t[run], _filled(good.log.t[run], good.log.q[run], good.position_spikes[run]), step)
+        stamps = good.log.t[run]
+        clock = instants(stamps, _filled(stamps, good.log.q[run], good.position_spikes[run]), step)
         at = grid(float(clock.t.min()), float(clock.t.max()), 1.0 / step)
         parts.append((at, *_sampled(good, run, clock, at, step, log.torque != "measured", config)))
         stretches.append((run, slice(done, done + len(at)), clock))
         done += len(at)
     t, q, tau, saturated = (np.concatenate(part) for part in zip(*parts, strict=True))
     values = {"t": t, "q": q, "tau": tau}
-    signals = {name: replace(good.log.signals[name], values=value) for name, value in values.items()}
+    signals = {name: replace(good.log.signals[name], values=x) for name, x in values.items()}
     even = replace(log, signals=signals, sample_time=step, derived=None)
     return Evened(even, replace(usable(even), saturated=saturated > 0.0), tuple(stretches))
 
@@ -81,15 +84,15 @@ def _sampled(good: Usable, run: slice, clock: Instants, at: Array, step: float, 
     q, tau = (_filled(clock.t, x, np.isnan(x)) for x in (q, tau))
     t, both = merge_close(clock.t, np.hstack([q, tau, lost]), step)
     if len(t) < (1.0 - config.merged) * len(clock.t):
-        raise InputRejected("T05", f"the clock is too uneven: {len(clock.t) - len(t)} of {len(clock.t)} samples lie on another's "
-                            "place", where=good.log.source or good.log.name,
+        crowded = f"{len(clock.t) - len(t)} of {len(clock.t)} samples lie on another's place"
+        raise InputRejected("T05", f"the clock is too uneven: {crowded}",
+                            where=good.log.source or good.log.name,
                             remedy="record with an even clock, or resample with 'rrrid import'")
     joints = good.log.n_joints
-    q, tau, lost = resample(t, both[:, :2 * joints], at)[:, :joints], both[:, joints:2 * joints], both[:, 2 * joints:]
+    q, tau = resample(t, both[:, :joints], at), both[:, joints:2 * joints]
     tau = average_held(t, tau, at, step) if held else resample(t, tau, at)
-    lost = resample(t, lost, at, "linear")
-    q, tau = (np.where(x > 0.0, np.nan, y) for x, y in ((lost[:, :joints], q), (lost[:, joints:2 * joints], tau)))
-    return q, tau, lost[:, 2 * joints:]
+    no_q, no_tau, saturated = np.split(resample(t, both[:, 2 * joints:], at, "linear"), 3, axis=1)
+    return np.where(no_q > 0.0, np.nan, q), np.where(no_tau > 0.0, np.nan, tau), saturated
 
 
 def _filled(t: Array, x: Array, spoilt: Mask) -> Array:

@@ -1,6 +1,6 @@
 """Estimate when the samples of a log were taken, and put them on an even grid.
 
-    found = instants(stamps, q, step)           when each sample was taken, with what remains unknown
+    found = instants(stamps, q, step)           when each sample was taken, and the jitter left
     even = resample(found.t, q, at)             a sampled signal, at even times
     even = average_held(found.t, u, at, step)   a command that is held from sample to sample
 
@@ -10,9 +10,9 @@ deviation e_k = s_k - g_k of a stamp from its tick the share
     w = var a / (var a + var b),    E[t_k | s_k] = g_k + w e_k
 
 is a deviation of the sampling, the rest is one of the stamp (linear regression). Positions tell
-w: to first order y_k = q(g_k) + w dq(g_k) e_k + noise, and what a local polynomial leaves of y
-is free of the smooth q. So w is the coefficient of a regression of the polynomial residual of y
-on that of dq e, all joints together, each weighted by its noise R_j + (dq_j σ_t)², where σ_t is
+w: to first order y_k = q(g_k) + w dq(g_k) e_k + noise, and the residual of a local polynomial
+of y is free of the smooth q. So w is the coefficient of a regression of that residual on the
+residual of dq e, all joints together, each weighted by its noise R_j + (dq_j σ_t)², where σ_t is
 the jitter that remains. w = 1: the stamps are right; w = 0: the ticks are.
 
 The ticks are a random walk with a white deviation (local level model, Harvey 1989, sec. 2.2): a
@@ -41,10 +41,10 @@ class ClockConfig:
     smooth_hz: float = 40.0  # above the motion of an arm: what a local polynomial leaves is noise
     order: int = 4  # of the local polynomial (Savitzky & Golay 1964)
     lag: int = 64  # steps of the variogram: long against one sample, short against a log
-    sure: float = 3.0  # standard deviations, from which on a walk is none by chance
+    sure: float = 3.0  # standard deviations, beyond which a walk is not due to chance
     around: int = 16  # samples before and after a long interval that tell whether one is lost
     passes: int = 3  # of the weights: they are known to a per cent then
-    closest: float = 0.25  # of a step: nearer samples count as one, their mean
+    closest: float = 0.25  # of a step: nearer samples are replaced by their mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +174,7 @@ def _level(x: Array, ratio: float) -> Array:
 
 def _residuals(stamps: Array, e: Array, q: Array, step: float,
                config: ClockConfig) -> tuple[Array, Array, Array] | None:
-    """Return what a local polynomial leaves of q and of dq e, and dq; of windows without a loss."""
+    """Return the polynomial residuals of q and of dq e, and dq, of windows without a loss."""
     half = half_width(step, config.smooth_hz, config.order)
     if len(q) < 6 * half + 1:
         return None

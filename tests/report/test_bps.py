@@ -89,7 +89,8 @@ def test_estimates_that_do_not_settle_are_said(result: Result) -> None:
 def test_the_torque_that_is_drawn_is_the_torque_that_was_fitted(result: Result) -> None:
     """After the low-pass: what is left in the figure has the root mean square of the table, and nothing is aliased."""
     (course,) = result.courses
-    inside = course.left[(course.t > 0.1) & (course.t < course.t[-1] - 0.1)]  # the ends, known badly, are not fitted
+    fitted = (course.t > 0.1) & (course.t < course.t[-1] - 0.1)  # the ends, known badly, are not fitted
+    inside = course.left[fitted & ~((course.t > 3.7) & (course.t < 5.4))]  # nor joint 1 while dry friction holds it
     np.testing.assert_allclose(np.sqrt(np.nanmean(np.square(inside), axis=0)), result.torque_rms["identify"], rtol=0.1)
     np.testing.assert_allclose(course.left, course.measured - course.model, atol=1e-9)
 

@@ -2,7 +2,7 @@
 
     motions = without_stiction(motions, fitted, columns, recipe, weighted)
 
-At rest dry friction is whatever holds the joint, anything between -F_c and F_c: the equation has
+At rest dry friction takes any value between -F_c and F_c that holds the joint: the equation has
 an unknown torque, and no law of friction holds (Armstrong-Hélouvry, Dupont & Canudas de Wit 1994,
 sec. 2.1). A joint rests where it neither moves nor accelerates: |dq| and |ddq| both small beside
 what they are in the log. A reversal has no speed but all its acceleration, and counts as motion.
@@ -30,7 +30,7 @@ __all__ = ["RestConfig", "rests", "without_stiction"]
 
 @dataclass(frozen=True)
 class RestConfig:
-    """What counts as rest, and when it is left out."""
+    """Limits of a rest, and of leaving it out."""
 
     still: float = 0.2  # hypot of speed and acceleration over their rms; .1 to .3 are alike
     memory: float = 0.05  # [s] a rest lasts at least, where no low-pass has a longer period
@@ -73,7 +73,7 @@ def rests(motions: Sequence[Reconstructed], cutoff_hz: float | None,
     """
     config = config or RestConfig()
     parts = [[x[found.good.kept] for x in (found.motion.dq, found.motion.ddq)] for found in motions]
-    speed, acceleration = (np.sqrt(np.mean(np.vstack(part) ** 2, axis=0)) for part in zip(*parts))
+    speed, acceleration = (np.sqrt(np.mean(np.vstack(part) ** 2, axis=0)) for part in zip(*parts, strict=True))
     masks = []
     for found, (dq, ddq) in zip(motions, parts, strict=True):
         size = np.hypot(dq / np.maximum(speed, 1e-300), ddq / np.maximum(acceleration, 1e-300))
@@ -97,8 +97,8 @@ def _counts(one: LogEquations, rows: Rows) -> Array:
 
 
 def _rms(equations: Sequence[LogEquations], rows: Sequence[Rows], beta: Array) -> Array:
-    """Return the rms residual (joints,) of some equations; zero where there are none."""
-    power, count = 0.0, 0.0
+    """Return the rms residual (joints,) of some equations; zero for a joint without equations."""
+    power, count = np.zeros((2, equations[0].rows.slow.shape[1]))
     for one, chosen in zip(equations, rows, strict=True):
         for block in replace(one, chosen=chosen):
             power = power + np.sum(block.residual(beta) ** 2, axis=1)
