@@ -1,10 +1,12 @@
-"""Judge the torque boundary on random machines: which of its fields are right, and how often it is wrong about a whole torque.
+"""Judge the torque boundary on random machines: which of its fields are right, and how often it is
+wrong about a whole torque.
 
     python -m benchmarks.torque_boundary --count 200 --first 5000 --out boundary.jsonl
 
-Machines have 3 to 7 joints of several families, links, drives, friction laws and motions at random; their torques are Pinocchio's.
-Each is logged whole, without gravity, without friction, as magnitudes, on a wall, under a ceiling, with y up, and with permuted
-joints; beside them healthy and faulty machines on which nothing may be claimed. A file of results is continued.
+Machines have 3 to 7 joints of several families, links, drives, friction laws and motions at
+random; their torques are Pinocchio's. Each is logged whole, without gravity, without friction, as
+magnitudes, on a wall, under a ceiling, with y up, and with permuted joints; beside them healthy
+and faulty machines on which nothing may be claimed. A file of results is continued.
 """
 
 from __future__ import annotations
@@ -438,7 +440,9 @@ def _log(machine: Machine, q: Array, tau: Array) -> ExperimentLog:
 
 
 def _vertical(machine: Machine, gravity: Array) -> bool:
-    """Whether this gravity puts nothing but constants on all joints: no log of this motion can tell it."""
+    """Whether this gravity puts nothing but constants on all joints: no log of this motion can tell
+    it.
+    """
     some = slice(None, None, max(1, len(machine.t) // 200))
     still = 0 * machine.q[some]
     pulled = _inverse_dynamics(machine.robot, machine.q[some], still, still, gravity)
@@ -449,7 +453,9 @@ def _vertical(machine: Machine, gravity: Array) -> bool:
 
 
 def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
-    """Return what is right of the boundary of one log: of each field "right", "wrong" or "null", and "false" claims."""
+    """Return what is right of the boundary of one log: of each field "right", "wrong" or "null",
+    and "false" claims.
+    """
     log, truth = case(seed, kind, fault)
     began = process_time()
     found = torque_boundary([log])
@@ -528,7 +534,7 @@ def table(results: Iterable[dict[str, Any]]) -> str:
         said = [r[field] for r in rows if field in r and r["fault"] == "healthy"]
         lines.append(
             _rate(f"{field} right", sum(s == "right" for s in said), len(said))
-            + f", wrong {sum(s == 'wrong' for s in said)}, null {sum(s == 'not told' for s in said)}"
+            + f", wrong {said.count('wrong')}, null {said.count('null')}"
         )
     for kind in KINDS[1:]:
         own = [r for r in rows if r["kind"] == kind and "gate" in r]

@@ -89,7 +89,8 @@ def _direction(boundary: Boundary) -> Row:
             direction.reason,
         ), "bad" if boundary.turned else "neutral"
     vector = ", ".join(f"{x + 0.0:.2f}" for x in direction.vector)
-    remark = f"{math.degrees(direction.angle):.1f} ± {math.degrees(direction.std):.1f} degrees from the description"
+    angle, std = math.degrees(direction.angle), math.degrees(direction.std)
+    remark = f"{angle:.1f} ± {std:.1f} degrees from the description"
     return ("gravity [m/s^2]", f"[{vector}]", remark), "bad" if boundary.turned else "neutral"
 
 

@@ -1,4 +1,6 @@
-"""The torque boundary on field cases and recorded robots: what is wrong is named with its repair, what is right is left alone."""
+"""The torque boundary on field cases and recorded robots: what is wrong is named with its repair,
+what is right is left alone.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +95,8 @@ def test_a_field_case_is_named_and_refused_with_its_repair(
         (diagnose.STAGE, diagnose.Settings()),
     ):
         with pytest.raises(InputRejected) as refused:
-            run_stage(stage, Request((logs,), tmp_path / stage.name, no_report=True), settings)  # type: ignore[arg-type]
+            # type: ignore[arg-type]
+            run_stage(stage, Request((logs,), tmp_path / stage.name, no_report=True), settings)
         assert refused.value.code == code
         assert "--allow-mismatch" in refused.value.remedy
 

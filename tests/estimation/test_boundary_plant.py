@@ -12,7 +12,9 @@ SEEDS = (103, 108, 115)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_field_is_wrong_and_what_is_told_is_what_was_logged(seed: int, kind: str) -> None:
-    """Sign, gravity, friction, direction and order; the gate closes where the description is mistaken, and nowhere else."""
+    """Sign, gravity, friction, direction and order; the gate closes where the description is
+    mistaken, and nowhere else.
+    """
     found = judged(seed, kind)
     assert [
         field

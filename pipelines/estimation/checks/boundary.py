@@ -1,10 +1,11 @@
-"""Estimate what the logged torque is: its sign, its gravity and friction, and the order of its joints.
+"""Estimate what the logged torque is: sign, gravity, friction, and order of the joints.
 
     boundary = torque_boundary([log, …])        None where no log moves the arm enough to tell
 
-Gravity along another axis, a torque without gravity and one with a share of it are one question: which gravity vector explains the
-torque of all joints by one set of links (`gravity_fit`)? A description is left only for another that decides: its likelihood, after
-the residual's correlation is counted, is far larger, and it leaves hardly more than rows with parameters of their own.
+Gravity along another axis, a torque without gravity and one with a share of it are one question:
+which gravity vector explains the torque of all joints by one set of links (`gravity_fit`)? The
+description is rejected only where another gravity, or order, is decisively more likely after the
+residual's correlation is counted, and leaves less than half of the residual power.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ _HELD = 0.02  # of the travel of the joint that moves most: a joint that moves l
 
 @dataclass(frozen=True)
 class Share:
-    """Share of a part of the torque; of gravity 1 is all of it, of friction the share of the torque's RMS."""
+    """Share of a part of the torque; of gravity 1 is all of it, of friction the share of the
+    torque's RMS.
+    """
 
     share: float | None  # of all joints; null: not identifiable
     std: float | None  # standard deviation of `share`
@@ -88,7 +91,8 @@ class JointOrder:
     columns: (
         tuple[int, ...] | None
     )  # column of the log, from 1, that each joint has; null: not identifiable
-    signal: str  # signals whose columns are out of order: "q and tau", "q" or "tau"; empty where none is
+    # signals whose columns are out of order: "q and tau", "q" or "tau"; empty where none is
+    signal: str
     before: float | None = None  # residual over the torque with the columns as logged
     after: float | None = None  # residual over the torque with the columns in order
     reason: str = ""  # why a value is not identifiable; else empty
@@ -278,9 +282,8 @@ def _estimated(
     described = np.array(robot.gravity)
     rows = _thinned(motions, config.rows)
     fits = _fits(arm, rows, described, config)
-    evidence = [
-        f"the torque of joint {', '.join(str(j + 1) for j, count in enumerate(touches) if count is None)} changes its sign"
-    ]
+    signed = [str(j + 1) for j, count in enumerate(touches) if count is None]
+    evidence = [f"the torque of joint {', '.join(signed)} changes its sign"]
     order, fits = _ordered(arm, motions, rows, fits, described, config)
     if order.signal:
         evidence.append(
@@ -369,7 +372,9 @@ def _under(rows: TorqueRows, described: Array, config: BoundaryConfig) -> tuple[
 
 
 def _gain(logged: _Fits, other: GravityFit, effective: Array, column: ColumnOrder) -> float:
-    """Log likelihood of the other order beyond that of the logged one, by each torque's number of independent moments."""
+    """Log likelihood of the other order beyond that of the logged one, by each torque's number of
+    independent moments.
+    """
     taken = list(column.order) if "tau" in column.signal else list(range(len(column.order)))
     moments = np.minimum(logged.model.effective[taken], effective)
     return 0.5 * float(moments @ np.log(logged.best.variance[taken] / other.variance))
@@ -378,7 +383,9 @@ def _gain(logged: _Fits, other: GravityFit, effective: Array, column: ColumnOrde
 def _gravity(
     fits: _Fits, described: Array, config: BoundaryConfig
 ) -> tuple[Share, Direction, bool, bool]:
-    """Return share and direction of the gravity, whether it is absent, and whether it is turned from the described one."""
+    """Return share and direction of the gravity, whether it is absent, and whether it is turned
+    from the described one.
+    """
     model, best = fits.model, fits.best
     vector = best.gravity[0]
     size = float(np.linalg.norm(vector))
@@ -455,7 +462,9 @@ def _gravity(
 def _present(
     top: GravityFit, none: GravityFit, share: tuple[float, float] | None, config: BoundaryConfig
 ) -> bool | None:
-    """Return whether the torque holds gravity: by its share, and by the fits of gravity of its whole size and of zero gravity."""
+    """Return whether the torque holds gravity: by its share, and by the fits of gravity of its
+    whole size and of zero gravity.
+    """
     half = float(np.sum(top.residual**2)) < config.explained * float(np.sum(none.residual**2))
     if share is None:
         return True if half and top.score > none.score + config.decisive else None
@@ -516,7 +525,9 @@ def _each_joint(
 
 
 def _direction_spread(fits: _Fits, config: BoundaryConfig) -> tuple[float | None, str]:
-    """Standard deviation [rad] by the profile of the likelihood, in the least certain direction; or the reason why it is not identifiable."""
+    """Standard deviation [rad] by the profile of the likelihood, in the least certain direction; or
+    the reason why it is not identifiable.
+    """
     top, model = fits.turned[0], fits.model
     possible = _possible(model, top)
     if any(
@@ -538,9 +549,10 @@ def _direction_spread(fits: _Fits, config: BoundaryConfig) -> tuple[float | None
 
 
 def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
-    """The share of friction: of each joint the power that it takes, over the RMS of torque and speed.
+    """The share of friction: of each joint the power that it takes, over the RMS of torque and
+    speed.
 
-    s_j = <τ_f v> / (rms τ · rms v)        linear in the coefficients, signed, independent of the friction law
+    s_j = <τ_f v> / (rms τ · rms v)        linear, signed, for any friction law
     """
     model = fits.model
     rows = model.rows
@@ -592,7 +604,8 @@ def _in_words(fits: _Fits, gravity: Share, friction: Share) -> list[str]:
         fits.rms,
     )
     said = [
-        f"residual over the torque: {rms[0]:.2g} with gravity as described, {rms[1]:.2g} with none, {rms[2]:.2g} with the best"
+        f"residual over the torque: {rms[0]:.2g} with gravity as described, "
+        f"{rms[1]:.2g} with none, {rms[2]:.2g} with the best"
     ]
     if gravity.share is not None and gravity.std is not None:
         said.append(
@@ -600,7 +613,8 @@ def _in_words(fits: _Fits, gravity: Share, friction: Share) -> list[str]:
         )
     if friction.share is not None and friction.upper is not None:
         said.append(
-            f"friction takes {100 * friction.share:.1f} % of torque times speed, at most {100 * friction.upper:.1f} %"
+            f"friction takes {100 * friction.share:.1f} % of torque times speed, "
+            f"at most {100 * friction.upper:.1f} %"
         )
     return said
 

@@ -1,7 +1,8 @@
 """Find the order of the columns that a log's motion and torque fit.
 
-Every order is scored by the likelihood of the whole arm under its described gravity, on a few moments. Orders of positions and
-torques together come from columns that are named otherwise than the joints; orders of either alone from a column map.
+Every order is scored by the likelihood of the whole arm under its described gravity, on a few
+moments. Orders of positions and torques together come from columns that are named otherwise than
+the joints; orders of either alone from a column map.
 """
 
 from __future__ import annotations
@@ -84,7 +85,9 @@ class _Scorer:
                 self.known[order] = self._normal(order, columns)
 
     def _normal(self, order: Order, columns: Array) -> tuple[Array, Array, Array]:
-        """Per joint: Gram matrix (n, p, p), products with every torque (n, p, n), power of every torque (n, n)."""
+        """Per joint: Gram matrix (n, p, p), products with every torque (n, p, n), power of every
+        torque (n, n).
+        """
         moments, n, p = columns.shape
         gram, cross, power = np.empty((n, p, p)), np.empty((n, p, n)), np.empty((n, n))
         for j, k in enumerate(order):
@@ -95,7 +98,9 @@ class _Scorer:
         return gram, cross, power
 
     def score(self, q_order: Order, tau_order: Order) -> float:
-        """Log likelihood a moment of an order of the positions, of those prepared, and one of the torques."""
+        """Log likelihood a moment of an order of the positions, of those prepared, and one of the
+        torques.
+        """
         gram, cross, power = self.known[q_order]
         n = len(q_order)
         right = cross[np.arange(n), :, list(tau_order)]
@@ -123,13 +128,15 @@ def search_orders(
 ) -> tuple[ColumnOrder, ...]:
     """Return the best orders that score better than the logged one, best first.
 
-    Exchanges of two columns come first; only where one of them fits better than the log, or `every` is asked for, all others.
+    Exchanges of two columns come first; only where one of them fits better than the log, or
+    `every` is asked for, all others.
 
     Args:
         motion: some hundred moments.
         gravity: (3,) [m/s^2] under which orders are compared.
         moving: joints that move; the others keep their place.
-        config: how many are returned at most; moments that all orders of many joints are compared with; whether to try every order.
+        config: how many are returned at most; moments that all orders of many joints are compared
+        with; whether to try every order.
     """
     keep, few, every = config
     same: Order = tuple(range(motion.q.shape[1]))
@@ -177,7 +184,9 @@ def _scores(scorer: _Scorer, signal: str, orders: Sequence[Order]) -> dict[Order
 
 
 def _all_of(scorer: _Scorer, signal: str, same: Order, moving: Sequence[int]) -> dict[Order, float]:
-    """Scores of every order of one kind; of many joints, of those that exchanges of two columns reach."""
+    """Scores of every order of one kind; of many joints, of those that exchanges of two columns
+    reach.
+    """
     if len(moving) <= _ALL_UP_TO[signal]:
         return _scores(scorer, signal, _placed(same, moving))
     known, beam = _scores(scorer, signal, [same]), [same]

@@ -46,7 +46,8 @@ def boundary_findings(boundary: Boundary | None, where: str) -> tuple[Check, ...
                 f"± {boundary.gravity.std:.2f}",
                 where=where,
                 gate=True,
-                remedy="log the torque with the gravity compensation in it, or write gravity = [0, 0, 0] in the robot's "
+                remedy="log the torque with the gravity compensation in it, or write "
+                "gravity = [0, 0, 0] in the robot's "
                 "description",
             ),
         )
@@ -79,7 +80,8 @@ def _order(order: JointOrder, where: str) -> Check:
         f"{order.signal}: columns {columns} fit {how}, {residual}",
         where=where,
         gate=True,
-        remedy="put the columns in the order of the robot's joints: correct the column map of the import",
+        remedy="put the columns in the order of the robot's joints: correct the column map "
+        "of the import",
     )
 
 
@@ -92,7 +94,8 @@ def _turned(boundary: Boundary, where: str) -> Check:
     return Check.of(
         "S24",
         "warn",
-        f"gravity points elsewhere: the torque has gravity = {told}{known}, the description {described}",
+        f"gravity points elsewhere: the torque has gravity = {told}{known}, "
+        f"the description {described}",
         where=where,
         gate=True,
         remedy=f"write gravity = {told} in the robot's description, or correct its base frame",

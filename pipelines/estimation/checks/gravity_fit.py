@@ -2,9 +2,10 @@
 
     min over a, φ, f of  Σ_j ν_j/2 log mean (τ_j - (Y_0j + Σ_k a_jk Y_kj) φ - F_j f_j)²
 
-Joints have unknown noise, so the likelihood is concentrated in it. What a joint has for itself is projected out once (Frisch &
-Waugh 1933); φ is projected out at every a (Golub & Pereyra 1973), with Kaufman's Jacobian. Everything is made of one Gram matrix a
-joint, so that a trial of another a costs less than a millisecond.
+Joints have unknown noise, so the likelihood is concentrated in it. What a joint has for itself is
+projected out once (Frisch & Waugh 1933); φ is projected out at every a (Golub & Pereyra 1973),
+with Kaufman's Jacobian. Everything is made of one Gram matrix a joint, so that a trial of another
+a costs less than a millisecond.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ _STEPS = 30
 _ENOUGH = 1e-4  # gain in log likelihood a step, below which the fit has ended
 _ROUNDS = 12  # of reweighting by each joint's own residual at most
 _SETTLED = 3e-3  # change of the logarithm of a variance, at which reweighting ends
-LOOSE = 30.0  # [m/s^2] standard deviation of each component before any data: three times g, so that what no data tell stays finite
+# [m/s^2] standard deviation of each component before any data: three times g, so that what no data
+# tell stays finite
+LOOSE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,9 @@ class GravityModel:
         ]
 
     def fit(self, gravity: Array, variance: Array | None = None) -> GravityFit:
-        """Fit the parameters under `gravity`, (3,) or of each joint (n, 3), from the `variance` (n,) of a fit nearby."""
+        """Fit the parameters under `gravity`, (3,) or of each joint (n, 3), from the `variance`
+        (n,) of a fit nearby.
+        """
         each = np.broadcast_to(gravity, (self.rows.n_joints, 3))
         variance = np.ones(len(each)) if variance is None else variance
         for _ in range(_ROUNDS):
@@ -115,8 +120,8 @@ class GravityModel:
         return fit.parameters * np.where(np.isfinite(self.scale), self.scale, 0.0)
 
     def curvature(self, fit: GravityFit, groups: Array) -> tuple[Array, Array]:
-        """Gradient and Hessian of the log likelihood over the gravity, the parameters projected out; its sign such that a step is
-        the Hessian's inverse times the gradient.
+        """Gradient and Hessian of the log likelihood over the gravity, the parameters projected
+        out; its sign such that a step is the Hessian's inverse times the gradient.
 
         Args:
             groups: (k, n, 3) directions in which the joints' gravity is changed.
@@ -164,7 +169,9 @@ class GravityModel:
         )
 
     def search(self, start: Array, groups: Array) -> GravityFit:
-        """Fit the gravity as well, from `start` (n, 3), along `groups` (k, n, 3), by Levenberg-Marquardt steps."""
+        """Fit the gravity as well, from `start` (n, 3), along `groups` (k, n, 3), by Levenberg-
+        Marquardt steps.
+        """
         best, damping = self.fit(start), 1e-3
         for _ in range(_STEPS):
             slope, hessian = self.curvature(best, groups)
@@ -204,7 +211,9 @@ class GravityModel:
         return best
 
     def rigid(self, joint: int, fit: GravityFit) -> Array:
-        """(N, p) equilibrated columns of the rigid body under the gravity of `fit`, own columns projected out."""
+        """(N, p) equilibrated columns of the rigid body under the gravity of `fit`, own columns
+        projected out.
+        """
         return np.asarray(self.projected[joint, :, :-1] @ self._transform(fit.gravity[joint]))
 
     def residuals(self, fit: GravityFit) -> Array:
@@ -216,5 +225,7 @@ class GravityModel:
 
 
 def _ridge(normal: Array) -> Array:
-    """Return the ridge (p, p) that keeps a normal matrix of equilibrated columns invertible, also where all are zero."""
+    """Return the ridge (p, p) that keeps a normal matrix of equilibrated columns invertible, also
+    where all are zero.
+    """
     return _RIDGE * max(float(np.trace(normal)) / len(normal), 1.0) * np.eye(len(normal))

@@ -1,9 +1,9 @@
 """Estimate the spread of a fit whose residual is correlated and partly an error of the model.
 
-    Cov = H⁻¹ (Σ_b s_b s_bᵀ) H⁻¹        s_b: score of a block of time over all joints (Liang & Zeger 1986)
+    Cov = H⁻¹ (Σ_b s_b s_bᵀ) H⁻¹        s_b: score of a block of time (Liang & Zeger 1986)
 
-That holds under correlation of any kind within the blocks. Where it is smaller, the variance of as many independent moments as the
-residual's correlation leaves is used instead.
+That holds under correlation of any kind within the blocks. Where it is smaller, the variance of as
+many independent moments as the residual's correlation leaves is used instead.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ _BLOCKS = 20  # of all logs together
 
 
 def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
-    """Return the number of independent moments (n,) of residuals (n, N), `starts` the first of each log.
+    """Return the number of independent moments (n,) of residuals (n, N), `starts` the first of
+    each log.
 
     ν = N / (1 + 2 Σ ρ_k), summed over the initial positive pairs of the autocorrelation (Geyer 1992).
     """
@@ -42,7 +43,9 @@ def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
 
 
 def gravity_spread(model: GravityModel, fit: GravityFit, groups: Array) -> Array:
-    """Return the covariance (k, k) of the gravity's changes along `groups` (k, n, 3), all else fitted with it."""
+    """Return the covariance (k, k) of the gravity's changes along `groups` (k, n, 3), all else
+    fitted with it.
+    """
     k = len(groups)
     designs = [
         np.concatenate([_pulls(model, fit, j) @ groups[:, j].T, model.rigid(j, fit)], axis=1)
@@ -56,7 +59,9 @@ def gravity_spread(model: GravityModel, fit: GravityFit, groups: Array) -> Array
 
 
 def friction_spread(model: GravityModel, fit: GravityFit) -> tuple[Array, Array]:
-    """Return the own coefficients (n, c) of all joints and their covariance (n c, n c), the gravity that of `fit`."""
+    """Return the own coefficients (n, c) of all joints and their covariance (n c, n c), the gravity
+    that of `fit`.
+    """
     rows = model.rows
     n, moments, p = rows.inertial.shape
     c = rows.own.shape[2]

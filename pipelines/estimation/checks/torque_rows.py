@@ -2,9 +2,10 @@
 
     τ_j = (Y_0j + Σ_k a_jk Y_kj) φ + F_j f_j        j: joint, k: x, y, z of the base
 
-The regressor is linear in the gravity vector a [m/s^2] (Atkeson, An & Hollerbach 1986, eq. (9)): Y_0 is the regressor without
-gravity, Y_k what a gravity of 1 m/s^2 along axis k adds. φ are the base parameters of the arm under gravity from anywhere, F the
-columns that a joint has for itself: rotor inertia, friction and an offset.
+The regressor is linear in the gravity vector a [m/s^2] (Atkeson, An & Hollerbach 1986, eq. (9)):
+Y_0 is the regressor without gravity, Y_k what a gravity of 1 m/s^2 along axis k adds. φ are the
+base parameters of the arm under gravity from anywhere, F the columns that a joint has for itself:
+rotor inertia, friction and an offset.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ class TorqueRows:
     gravity: Array  # Y_k (n, N, 3, m) [per m/s^2]
     heavy: npt.NDArray[np.intp]  # (m,) indices of the parameters on which gravity acts
     own: Array  # F (n, N, c): rotor inertia, friction, offset
-    unit: Array  # (n, p) mean columns of each joint's torque at an acceleration of one of that joint, without gravity
+    # (n, p) mean columns of each joint's torque at an acceleration of one of that joint, without
+    # gravity
+    unit: Array
     tau: Array  # (n, N) [N m]
     start: npt.NDArray[np.intp]  # first moment of each log
 
@@ -121,7 +124,9 @@ def torque_rows(
 def described_torque(
     arm: GenericArm, rows_of: Sequence[Sampled], standard: Array, gravity: Array
 ) -> Array:
-    """Return the torque (N, n) of known standard parameters (10 · links,) under `gravity` (3,) [m/s^2]."""
+    """Return the torque (N, n) of known standard parameters (10 · links,) under `gravity` (3,)
+    [m/s^2].
+    """
     q, dq, ddq = (
         np.concatenate([getattr(motion, name) for motion in rows_of]) for name in ("q", "dq", "ddq")
     )
