@@ -114,11 +114,11 @@ def test_a_compensated_torque_may_be_fitted_by_an_arm_that_is_described_without_
     shared: Path, tmp_path: Path
 ) -> None:
     """The remedy works: with gravity = [0, 0, 0] no gate closes."""
-    logs = imported(shared / "cases" / "34-gravity-compensated-torque", tmp_path / "compensated")
-    paths, _ = find_logs([logs])
-    one = open_log(paths[0]).log
-    weightless = replace(one, robot_text=format_robot(replace(one.robot, gravity=(0.0, 0.0, 0.0))))
-    found = torque_boundary([weightless])
+    folder = imported(shared / "cases" / "34-gravity-compensated-torque", tmp_path / "compensated")
+    paths, _ = find_logs([folder])
+    logs = [open_log(path).log for path in paths]
+    described = format_robot(replace(logs[0].robot, gravity=(0.0, 0.0, 0.0)))
+    found = torque_boundary([replace(log, robot_text=described) for log in logs])
     assert found is not None
     assert found.gravity.present is False
     assert boundary_findings(found, "log") == ()

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.torque_boundary import KINDS, judged
 
-SEEDS = (103, 108, 115)
+SEEDS = (103, 108)
 
 
 @pytest.mark.parametrize("kind", KINDS)
