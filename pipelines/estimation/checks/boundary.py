@@ -433,7 +433,7 @@ def _gravity(
         not removed
         and (half or (_possible(model, top) and not _possible(model, fits.described)))
         and _angle(top.gravity[0], described) > config.tilt
-        and top.score > _around(model, described, config) + config.decisive
+        and top.score > _around(fits, described, config) + config.decisive
     )
     spread, why = _direction_spread(fits, config)
     if (
@@ -476,16 +476,14 @@ def _present(
     return True if low > config.absent else None
 
 
-def _around(model: GravityModel, described: Array, config: BoundaryConfig) -> float:
+def _around(fits: _Fits, described: Array, config: BoundaryConfig) -> float:
     """The best score of all gravities that a tilted mounting leaves of the described one."""
     if not np.any(described):
-        return model.fit(described).score
+        return fits.described.score
+    near = [fit.score for fit in fits.turned if _angle(fit.gravity[0], described) < config.tilt]
     along = described / np.linalg.norm(described)
-    return max(
-        model.fit(STANDARD_GRAVITY * vector).score
-        for tilt in (0.0, 0.5 * config.tilt, config.tilt)
-        for vector in (_cone(along, tilt) if tilt else [along])
-    )
+    cone = [along, *_cone(along, 0.5 * config.tilt), *_cone(along, config.tilt)]
+    return max(*near, *(fits.model.fit(STANDARD_GRAVITY * vector).score for vector in cone))
 
 
 def _cone(along: Array, tilt: float) -> list[Array]:
