@@ -1,1 +1,1 @@
-"""What is estimated from logs, and what has to be checked before it is."""
+"""Estimate models of an arm from logs, and check the logs first."""

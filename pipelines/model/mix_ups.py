@@ -77,25 +77,24 @@ def _better(before: Array, after: Array) -> bool:
 
 
 def position_columns(e: Evidence) -> list[Check]:
-    """S13: would the positions fit better in another order, alone or with the torques?"""
+    """S13: would the positions alone fit better in another order? Positions and torques together: the torque boundary."""
     told = e.telling
     if _rms(e.residual[told]) < _BAD or len(told) < 2:
         return []
     few = e.thinned()
     motion, n = few.motion, e.n_joints
-    best: tuple[float, Array, tuple[int, ...], str] | None = None
+    best: tuple[float, Array, tuple[int, ...]] | None = None
     for order in _orders(e, 3)[1:]:
         pick = list(order)
         turned = Sampled(motion.t, motion.q[:, pick], motion.dq[:, pick], motion.ddq[:, pick], motion.coulomb[:, pick],
                          motion.torque, motion.at, motion.reach, motion.sample_time)
-        table = quick_residual(e.body, turned)
-        for signal, residual in (("q", np.diag(table)), ("q and tau", table[np.arange(n), pick])):
-            if best is None or _rms(residual[told]) < best[0]:
-                best = (_rms(residual[told]), residual[told], order, signal)
+        residual = np.diag(quick_residual(e.body, turned))[told]
+        if best is None or _rms(residual) < best[0]:
+            best = (_rms(residual), residual, order)
     if best is None or not _better(few.residual[told], best[1]):
         return []
     moved = [j for j in range(n) if best[2][j] != j]
-    return [_swapped(e, best[3], moved, [best[2][j] for j in moved], few.residual[told], best[1])]
+    return [_swapped(e, "q", moved, [best[2][j] for j in moved], few.residual[told], best[1])]
 
 
 def encoder_scale(e: Evidence) -> list[Check]:

@@ -1,9 +1,9 @@
 """Estimate the spread of a fit whose residual is correlated and partly an error of the model.
 
-    Cov = H⁻¹ (Σ_b s_b s_bᵀ) H⁻¹        s_b: score of a block of time over all joints (Liang & Zeger 1986)
+    Cov = H⁻¹ (Σ_b s_b s_bᵀ) H⁻¹        s_b: score of a block of time (Liang & Zeger 1986)
 
-That holds under correlation of any kind within the blocks. Where it is smaller, the variance of as many independent moments as the
-residual's correlation leaves is used instead.
+That holds under correlation of any kind within the blocks. Where it is smaller, the variance of as
+many independent moments as the residual's correlation leaves is used instead.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ _BLOCKS = 20  # of all logs together
 
 
 def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
-    """Return the number of independent moments (n,) of residuals (n, N), `starts` the first of each log.
+    """Return the number of independent moments (n,) of residuals (n, N), `starts` the first of
+    each log.
 
     ν = N / (1 + 2 Σ ρ_k), summed over the initial positive pairs of the autocorrelation (Geyer 1992).
     """
@@ -35,17 +36,21 @@ def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
     power = sum(np.abs(np.fft.rfft(centred[:, a:b], size, axis=1)) ** 2 for a, b in pairwise(edges))
     rho = np.fft.irfft(power, size, axis=1)[:, :length]
     rho = rho / np.maximum(rho[:, :1], 1e-300)
-    pairs = rho[:, :length // 2 * 2].reshape(n, -1, 2).sum(axis=2)
+    pairs = rho[:, : length // 2 * 2].reshape(n, -1, 2).sum(axis=2)
     positive = np.cumprod(pairs > 0, axis=1)
     correlation = np.maximum(2.0 * np.sum(pairs * positive, axis=1) - 1.0, 1.0)
     return np.asarray(np.maximum(total / correlation, 2.0))
 
 
 def gravity_spread(model: GravityModel, fit: GravityFit, groups: Array) -> Array:
-    """Return the covariance (k, k) of the gravity's changes along `groups` (k, n, 3), all else fitted with it."""
+    """Return the covariance (k, k) of the gravity's changes along `groups` (k, n, 3), all else
+    fitted with it.
+    """
     k = len(groups)
-    designs = [np.concatenate([_pulls(model, fit, j) @ groups[:, j].T, model.rigid(j, fit)], axis=1)
-               for j in range(len(fit.gravity))]
+    designs = [
+        np.concatenate([_pulls(model, fit, j) @ groups[:, j].T, model.rigid(j, fit)], axis=1)
+        for j in range(len(fit.gravity))
+    ]
     prior = np.zeros((designs[0].shape[1],) * 2)
     flat = groups.reshape(k, -1)
     prior[:k, :k] = flat @ flat.T / (len(fit.gravity) * LOOSE**2)
@@ -54,7 +59,9 @@ def gravity_spread(model: GravityModel, fit: GravityFit, groups: Array) -> Array
 
 
 def friction_spread(model: GravityModel, fit: GravityFit) -> tuple[Array, Array]:
-    """Return the own coefficients (n, c) of all joints and their covariance (n c, n c), the gravity that of `fit`."""
+    """Return the own coefficients (n, c) of all joints and their covariance (n c, n c), the gravity
+    that of `fit`.
+    """
     rows = model.rows
     n, moments, p = rows.inertial.shape
     c = rows.own.shape[2]
@@ -63,21 +70,28 @@ def friction_spread(model: GravityModel, fit: GravityFit) -> tuple[Array, Array]
         design = np.zeros((moments, p + n * c))
         design[:, :p] = rows.inertial[j]
         design[:, rows.heavy] += np.einsum("k,nkm->nm", fit.gravity[j], rows.gravity[j])
-        design[:, p + j * c:p + (j + 1) * c] = rows.own[j]
+        design[:, p + j * c : p + (j + 1) * c] = rows.own[j]
         designs.append(design / model.size[j])
-    theta, covariance = _clustered(model, fit, designs, [rows.tau[j] / model.size[j] for j in range(n)])
+    theta, covariance = _clustered(
+        model, fit, designs, [rows.tau[j] / model.size[j] for j in range(n)]
+    )
     return theta[p:].reshape(n, c), covariance[p:, p:]
 
 
 def _pulls(model: GravityModel, fit: GravityFit, joint: int) -> Array:
     """(N, 3) torque of 1 m/s^2 along each axis, beyond what the joint's own columns explain."""
     p, m = model.rows.inertial.shape[2], len(model.rows.heavy)
-    part = model.projected[joint, :, p:p + 3 * m].reshape(-1, 3, m)
+    part = model.projected[joint, :, p : p + 3 * m].reshape(-1, 3, m)
     return np.asarray(part @ fit.parameters[model.rows.heavy])
 
 
-def _clustered(model: GravityModel, fit: GravityFit, designs: list[Array], targets: list[Array],
-               prior: Array | float = 0.0) -> tuple[Array, Array]:
+def _clustered(
+    model: GravityModel,
+    fit: GravityFit,
+    designs: list[Array],
+    targets: list[Array],
+    prior: Array | float = 0.0,
+) -> tuple[Array, Array]:
     """Weighted least squares over all joints, and its covariance."""
     width, moments = designs[0].shape[1], designs[0].shape[0]
     normal, naive = np.zeros((width, width)) + prior, np.zeros((width, width)) + prior
