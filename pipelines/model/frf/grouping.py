@@ -101,7 +101,7 @@ def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
     alone = [m.frequency for one in modes for m in one.single]
     found = []
     if extra:
-        found.append(Open(joint, extra[0], ("base_resonance", "joint_elasticity"),
+        found.append(Open(joint, extra[0], ("base_resonance", "joint_elasticity", "backlash"),
                           f"A pair at {_many(extra)} Hz is seen in some postures of joint {joint} only.",
                           "the same posture again, longer or excited more strongly"))
     if alone:
@@ -259,7 +259,7 @@ def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
         words = (f"No {'distinct ' if traces else ''}mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration "
                  f"per input is flat within {100.0 * (flat - 1.0):.2g} %, without delay.{beside}")
         return Finding("rigid", joint, words, None, None, None, {}, (joint,))
-    return Open(joint, None, ("drive_lag", "joint_elasticity"),
+    return Open(joint, None, ("drive_lag", "joint_elasticity", "backlash"),
                 f"No mode is distinct, yet the acceleration per input changes by a factor of {flat:.3g}.",
                 "longer, with stronger excitation, and in a second posture")
 
