@@ -216,8 +216,8 @@ def _recorded(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method
         number, default = 1 + sum(q.joint == p.joint for q in postures[:k]), own["closed-loop"]
         motion.append((p.joint, number, posture_words(p.posture, p.joint), ", ".join(p.logs), p.controller, p.speed, p.swing,
                        100.0 * p.left_out, 100.0 * p.filled))
-        spectra.append((p.joint, number, _said_bands(p.excited), default.estimator, default.resolution, default.averages, p.distortion,
-                        p.detected_even, p.detected_odd))
+        spectra.append((p.joint, number, _said_bands(p.excited), default.estimator, default.resolution, default.averages,
+                        p.distortion, p.detected_even, p.detected_odd))
     text = ("The reference is subtracted. Start, reversal and stop are left out, and half a second after each: there friction "
             "jumps. At constant speed its mean is a constant that no spectrum shows. The excited band is where v has power and its "
             "responses are known to 10 dB: nothing is fitted, judged or named outside. Lost samples are filled alike in all "
@@ -226,5 +226,5 @@ def _recorded(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method
         Table(("joint", "no.", "posture", "logs", "controller", "speed [rad/s]", "its std [rad/s]", "left out [%]",
                "lost, filled [%]"), tuple(motion)),
         Table(("joint", "no.", "excited band [Hz]", "estimator", "resolution [Hz]", "averages", "realisations", "even lines",
-               "odd lines"), tuple(spectra), "Variance between realisations and directions, and power at even and odd lines that v leaves out: "
-              "each over that of noise. Far more than 1 is nonlinear distortion.")))
+               "odd lines"), tuple(spectra), "Variance between realisations and directions, and power at even and odd lines that "
+              "v leaves out: each over that of noise. Far more than 1 is nonlinear distortion.")))

@@ -25,8 +25,6 @@ __all__ = ["Explained", "explain", "predicted"]
 
 Rest = Callable[[Array], Array]
 
-# Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn.
-_SLACK = 0.008
 _STEPS = 100
 
 
@@ -60,18 +58,21 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
     return frequencies(locked), frequencies(kept)[1:]
 
 
-def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: bool, joint: bool) -> Explained | None:
+def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: bool, joint: bool,
+            slack: float = 0.008) -> Explained | None:
     """Springs at the base, in the joint or both, that explain the pairs of every posture best; None where counts differ.
 
     Args:
         pairs: of each posture, by frequency; as many as there are springs.
         inertia: J of each posture [kg m^2].
+        slack: relative deviation of a frequency that masses and springs are granted: held joints give way a little, and J is
+            averaged over a turn.
     """
     springs = int(base) + int(joint)
     if not pairs or springs == 0 or any(len(own) != springs for own in pairs):
         return None
     measured = np.log([[f.value for kind in _kinds(own) for f in kind] for own in pairs])
-    spread = np.array([[np.hypot(f.std / f.value, _SLACK) for kind in _kinds(own) for f in kind] for own in pairs])
+    spread = np.array([[np.hypot(f.std / f.value, slack) for kind in _kinds(own) for f in kind] for own in pairs])
 
     def rest(theta: Array) -> Array:
         b, k = _taken(theta, base, joint)

@@ -30,7 +30,8 @@ from pipelines.model.frf.rigid import Expected, expected_rigid
 __all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings"]
 
 
-_SLOW = (BAND[0], 20.0)  # [Hz] where friction and delay turn the phase by less than a right angle
+_SLOW = 20.0  # [Hz] up to which friction and delay turn the phase by less than a right angle
+_FIRST = 2.0  # times the lowest excited frequency, up to where the sign is seen first: between two modes the phase is turned round
 _RELIABLE = 0.7  # coherence
 _FEWEST = 3  # bins
 _AGAINST = -0.5  # cosine of the phase: beyond 120°
@@ -89,9 +90,12 @@ def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tupl
 
 
 def _check_sign(measured: Measured) -> None:
-    slow = relative_acceleration(measured).within(*_SLOW)
-    sure = slow.response[slow.coherence >= _RELIABLE]
-    if len(sure) >= _FEWEST and float(np.median(sure.real / np.abs(sure))) < _AGAINST:
+    whole = relative_acceleration(measured)
+    whole = whole.where(measured.excited.holds(whole.frequency) & (whole.coherence >= _RELIABLE))
+    slow = whole.within(0.0, _SLOW)
+    slow = slow.within(0.0, _FIRST * float(slow.frequency.min(initial=_SLOW)))
+    if len(slow.frequency) >= _FEWEST and all(float(np.median(one.response.real / np.abs(one.response))) < _AGAINST
+                                              for one in (slow, whole)):
         first = measured.first
         raise InputRejected("S14", f"joint {measured.joint} accelerates against its input {first.quantity}", where=first.name,
                             remedy=f"reverse the sign of {first.quantity}, or of q, in the recipe")

@@ -18,8 +18,8 @@ _FITS = 4.0  # χ² per number, beyond which an explanation is none
 _HEAVY = 2.0  # rise above which what drops out outweighs the rest: no base does
 _LIGHT = 0.5  # of the arm's inertia: no base weighs less
 FLAT = 1.15  # a ratio of magnitudes below it is flat
-# Damping ratio beyond which a mode is no mere spring: structures and gears have a few hundredths. A gap that is crossed answers like
-# a spring that swallows energy (its describing function: Gelb & Vander Velde 1968, ch. 2).
+# Damping ratio beyond which a mode is no mere spring: structures and gears have a few hundredths. A gap that is crossed answers
+# like a spring that swallows energy (its describing function: Gelb & Vander Velde 1968, ch. 2).
 _SPRING = 0.15
 _SPAN = 4.0  # highest over lowest frequency, of a band in which a joint without a mode is called rigid
 _DELAY = 0.15  # of the sample time: the smallest delay worth a word
@@ -101,7 +101,7 @@ def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
     alone = [m.frequency for one in modes for m in one.single]
     found = []
     if extra:
-        found.append(Open(joint, extra[0], ("base_resonance", "joint_elasticity"),
+        found.append(Open(joint, extra[0], ("base_resonance", "joint_elasticity", "backlash"),
                           f"A pair at {_many(extra)} Hz is seen in some postures of joint {joint} only.",
                           "the same posture again, longer or excited more strongly"))
     if alone:
@@ -112,31 +112,32 @@ def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
 
 
 def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str) -> tuple[list[Finding], list[Open]]:
-    inertia = [m.inertia.value if m.inertia else float("nan") for m in modes]
+    inertia, slack = [m.inertia.value if m.inertia else float("nan") for m in modes], max(m.slack for m in modes)
     if not np.isfinite(inertia).all() or min(inertia) <= 0.0:
         return [], [_open(joint, pairs, "the inertia of the joint could not be measured")]
     if len(pairs[0]) == 1:
-        return _one_spring(joint, pairs, inertia, unit)
+        return _one_spring(joint, pairs, inertia, unit, slack)
     if len(pairs[0]) == 2:
-        both = explain(pairs, inertia, base=True, joint=True)
+        both = explain(pairs, inertia, True, True, slack)
         if both is not None and len(pairs) > 1 and _accepted(both) and _moves(inertia):
             words = (f"{_told(pairs, inertia, unit)}. A base and a spring in the joint together explain both pairs in all "
                      f"{len(pairs)} postures (χ² {both.misfit:.3g} for {both.freedom}).")
             return [_as_base(both, pairs, words, joint), _as_joint(joint, both, pairs, inertia, words)], []
         strong = [sorted(own, key=lambda p: -p.rise) for own in pairs]
         if all(own[0].rise > _HEAVY and own[1].rise < _TRACE for own in strong):
-            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit)
+            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack)
             return found, [*open_, _open(joint, [[own[1]] for own in strong], "a small pair beside a large one")]
     return [], [_open(joint, pairs, f"{len(pairs[0])} pairs that no base and joint spring explain together")]
 
 
-def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str) -> tuple[list[Finding], list[Open]]:
+def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str,
+                slack: float) -> tuple[list[Finding], list[Open]]:
     damping = float(np.mean([max(p.antiresonance.damping.value, p.resonance.damping.value) for own in pairs for p in own]))
     if damping > _SPRING:
         why = f"{_told(pairs, inertia, unit)}; a damping ratio of {damping:.2g} is that of a gap which is crossed, or of friction"
         return [], [replace(_open(joint, pairs, why), candidates=("backlash", "joint_elasticity", "base_resonance"),
                             experiment=f"joint {joint} excited half as strongly: a gap answers otherwise then, a spring does not")]
-    base, spring = explain(pairs, inertia, True, False), explain(pairs, inertia, False, True)
+    base, spring = explain(pairs, inertia, True, False, slack), explain(pairs, inertia, False, True, slack)
     assert base is not None
     assert spring is not None
     told = _told(pairs, inertia, unit)
@@ -258,7 +259,7 @@ def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
         words = (f"No {'distinct ' if traces else ''}mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration "
                  f"per input is flat within {100.0 * (flat - 1.0):.2g} %, without delay.{beside}")
         return Finding("rigid", joint, words, None, None, None, {}, (joint,))
-    return Open(joint, None, ("drive_lag", "joint_elasticity"),
+    return Open(joint, None, ("drive_lag", "joint_elasticity", "backlash"),
                 f"No mode is distinct, yet the acceleration per input changes by a factor of {flat:.3g}.",
                 "longer, with stronger excitation, and in a second posture")
 

@@ -42,6 +42,11 @@ _LONGEST = 0.05  # [s] no delay is longer
 _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
 
 
+# Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn;
+# and more where the motion of the others was taken out, by inertias that a fit over all of the band knows to a few per cent.
+HELD_STILL, TAKEN_OUT = 0.008, 0.025
+
+
 @dataclass(frozen=True)
 class Pair:
     """An antiresonance and the resonance above it."""
@@ -73,6 +78,7 @@ class Modes:
     left: float  # rms of what it leaves, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
+    slack: float = HELD_STILL  # relative deviation of a frequency that masses and springs are granted
 
 
 def relative_acceleration(measured: Measured, response: FrequencyResponse | None = None) -> FrequencyResponse:
@@ -123,7 +129,8 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
                  _inertia(measured, level), _friction_below(relative, level), fit.misfit, _left(fit, part),
-                 (float(part.frequency[0]), float(part.frequency[-1])), fit)
+                 (float(part.frequency[0]), float(part.frequency[-1])), fit,
+                 HELD_STILL if measured.held is None else TAKEN_OUT)
 
 
 def _fitted(part: FrequencyResponse) -> Rational:

@@ -102,6 +102,8 @@ def _with_poles(rows: _Rows, config: HeldConfig) -> _Fit:
     """A pair of poles more as long as that explains most of what is left."""
     best = _least_squares(rows, (), None)
     for number in range(config.poles):
+        if best.cost <= 2.0 * len(rows.s):  # explained to within `floor` and noise (Morozov's discrepancy principle)
+            break
         more = min((_pole_more(rows, best, by, config) for by in (None, *range(number + 1))), key=lambda fit: fit.cost)
         if more.cost > config.gain * best.cost:
             break
