@@ -119,7 +119,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     identify, validate = (_along(part, course, chosen) for part in (identify, validate))
     final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
     if sticks:
-        final = replace(final, found=with_block_covariance(final.found, _blocks(identify)))
+        final = _with_errors_in_variables(replace(final, found=with_block_covariance(final.found, _blocks(identify))),
+                                          rows.sliding.attenuation)
     ripple = ripple_of(LawEquations.of(identify, arm), final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
@@ -197,6 +198,14 @@ def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -
     speed = np.concatenate([-side[::-1], side])
     own = replace(course, curve=(speed, fit.curve(speed)))
     return tuple(replace(stretch, course=own) for stretch in stretches)
+
+
+def _with_errors_in_variables(fit: LawFit, attenuation: float) -> LawFit:
+    """`fit` with every inertia as uncertain as noise of the acceleration may have made it too small: J times that share."""
+    covariance = fit.found.covariance.copy()
+    places = fit.rigid_size * np.arange(len(fit.postures))
+    covariance[places, places] += np.square(min(attenuation, 1.0) * fit.found.beta[places])
+    return replace(fit, found=replace(fit.found, covariance=covariance))
 
 
 def _blocks(stretches: Sequence[Stretch]) -> npt.NDArray[np.intp]:
