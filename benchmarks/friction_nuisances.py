@@ -15,13 +15,14 @@ import json
 import math
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pipelines import fit_friction
 from pipelines.errors import RrridError
 from pipelines.fit_friction import Settings
-from pipelines.log.experiment import ExperimentLog
+from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import Opened
 from pipelines.model.friction.result import JointResult
 from pipelines.stage import Inputs
@@ -40,7 +41,7 @@ def wilson(right: int, count: int) -> str:
     return f"{right}/{count} = {100 * share:.1f} % ({100 * (middle - half):.1f} to {100 * (middle + half):.1f})"
 
 
-def judge(machine: Machine, log: ExperimentLog) -> dict[str, object]:
+def judge(machine: Machine, log: ExperimentLog) -> dict[str, Any]:
     """Errors in standard deviations, and what was said."""
     begun = time.process_time()
     try:
@@ -66,19 +67,21 @@ def _reference(joint: JointResult, machine: Machine) -> float:
     return machine.seconds / 2 if joint.drift is None else joint.drift.holds_at
 
 
-def table(kind: str, rows: list[dict[str, object]]) -> None:
+def table(kind: str, rows: list[dict[str, Any]]) -> None:
+    """Print one line of figures for a kind of machine."""
     fits = [row for row in rows if "refused" not in row]
-    inertia = [(a - c) / b if b else math.inf for a, b, c in (row["inertia"] for row in fits)]  # type: ignore[attr-defined,misc]
-    curve = [(c - d) / b if b else math.inf for row in fits for _, c, b, d in row["curve"]]  # type: ignore[attr-defined]
-    relative = np.median([abs(a / c - 1.0) for a, _, c in (row["inertia"] for row in fits)]) if fits else math.nan  # type: ignore[attr-defined,misc]
+    numbers = np.array([row["inertia"] for row in fits], dtype=np.float64).reshape(-1, 3)
+    values = np.array([value for row in fits for value in row["curve"]], dtype=np.float64).reshape(-1, 4)
+    inertia, curve = (numbers[:, 0] - numbers[:, 2]) / numbers[:, 1], (values[:, 1] - values[:, 3]) / values[:, 2]
+    relative = np.median(np.abs(numbers[:, 0] / numbers[:, 2] - 1.0)) if fits else math.nan
     named = [row for row in fits if row["drift"] is not None]
-    as_kind = sum(row["drift"][0] == kind for row in named)  # type: ignore[index]
-    seconds = np.mean([float(row["seconds"]) for row in fits]) if fits else math.nan  # type: ignore[arg-type]
+    as_kind = sum(row["drift"][0] == kind for row in named)
+    seconds = np.mean([row["seconds"] for row in fits]) if fits else math.nan
     print(f"{kind:12s} refused {len(rows) - len(fits)}/{len(rows)}; J {_within(inertia)}, median error {100 * relative:.2f} %; "
           f"curve {_within(curve)}; drift named {wilson(len(named), len(fits))}, as {kind} {as_kind}; {seconds:.1f} s", flush=True)
 
 
-def _within(errors: list[float]) -> str:
+def _within(errors: Array) -> str:
     return wilson(int(np.sum(np.abs(errors) <= 2.0)), len(errors))
 
 

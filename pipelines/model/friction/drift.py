@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.fit.flips import by_flips
 from pipelines.model.friction.weak_form import Course, Stretch
@@ -24,6 +25,8 @@ __all__ = ["DriftConfig", "drift_of"]
 
 _FORMS = ("whole", "viscous", "coulomb")
 _PULLED = 1e-3  # the least that 1 - leverage may be
+Index = npt.NDArray[np.intp]
+
 _RANK = 1e-7  # singular values of unit columns below it: two columns that are one
 
 
@@ -91,13 +94,13 @@ def _basis(columns: Array) -> Array:
     return np.asarray(left[:, size > _RANK * size.max(initial=0.0)])
 
 
-def _blocks(t: Array, log: Array, length: float) -> Array:
+def _blocks(t: Array, log: Index, length: float) -> Index:
     """Number of the block of time of every row (rows,)."""
     code = log * 10**7 + np.floor(t / length).astype(np.intp)
-    return np.unique(code, return_inverse=True)[1]
+    return np.asarray(np.unique(code, return_inverse=True)[1], dtype=np.intp)
 
 
-def _held_out(basis: Array, y: Array, blocks: Array) -> Array:
+def _held_out(basis: Array, y: Array, blocks: Index) -> Array:
     """Sum of squares of every block as the other blocks predict it (blocks,): e_b = (I - H_bb)⁻¹ r_b, H over `basis`."""
     rest, found = y - basis @ (basis.T @ y), []
     for block in range(int(blocks.max()) + 1):
@@ -105,7 +108,7 @@ def _held_out(basis: Array, y: Array, blocks: Array) -> Array:
         values, vectors = np.linalg.eigh(own.T @ own)
         push = (vectors.T @ (own.T @ here)) / np.maximum(1.0 - values, _PULLED)
         found.append(float(np.sum(np.square(here + own @ (vectors @ push)))))
-    return np.maximum(np.array(found), 1e-300)
+    return np.asarray(np.maximum(np.array(found), 1e-300))
 
 
 def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
@@ -114,7 +117,7 @@ def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
     return [Course("trend", form, starts, share * duration, 0.5 * duration, duration) for share in config.times for form in _FORMS]
 
 
-def _steps(stretches: Sequence[Stretch], t: Array, log: Array, config: DriftConfig) -> list[Course]:
+def _steps(stretches: Sequence[Stretch], t: Array, log: Index, config: DriftConfig) -> list[Course]:
     """Steps between rows; a step lasts until the end of the last log."""
     starts = tuple(float(stretch.t[0]) for stretch in stretches)
     rows = np.unique(np.linspace(config.ends * len(t), (1.0 - config.ends) * (len(t) - 1), config.steps).astype(np.intp))

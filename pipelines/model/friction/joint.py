@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.fit.varpro import SeparableFit
+from pipelines.fit.varpro import SeparableFit, with_block_covariance
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.break_away import BreakAway, break_away, held_at_least
 from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
@@ -116,8 +117,10 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
     identify, validate = (_along(part, course, chosen) for part in (identify, validate))
-    lags = round(_MEMORY / rows.window) if sticks else None
-    final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta], lags=lags)
+    final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+    if sticks:
+        final = _with_errors_in_variables(replace(final, found=with_block_covariance(final.found, _blocks(identify))),
+                                          rows.sliding.attenuation)
     ripple = ripple_of(LawEquations.of(identify, arm), final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
@@ -169,9 +172,10 @@ def _about_a_flexible_law(stretches: tuple[Stretch, ...], fitted: int, arm: OneJ
 
 
 def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, config: SlidingConfig) -> bool:
-    """Whether one curve follows the rows of doubt as well as it does those that surely slide."""
-    residual = LawEquations.of(stretches, fit.joint).predicted(fit).residual
-    return float(np.mean(np.square(residual[~sliding.slides]))) <= config.worse * sliding.mean_square
+    """Whether one curve follows the rows of doubt as well as those that surely slide, or these do not rule what it leaves."""
+    square = np.square(LawEquations.of(stretches, fit.joint).predicted(fit).residual)
+    doubt, sure = square[~sliding.slides], square[sliding.slides]
+    return float(doubt.mean()) <= config.worse * sliding.mean_square or float(doubt.sum()) <= float(sure.sum())
 
 
 def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
@@ -194,6 +198,20 @@ def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -
     speed = np.concatenate([-side[::-1], side])
     own = replace(course, curve=(speed, fit.curve(speed)))
     return tuple(replace(stretch, course=own) for stretch in stretches)
+
+
+def _with_errors_in_variables(fit: LawFit, attenuation: float) -> LawFit:
+    """`fit` with every inertia as uncertain as noise of the acceleration may have made it too small: J times that share."""
+    covariance = fit.found.covariance.copy()
+    places = fit.rigid_size * np.arange(len(fit.postures))
+    covariance[places, places] += np.square(min(attenuation, 1.0) * fit.found.beta[places])
+    return replace(fit, found=replace(fit.found, covariance=covariance))
+
+
+def _blocks(stretches: Sequence[Stretch]) -> npt.NDArray[np.intp]:
+    """Number of the block of `_MEMORY` seconds that each row is in (rows,)."""
+    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / _MEMORY) for k, stretch in enumerate(stretches)]
+    return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
 def _swaying(logs: JointLogs) -> tuple[int, ...]:

@@ -35,8 +35,9 @@ def sticking_in_words(sticking: Sticking | None, name: str) -> str:
     """Say how many rows are left out, and why."""
     if sticking is None:
         return ""
-    words = (f"{plain_number(100.0 * sticking.share)} % of the rows of {name} are left out: the joint rests or bends its contacts "
-             f"there, up to a travel of {plain_number(sticking.distance)} rad, and friction is no function of its speed.")
+    share = plain_number(100.0 * sticking.share)
+    words = (f"{share} % of the rows of {name} are left out: the joint rests or bends its contacts there, "
+             f"up to a travel of {plain_number(sticking.distance)} rad, and friction is no function of its speed.")
     if sticking.slips:
         words += f" It sticks and slips on {sticking.slips} times amid motion one way."
     return words
@@ -52,9 +53,10 @@ def nuisance_findings(joint: JointFit, name: str) -> tuple[Check, ...]:
     attenuation = joint.sliding.attenuation
     if attenuation > _COARSE or not math.isfinite(attenuation):
         noise = 100.0 * min(attenuation, 1.0)
-        found.append(Check.of("D08", "warn", f"the encoder is too coarse for these motions: {noise:.0f} % of the acceleration of joint "
-                              f"{joint.logs.joint} is noise (variance), and its inertia comes out as much too small", where=where,
-                              gate=True, remedy="record quicker changes of speed, at higher speeds, or a finer encoder"))
+        found.append(Check.of(
+            "D08", "warn", f"the encoder is too coarse for these motions: {noise:.0f} % of the acceleration of joint "
+            f"{joint.logs.joint} is noise (variance), and its inertia comes out as much too small", where=where, gate=True,
+            remedy="record quicker changes of speed, at higher speeds, or a finer encoder"))
     if check := _negative_viscous(joint, where):
         found.append(check)
     return tuple(found)

@@ -111,7 +111,7 @@ def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
     travel = np.minimum(since, np.minimum.accumulate(until[::-1])[::-1] - path)
     edges = stretch.edges
     within = np.minimum.reduceat(travel, edges)[:len(edges) - 1]
-    return np.minimum(within, travel[edges[1:]])
+    return np.asarray(np.minimum(within, travel[edges[1:]]))
 
 
 def free_curve(speed: Array, config: SlidingConfig) -> Array:

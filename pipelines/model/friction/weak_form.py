@@ -82,7 +82,7 @@ class Course:
         since = t - self.starts[part]
         if self.kind == "step":
             return np.where(part > self.part, 1.0, np.where(part < self.part, 0.0, (since >= self.time) * 1.0))
-        return np.exp(-self.holds / self.time) - np.exp(-since / self.time)
+        return np.asarray(np.exp(-self.holds / self.time) - np.exp(-since / self.time))
 
     @property
     def whole(self) -> float:
@@ -98,7 +98,7 @@ class Course:
     def columns(self, part: int, t: Array, dq: Array) -> Array:
         """c(t) g(v) over the step after each sample (samples, 1); the last row is zero."""
         value = self.at(part, 0.5 * (t[1:] + t[:-1])) * self.shape(0.5 * (dq[1:] + dq[:-1]))
-        return np.append(value, 0.0)[:, None]
+        return np.asarray(np.append(value, 0.0)[:, None])
 
 
 @dataclass(frozen=True, eq=False)

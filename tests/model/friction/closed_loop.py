@@ -118,7 +118,7 @@ def simulate(machines: list[Machine]) -> list[ExperimentLog]:
     J, W, q0, kp, kd, step, noise = map(row, ("inertia", "weight", "hanging", "kp", "kd", "encoder", "noise"))
     fc, fv = np.array([m.coulomb for m in machines]).T, np.array([m.viscous for m in machines]).T
     hump, vs, bend, measured = row("stribeck"), row("stribeck_speed"), row("bending"), row("measured") > 0.5
-    scale = np.stack([m.scale(np.arange(len(position)) * dt) for m in machines], axis=1)
+    scale = np.stack([m.scale(np.arange(len(position), dtype=np.float64) * dt) for m in machines], axis=1)
     top = np.maximum(fc[0], fc[1]) * (1.0 + hump)
     s0 = top / bend
     s1 = 0.5 * 2.0 * np.sqrt(s0 * J)
