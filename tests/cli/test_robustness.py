@@ -235,3 +235,16 @@ def test_a_short_log_says_by_how_much(tmp_path: Path) -> None:
         assert "RRID-T08" in getattr(done, stream)
         assert "50 samples, 0.05 s" in getattr(done, stream)
         assert "100" in getattr(done, stream)
+
+
+def test_a_verdict_is_never_cut_off() -> None:
+    """However much a run has to say, its last word is printed."""
+    from io import StringIO
+
+    from pipelines.report.report import Report
+    from rrrid_cli.console import say_verdict
+
+    stream = StringIO()
+    verdict = " ".join(f"Joint {k} has friction of its own." for k in range(200)) + " The end."
+    say_verdict(Report("Run", verdict, "attention", None, ()), stream)
+    assert stream.getvalue() == verdict + "\n"
