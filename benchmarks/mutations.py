@@ -5,7 +5,7 @@
 
 A mutation takes one of some healthy texts and cuts, repeats, swaps, deletes or inserts pieces of it, up
 to repeating a piece a hundred thousand times. Each is read in a process of its own, whose time and peak of memory are
-measured; beside what the process had before it read.
+measured, the peak beyond the memory in use before.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _TOKENS = ("[", "]", "{", "}", '"', "'", '"""', "'''", ".", "a.", "=", ",", ";",
 
 @dataclass(frozen=True)
 class Reading:
-    """What became of reading one mutated text."""
+    """Result of reading one mutated text."""
 
     kind: str
     outcome: str  # "read", the code of an error, or "internal: …"
@@ -82,7 +82,7 @@ def _healthy() -> Iterator[tuple[str, str]]:
 
 
 def _mutated(text: str, rng: np.random.Generator) -> str:
-    """One change somewhere. A repetition is as often one of a few as one of a hundred thousand."""
+    """Return the text with one random change; the logarithm of a repetition's count is uniform up to 1e5."""
     a, b = sorted(int(k) for k in rng.integers(0, len(text) + 1, 2))
     piece = text[a:min(b, a + int(2.0 ** rng.uniform(0, 9)))]
     token = _TOKENS[rng.integers(len(_TOKENS))]

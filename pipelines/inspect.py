@@ -17,6 +17,7 @@ from pipelines.errors import Check, RrridError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.log.codes import first_to_read, title_of
+from pipelines.log.derive import recording
 from pipelines.log.doctor.checks import NotTested, Subject, check_together, findings
 from pipelines.log.doctor.checks_subject import many
 from pipelines.log.doctor.checks_unit import TRUSTED
@@ -132,9 +133,26 @@ def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings)
         # Of two channels with the same samples nobody can say that each fits best where it stands.
         found += [item for item in plausibility_findings(subject)
                   if not (twins and item.code == "RRID-S13" and (isinstance(item, NotTested) or item.level == "ok"))]
+        found += _periods(subject, opened)
     except RrridError as problem:  # a description without usable geometry
         found.append(_as_check(problem, opened.path))
     return subject, found
+
+
+def _periods(subject: Subject, opened: Opened) -> list[Check]:
+    """T10 as the stages say it that average periods: those that are unlike the others, and how long the first takes to settle."""
+    log = recording(subject.log)
+    if log.period is None or not subject.good.runs:
+        return []
+    # Observers, for the few logs that have periods.
+    from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff
+    from pipelines.model.mean_period import doubts, noise_floor
+    from pipelines.model.motion import Reconstruction, reconstruct
+
+    how = Reconstruction()
+    found = reconstruct(log, how, subject.good)
+    rate = 1.0 / log.sample_time
+    return doubts(noise_floor(log, found, cutoff_at(wanted_cutoff(found.motion, rate), rate)), opened.path)
 
 
 def exit_code(result: Result, check: bool) -> int:

@@ -1,4 +1,4 @@
-"""Make standard input, output and error usable, whatever the shell gave: closed, or in an encoding without our signs."""
+"""Make standard input, output and error usable where they are closed, or where their encoding lacks characters."""
 
 from __future__ import annotations
 

@@ -10,14 +10,14 @@ import h5py
 import numpy as np
 import pytest
 
-from pipelines import import_log, inspect
+from pipelines import import_log, inspect, reconstruct
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import find_logs, open_log, write_log
 from pipelines.log.results import decode, read_series
 from pipelines.stage import Outcome, Request, run_stage
 from tests.fault_table import FAULTS
-from tests.faulty import faster
+from tests.faulty import faster, good_path
 from tests.healthy import good_log, make_log, rest, rows, with_signal
 
 MAKE = {fault.row: fault.make for fault in FAULTS}
@@ -289,3 +289,13 @@ def test_angles_of_every_kind_of_log_are_told_in_radians(experiment: str, tmp_pa
     rows = {row[0]: row for row in section.tables[0].rows if row[1] == 1}
     assert rows["q"][-1] == "rad"
     assert rows["q"][2] == pytest.approx(float(np.nanmin(log.q[:, 0])), rel=1e-3)
+
+
+def test_inspect_says_of_periods_what_the_stages_say(tmp_path: Path) -> None:
+    """T10: the attribute period is 4 s where the motion repeats after 5: the doctor warns of it in the words of `reconstruct`."""
+    write_log(tmp_path / "a.h5", make_log(good_path(), duration=15.0, period=4.0))
+    told = [[(check.message, check.level) for check in run_stage(stage, Request((tmp_path / "a.h5",), tmp_path / stage.name,
+                                                                                no_report=True), stage.settings()).checks
+             if check.code == "RRID-T10"] for stage in (inspect.STAGE, reconstruct.STAGE)]
+    assert told[0] == told[1]
+    assert [level for _, level in told[0]] == ["warn"]

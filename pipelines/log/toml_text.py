@@ -76,5 +76,5 @@ def _check_bounds(text: str, bounds: TomlBounds) -> None:
 
 
 def _shortened(found: re.Match[str]) -> str:
-    """Return what stands for a string or a comment: nothing that could look like structure."""
+    """Return a placeholder for a string or a comment, without any character of structure."""
     return "" if found[0].startswith("#") else '""'

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected
+from pipelines.errors import Check, InputRejected, Level
 from pipelines.log.derive import recording
 from pipelines.log.doctor.faults import Mask, quantum
 from pipelines.log.doctor.segments import Usable, usable
@@ -115,7 +115,8 @@ def alike(mean: Reconstructed, how: Reconstruction) -> Reconstructed:
 def doubts(floor: NoiseFloor | None, where: object, averaged: bool = True) -> list[Check]:
     """T10: periods that are not averaged though it was asked for, and what is left out of the mean, or kept without one.
 
-    A start is motion like any other, and its equations hold; but somebody's hand on the arm is in no model. Either is said.
+    A start is motion like any other, and its equations hold: that it is left out of the mean is a remark. Somebody's hand on the
+    arm is in no model: a warning.
     """
     if floor is None:
         return []
@@ -126,11 +127,12 @@ def doubts(floor: NoiseFloor | None, where: object, averaged: bool = True) -> li
     fate = "left out of their mean" if mean else "kept, for its periods are not averaged"
     if floor.left_out:
         left_out = ", ".join(map(str, floor.left_out))
-        found.append(Check.of("T10", "warn", f"period {left_out} differs from the {floor.periods} others and is {fate}",
+        level: Level = "ok" if mean and floor.left_out == (1,) else "warn"
+        found.append(Check.of("T10", level, f"period {left_out} differs from the {floor.periods} others and is {fate}",
                               where=where, remedy="the first one often starts from rest; or somebody touched the arm" if mean else
                               "a start from rest does no harm there; if somebody touched the arm, cut that period out"))
     if floor.settling_time:
-        found.append(Check.of("T10", "warn", f"the first {floor.settling_time:.2g} s of its periods, in which the motion settled, "
+        found.append(Check.of("T10", "ok", f"the first {floor.settling_time:.2g} s of its periods, in which the motion settled, "
                               f"are {fate}", where=where, remedy="record a period more: the first then is left out" if mean else
                               "they do no harm to a fit of every sample"))
     return found

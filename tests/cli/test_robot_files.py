@@ -85,7 +85,7 @@ def test_a_link_that_cannot_exist_is_named(shared: Path, tmp_path: Path) -> None
     ('<?xml version="1.0"?>\n<sdf version="1.9"><model name="a"/></sdf>', "SDF")])
 @pytest.mark.parametrize("name", ["arm.xml", "arm.sdf", "arm.urdf", "arm"])
 def test_other_robot_files_are_recognised_by_content(name: str, text: str, words: str, tmp_path: Path) -> None:
-    """Case 44: whatever the file is called, MJCF and SDF are named, and the way out is a URDF."""
+    """Case 44: MJCF and SDF are named under any file name, and the remedy is a URDF."""
     (tmp_path / name).write_text(text)
     with pytest.raises(UsageError, match=f"RRID-S17.*{words}.*[Ee]xport a URDF"):
         load_robot(tmp_path / name)
@@ -121,6 +121,6 @@ def test_the_remedy_for_a_branching_arm_works_where_it_is_given(shared: Path, tm
 
 
 def test_a_recipe_given_as_robot_is_recognised(shared: Path) -> None:
-    """What describes a recording describes no robot; the robot that it names is the remedy."""
+    """A recipe is named as one, and the robot in it is the remedy."""
     with pytest.raises(UsageError, match=r"recipe of rrrid import.*arm\.urdf"):
         load_robot(shared / "cases" / "46-panda-tip-link-remedy" / "r2.toml")

@@ -105,7 +105,7 @@ def test_a_pattern_cannot_hang_the_import(pattern: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("digits", [400, 5000])
 def test_numbers_of_hundreds_of_digits_in_a_model(digits: int) -> None:
-    """Wherever a model has a number, one that no float holds rejects it (S18), or its version (F11)."""
+    """A number that no float holds rejects the model (S18), or its version (F11), at any place."""
     model = json.loads(shipped("models", "rrr").read_text())
     places = [(model["base_parameters"][0], "value"), (model["base_parameters"][0], "std"), (model, "format_version"),
               (model["friction"][0], "joint")]
@@ -114,7 +114,7 @@ def test_numbers_of_hundreds_of_digits_in_a_model(digits: int) -> None:
         text = json.dumps(model).replace("12345678901", "9" * digits)
         owner[key] = before
         if key == "joint" and digits == 400:
-            continue  # a whole number: that the arm has fewer joints is told where the arm is made of it
+            continue  # a whole number, refused where the arm is built: it has fewer joints
         with pytest.raises(InputRejected, match=r"RRID-(S18|F11)"):
             parse_model(text)
 
@@ -169,14 +169,14 @@ def test_without_shared_memory_a_batch_says_so(logs: Path) -> None:
     done = subprocess.run(["unshare", "-m", "bash", "-c", inside], capture_output=True, text=True, cwd=logs, check=False,
                           env=os.environ | {"PYTHONPATH": str(REPO)}, timeout=120)
     if "unshare" in done.stderr or "mount" in done.stderr:
-        pytest.skip("this machine lets nobody mount")
+        pytest.skip("mounting is not permitted here")
     assert done.returncode == 6
     assert "RRID-P04" in done.stderr
     assert "/dev/shm" in done.stderr
 
 
 def test_the_folders_of_a_killed_batch_are_swept(logs: Path, request: pytest.FixtureRequest) -> None:
-    """What a batch had in the folder for temporary files when it was killed, the next one removes, and its own at its end."""
+    """A batch removes the temporary folders of one that was killed, and its own at its end."""
     temporary = Path(tempfile.mkdtemp(prefix="r-"))  # short: a socket's name has 108 characters
     request.addfinalizer(lambda: shutil.rmtree(temporary, ignore_errors=True))
     for k in range(40):
@@ -198,14 +198,14 @@ def test_the_folders_of_a_killed_batch_are_swept(logs: Path, request: pytest.Fix
 
 
 def test_circles_of_links_cost_their_logs_alone(logs: Path) -> None:
-    """A link to itself and two to each other are told; linked logs are read, by a stage and by a batch."""
+    """A link to itself and a link to its folder are warned of; a linked log is read."""
     folder = logs / "linked"
     folder.mkdir()
     (folder / "self.h5").symlink_to("self.h5")
     (folder / "round").symlink_to(".")
     (folder / "a.h5").symlink_to(logs / "logs" / "a.h5")
     done = rrrid("inspect", "linked", "--no-report", "--json", cwd=logs)
-    assert done.returncode in (0, 3), done.stderr  # 3: the small log is none of a motion
+    assert done.returncode in (0, 3), done.stderr  # 3: the small log holds no plausible motion
     assert [log["name"] for log in json.loads(done.stdout)["logs"]] == ["small"]
     assert {Path(c["where"]).name for c in json.loads(done.stdout)["checks"] if c["code"] == "RRID-X11"} == {"self.h5", "round"}
 
@@ -235,3 +235,16 @@ def test_a_short_log_says_by_how_much(tmp_path: Path) -> None:
         assert "RRID-T08" in getattr(done, stream)
         assert "50 samples, 0.05 s" in getattr(done, stream)
         assert "100" in getattr(done, stream)
+
+
+def test_a_verdict_is_never_cut_off() -> None:
+    """However much a run has to say, its last word is printed."""
+    from io import StringIO
+
+    from pipelines.report.report import Report
+    from rrrid_cli.console import say_verdict
+
+    stream = StringIO()
+    verdict = " ".join(f"Joint {k} has friction of its own." for k in range(200)) + " The end."
+    say_verdict(Report("Run", verdict, "attention", None, ()), stream)
+    assert stream.getvalue() == verdict + "\n"
