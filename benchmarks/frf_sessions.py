@@ -1,4 +1,4 @@
-"""Sessions of frequency responses on a plant of their own: what gives way, whatever v, loop, rate and band.
+"""Sessions of frequency responses on a plant of their own: compliance found for any v, loop, rate and band.
 
     nice python -m benchmarks.frf_sessions [--seed 1] [--count 60]
 

@@ -24,7 +24,7 @@ __all__ = ["BandConfig", "ExcitedBand", "excited_band"]
 
 @dataclass(frozen=True)
 class BandConfig:
-    """What counts as excited.
+    """Limits of the excited band.
 
     Attributes:
         power: of v's mean density, weighted with itself, that a frequency needs: 40 dB down windows leak as much.
@@ -49,16 +49,12 @@ class ExcitedBand:
     intervals: tuple[tuple[float, float], ...]  # [Hz]
 
     def holds(self, frequency: Array) -> npt.NDArray[np.bool_]:
-        """Which of `frequency` [Hz] (any shape) lie in an interval."""
+        """Return a mask of the `frequency` [Hz] (any shape) that lie in an interval."""
         f = np.asarray(frequency)
         inside = np.zeros(f.shape, dtype=bool)
         for low, high in self.intervals:
             inside |= (f >= low) & (f <= high)
         return inside
-
-    def holds_all(self, low: float, high: float) -> bool:
-        """Whether one interval holds everything from `low` to `high` [Hz]."""
-        return any(a <= low and high <= b for a, b in self.intervals)
 
 
 def excited_band(responses: Responses, density: Array, config: BandConfig | None = None) -> ExcitedBand:

@@ -68,7 +68,7 @@ def test_a_firm_arm_under_pd_is_rigid(shared: Path, arm: str) -> None:
 
 
 def test_a_soft_base_under_pd(shared: Path) -> None:
-    """Its frequency within 3 %, its inertia within 15 %, and nothing beside it."""
+    """Its frequency within 3 %, its inertia within 15 %, and no other finding."""
     truth = json.loads((shared / "plant-b" / "answers.json").read_text())["arm-06"]["truth"][0]["parameters"]
     (base,) = _found(shared, "06", (1,)).classification
     assert base.kind == "base"
@@ -93,7 +93,7 @@ def test_a_gap_is_no_spring(shared: Path) -> None:
 
 
 def test_the_excited_band_is_that_of_v(shared: Path) -> None:
-    """Of v from 4 to 150 Hz: within 2 Hz of it, whatever the responses show beyond."""
+    """Of v from 4 to 150 Hz: within 2 Hz of it."""
     (measured,) = measured_responses([open_log(shared / "plant-b" / "arm-02" / "frf-3.h5").log])
     ((low, high),) = measured.excited.intervals
     assert low == pytest.approx(4.0, abs=2.0)

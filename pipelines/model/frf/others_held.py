@@ -2,7 +2,7 @@
 
     τ_j = Z_jj(s) a_j + F(s) Σ_k D_jk a_k,    Z_jj(s) = D_jj + Σ_m (c_m + d_m s) / (1 + b_m s + a_m s²) + friction, gravity
 
-a_k are accelerations and D is the mass matrix. What gives way makes the poles of the dynamic stiffness Z (Ewins 2000, Modal
+a_k are accelerations and D is the mass matrix. Compliance makes the poles of the dynamic stiffness Z (Ewins 2000, Modal
 Testing, §2.4): a base those of Z_jj alone (F = 1), a spring in the joint those of all that its link carries (F = 1 over its
 section). The other joints are held by their controllers, and above the band of those they swing freely: the inertia at joint j
 then falls from D_jj towards 1 / (D⁻¹)_jj, which looks like a heavily damped mode. Their motion is in the log; with it D_jk is
@@ -54,7 +54,7 @@ class _Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """What is fitted at every frequency."""
+    """Equations of one fit, at every frequency."""
 
     torque: Complex  # (bins,)
     acceleration: Complex  # a_j, then those of the others (bins, joints)
@@ -99,7 +99,7 @@ def _taking(responses: Responses, coupling: Complex, rigid: Complex, torque: int
 
 
 def _with_poles(rows: _Rows, config: HeldConfig) -> _Fit:
-    """A pair of poles more as long as that explains most of what is left."""
+    """Add pairs of poles as long as each explains most of the residual."""
     best = _least_squares(rows, (), None)
     for number in range(config.poles):
         if best.cost <= 2.0 * len(rows.s):  # explained to within `floor` and noise (Morozov's discrepancy principle)
