@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -28,6 +27,7 @@ class RawTable:
     units: Mapping[str, str] = field(default_factory=dict)  # what a header says
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # matrix -> its columns
     text: Mapping[str, str] = field(default_factory=dict)  # columns that are not numbers -> an example
+    labels: Mapping[str, str] = field(default_factory=dict)  # those of them that hold one text throughout -> that text
     lines: npt.NDArray[np.int64] | None = None  # (samples,) line numbers, in a text file
     breaks: tuple[int, ...] = ()  # index of the first sample after damage: the clock of a fixed rate is lost there
     checks: tuple[Check, ...] = ()
@@ -166,9 +166,3 @@ def _upright(name: str, array: npt.NDArray[np.generic], source: str, checks: lis
         return matrix.T
     raise InputRejected("S11", f"'{name}' has shape {matrix.shape}: which side is time cannot be told", where=source,
                         remedy="store one row a sample, with many more samples than columns")
-
-
-def header_unit(name: str) -> tuple[str, str]:
-    """("q1", "deg") from "q1 [deg]" or "q1 (deg)"; the unit is empty where the header says none."""
-    found = re.fullmatch(r"\s*(.*?)\s*[\[(]\s*([^\[\]()]{1,20})\s*[\])]\s*", name)
-    return (found.group(1), found.group(2)) if found and found.group(1) else (name.strip(), "")

@@ -25,7 +25,7 @@ from pipelines.log.text import read_small_text
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 
-_RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy")
+_RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".json", ".jsonl")
 
 Map = Mapping[str, Mapping[int, str]]
 
