@@ -60,12 +60,12 @@ class RawTable:
 
     def _remedy(self, column: str, wanted: str) -> str:
         """Which columns could be meant: by their names, those of the signal that was asked for."""
-        from pipelines.log.recording.column_roles import role_of
+        from pipelines.log.recording.column_names import signal_of
 
         if not wanted:
             return "correct the recipe"
         signal = wanted.rpartition("_")[0] or wanted
-        fitting = [name for name in self.columns if role_of(name) == signal]
+        fitting = [name for name in self.columns if signal_of(name) == signal]
         near = difflib.get_close_matches(column, fitting or list(self.columns), n=1) or fitting[:1]
         if not near:
             return f"correct the recipe, or pass --map {wanted}='…' with the column of {wanted}"

@@ -248,6 +248,10 @@ def _meaning(recipe: Recipe, where: object) -> None:
     if recipe.time.sample_time is not None and recipe.time.sample_time > 1.0:
         raise InputRejected("S09", f"time.sample_time is {recipe.time.sample_time:g} s: a rate?", where=where,
                             remedy=f"write rate = {recipe.time.sample_time:g}")
+    parts = recipe.time.column if isinstance(recipe.time.column, tuple) else ()
+    if isinstance(recipe.time.unit, tuple) and len(recipe.time.unit) != len(parts):
+        raise UsageError("C02", f"'time.unit' holds {len(recipe.time.unit)} units for {max(1, len(parts))} columns", where=where,
+                         remedy='give one unit a column: column = ["sec", "nanosec"], unit = ["s", "ns"]')
     if recipe.time.rate is not None and recipe.time.sample_time is not None:
         raise UsageError("C02", "'time' has both rate and sample_time", where=where, remedy="give one of them")
     if recipe.time.column is None and recipe.time.rate is None and recipe.time.sample_time is None:

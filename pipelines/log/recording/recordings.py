@@ -238,9 +238,9 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
                 undeclared.append(f"{signal}: unit {units[signal]} {origin}")
         if not here and file != source.primary:
             continue
-        own_clock = time.column is None or file == source.primary or isinstance(time.column, int) or time.column in table.columns
-        open_unit = own_clock and time.column is not None and time.unit is None
-        if open_unit and (header := table.units.get(table.name_of(time.column or 1, "t"))):
+        own_clock = file == source.primary or all(isinstance(c, int) or c in table.columns for c, _ in time.parts)
+        if own_clock and time.unit is None and len(time.parts) == 1 and (
+                header := table.units.get(table.name_of(time.parts[0][0], "t"))):
             undeclared.append(f"t: unit {header} from the header")
         t, said = time_of(table, time, assume_units) if own_clock else (np.full(table.rows.size, np.nan), [])
         checks += said
