@@ -46,15 +46,23 @@ class Clock:
 
 def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     """Return the clock of the recording; None where no column rises like one."""
-    times = [c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "time")]
-    counters = [c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "index")]
+    times = [
+        c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "time")
+    ]
+    counters = [
+        c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "index")
+    ]
     plain = [c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "")]
-    found = [clock for pair in itertools.pairwise(times) if (clock := _pair(table, *pair, named=True))]
+    found = [
+        clock for pair in itertools.pairwise(times) if (clock := _pair(table, *pair, named=True))
+    ]
     found += [_single(table, c) for c in times if _rises(table.columns[c])]
     if found:
         uneven = [_unevenness(clock.values) for clock in found]
         best = min(uneven)
-        return next(clock for clock, value in zip(found, uneven, strict=True) if value <= 2.0 * best + 1e-6)
+        return next(
+            clock for clock, value in zip(found, uneven, strict=True) if value <= 2.0 * best + 1e-6
+        )
     if len(plain) > 2 and (clock := _pair(table, plain[0], plain[1], named=False)):
         return clock
     for column in plain[:1] if len(table.columns) > 2 else []:
@@ -62,7 +70,11 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         if (steps > 0).all() and np.std(steps) < _EVEN * np.mean(steps):
             return _single(table, column)
     counted = [c for c in counters if _rises(table.columns[c])]
-    return Clock((counted[0],), ("sample",), table.columns[counted[0]]) if counted else None
+    if not counted:
+        return None
+    values = table.columns[counted[0]]
+    single = np.median(np.diff(values)) == 1.0  # KUKA's IPOC counts ms, in steps of its cycle
+    return Clock((counted[0],), ("sample" if single else "",), values)
 
 
 def _single(table: RawTable, column: str) -> Clock:
@@ -71,7 +83,15 @@ def _single(table: RawTable, column: str) -> Clock:
 
 
 def _rises(values: Array) -> bool:
-    return float(np.mean(np.diff(values) > 0)) > _RISING
+    """Tell whether a column rises like a clock; a fraction of a second that starts again is none by itself."""
+    steps = np.diff(values)
+    falls = -steps[steps < 0]
+    again = (
+        any(abs(falls.max() / full - 1.0) < 0.1 for full in (1e3, 1e6, 1e9))
+        if falls.size
+        else False
+    )
+    return float(np.mean(steps > 0)) > _RISING and not (again and values.min() >= 0.0)
 
 
 def _unevenness(values: Array) -> float:
@@ -84,7 +104,9 @@ def _pair(table: RawTable, whole: str, fraction: str, named: bool) -> Clock | No
     a, b = table.columns[whole], table.columns[fraction]
     if (a != np.round(a)).any() or (b < 0).any() or (b != np.round(b)).any() or _rises(a):
         return None
-    if named and [w for w in words_of(whole) if not _second(w)] != [w for w in words_of(fraction) if not _second(w)]:
+    if named and [w for w in words_of(whole) if not _second(w)] != [
+        w for w in words_of(fraction) if not _second(w)
+    ]:
         return None
     unit = read_name(fraction).unit if named else ""
     for candidate in (unit,) if unit in ("ns", "us", "ms") else ("ns", "us", "ms"):
@@ -111,20 +133,36 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
     steps = np.diff(clock.values)
     median = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     if clock.paired:
-        return "s", Guess("s", "sure", f"whole seconds and {clock.units[1]} together rise by {median:.4g} s, {1 / median:.4g} Hz")
+        return "s", Guess(
+            "s",
+            "sure",
+            f"whole seconds and {clock.units[1]} together rise by {median:.4g} s, {1 / median:.4g} Hz",
+        )
     if clock.units[0] == "sample":
         return "sample", Guess("sample", "likely", "named a counter: the rate is not in the file")
     named = clock.units[0]
     if named and 0.1 * _RATES[0] <= 1.0 / (median * SECONDS[named]) <= 10.0 * _RATES[1]:
-        return named, Guess(named, "sure", f"named so, and a median step of {median:.4g} makes "
-                            f"{1 / (median * SECONDS[named]):.4g} Hz")
+        return named, Guess(
+            named,
+            "sure",
+            f"named so, and a median step of {median:.4g} makes "
+            f"{1 / (median * SECONDS[named]):.4g} Hz",
+        )
     fits = [unit for unit, f in SECONDS.items() if _RATES[0] <= 1.0 / (median * f) <= _RATES[1]]
-    if (since := [unit for unit in fits if _EPOCH[0] < clock.values[0] * SECONDS[unit] < _EPOCH[1]]) and len(since) == 1:
-        return since[0], Guess(since[0], "sure", f"counted since 1970, and a median step of {median:.4g} makes "
-                               f"{1 / (median * SECONDS[since[0]]):.4g} Hz")
+    if (
+        since := [unit for unit in fits if _EPOCH[0] < clock.values[0] * SECONDS[unit] < _EPOCH[1]]
+    ) and len(since) == 1:
+        return since[0], Guess(
+            since[0],
+            "sure",
+            f"counted since 1970, and a median step of {median:.4g} makes "
+            f"{1 / (median * SECONDS[since[0]]):.4g} Hz",
+        )
     rates = {unit: f"{1 / (median * SECONDS[unit]):.4g} Hz in {unit}" for unit in fits}
     counts = bool(np.mean(steps == 1.0) > _RISING) and clock.values[0] in (0.0, 1.0)
-    why = [f"a median step of {median:.4g} would be {' or '.join(rates.values()) or 'no plausible rate'}"]
+    why = [
+        f"a median step of {median:.4g} would be {' or '.join(rates.values()) or 'no plausible rate'}"
+    ]
     if q is not None and (span := float(np.ptp(q, axis=0).max())) > 0:
         pace = _pace(clock.values, q) / span
         paced = [unit for unit in fits if _PACE[0] <= pace / SECONDS[unit] <= _PACE[1]]
@@ -134,16 +172,24 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
     if slope is not None:
         agreeing = [unit for unit in fits if _ratio_of(slope.factor / SECONDS[unit])]
         if len(agreeing) == 1:
-            return agreeing[0], Guess(agreeing[0], "likely", f"{'; '.join(why)}; the recorded velocity agrees")
+            return agreeing[0], Guess(
+                agreeing[0], "likely", f"{'; '.join(why)}; the recorded velocity agrees"
+            )
     if len(fits) == 1 and not counts:
         return fits[0], Guess(fits[0], "likely", "; ".join(why))
-    why += ['0, 1, 2, … may also count samples: then unit = "sample" and rate = … [Hz]'] if counts else []
+    why += (
+        ['0, 1, 2, … may also count samples: then unit = "sample" and rate = … [Hz]']
+        if counts
+        else []
+    )
     return "", Guess("", "unsure", "; ".join(why))
 
 
 def _ratio_of(factor: float) -> bool:
     """Tell whether slope over velocity is a ratio of the units people use."""
-    return factor > 0 and any(abs(factor / ratio - 1.0) < _RATIO_TOLERANCE for ratio in ANGULAR_RATIOS)
+    return factor > 0 and any(
+        abs(factor / ratio - 1.0) < _RATIO_TOLERANCE for ratio in ANGULAR_RATIOS
+    )
 
 
 def _pace(t: Array, q: Array) -> float:

@@ -8,7 +8,7 @@ numbers give the order, and names without number leave the order of the file.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -19,9 +19,12 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
 from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["Choice", "Group", "choose", "companion_of", "file_quantity", "groups_of", "unit_of_group"]
+__all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of", "texts_of", "unit_of_group"]
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
+
+
+Order = Literal["robot", "numbers", "file", "text"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Group:
     partial: bool
     filtered: bool
     columns: tuple[str, ...]
-    order: Literal["robot", "numbers", "file"]
+    order: Order  # text: as columns of text name them, and no robot has these names
     words: str  # the group in words, for comments
 
     @property
@@ -53,7 +56,7 @@ class Choice:
 
 def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     """Return the groups of the columns of `table`; `joints` names the robot's, from the base to the tip."""
-    labels = _labelled(table, joints)
+    texts = texts_of(table, joints)
     found: dict[tuple[object, ...], list[tuple[ColumnName, int | None]]] = {}
     for column in table.columns:
         rest, place = _without_joint(column, joints)
@@ -65,7 +68,7 @@ def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     groups = []
     for members in found.values():
         for part in _split(members):
-            groups.append(_ordered(part, joints, labels))
+            groups.append(_ordered(part, joints, texts))
     return groups
 
 
@@ -90,14 +93,28 @@ def _place_by_words(label: Sequence[str], joints: Sequence[str]) -> int | None:
     return matches[0] if len(matches) == 1 else None
 
 
-def _labelled(table: RawTable, joints: Sequence[str]) -> Mapping[int, int]:
-    """Return number -> place of the joint that a column of text names: name[0] is "elbow_joint" throughout."""
-    found: dict[int, int] = {}
+def texts_of(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that columns of text name, one a column, in the order of the file: name[0] is "elbow_joint" throughout."""
+    texts = list(table.labels.values())
+    known = [k for k, text in enumerate(texts) if text in joints]
+    if known:
+        return tuple(texts[known[0]: known[-1] + 1])
+    families: dict[tuple[str, ...], list[str]] = {}
     for column, text in table.labels.items():
-        numbers = re.findall(r"\d+", column)
-        if text in joints and numbers:
-            found[int(numbers[-1])] = list(joints).index(text)
-    return found if len(set(found.values())) == len(joints) > 0 else {}
+        families.setdefault(tuple(word for word in words_of(column) if not word.isdecimal()), []).append(text)
+    found = max(families.values(), key=len, default=[])
+    return tuple(found) if len(set(found)) == len(found) > 1 else ()
+
+
+def by_texts(columns: Sequence[str], texts: Sequence[str], joints: Sequence[str]) -> tuple[list[str], Order | None]:
+    """Return the columns in the robot's order by the `texts` that name them; None where the texts say nothing of them."""
+    if len(texts) != len(columns) or len(texts) < 2:
+        return list(columns), None
+    if joints and set(joints) <= set(texts):
+        return [columns[list(texts).index(joint)] for joint in joints], "robot"
+    numbers = [_number(words_of(text)) for text in texts]
+    rising = None not in numbers and numbers == sorted(numbers, key=lambda number: number or 0)
+    return list(columns), None if rising else "text"
 
 
 def _split(members: list[tuple[ColumnName, int | None]]) -> list[list[tuple[ColumnName, int | None]]]:
@@ -115,23 +132,24 @@ def _split(members: list[tuple[ColumnName, int | None]]) -> list[list[tuple[Colu
     return list(parts.values()) if len(several) == len(parts) else [members]
 
 
-def _ordered(members: list[tuple[ColumnName, int | None]], joints: Sequence[str], labels: Mapping[int, int]) -> Group:
+def _ordered(members: list[tuple[ColumnName, int | None]], joints: Sequence[str], texts: Sequence[str]) -> Group:
     """Return the group with its columns from the base to the tip, as far as that can be known."""
     names = [name for name, _ in members]
-    places: list[int | None] = [place for _, place in members]
+    places = [place for _, place in members]
     numbers = [_number(name.label) for name in names]
-    if labels and all(number in labels for number in numbers):
-        places = [labels[number] for number in numbers if number is not None]
-    order: Literal["robot", "numbers", "file"] = "file"
+    order: Order = "file"
     if joints and sorted(place for place in places if place is not None) == list(range(len(joints))):
-        chosen = sorted((place, k) for k, place in enumerate(places) if place is not None)
-        names, order = [names[k] for _, k in chosen], "robot"
+        names, order = [names[places.index(place)] for place in range(len(joints))], "robot"
     elif None not in numbers and len(set(numbers)) == len(numbers) and all(place is None for place in places):
         names, order = [names[k] for k in sorted(range(len(names)), key=lambda k: numbers[k] or 0)], "numbers"
+    columns = [name.column for name in names]
+    if order != "robot":
+        columns, by_text = by_texts(columns, texts, joints)
+        order = by_text or order
     first = names[0]
     words = " ".join(first.role) or " ".join(first.label)
     return Group(first.quantity, first.origin, first.motor, first.partial, first.filtered,
-                 tuple(name.column for name in names), order, words)
+                 tuple(columns), order, words)
 
 
 def _number(label: Sequence[str]) -> int | None:

@@ -21,7 +21,7 @@ from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.clock_guess import SECONDS, unit_of_clock
-from pipelines.log.recording.column_roles import Choice, Group, unit_of_group
+from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
     Slope,
@@ -279,7 +279,9 @@ class _Drafting:
         return f'"{words[0]}"' if len(set(words)) == 1 else f"[{', '.join(map(_quoted, words))}]"
 
     def _out_of_order(self, group: Group) -> bool:
-        """Tell whether the order of the joints is open: named in the file's alphabetical order, and not as the robot names them."""
+        """Tell whether the order of the joints is open: alphabetical names, or texts, that are not the robot's."""
+        if group.order == "text":
+            return True
         if group.order != "file" or len(group.columns) < 3 or self.reading.by_evidence:
             return False
         lower = [column.lower() for column in group.columns]
@@ -340,8 +342,10 @@ class _Drafting:
             lines[0] += "   # no column looks like it"
             return lines
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
-        alphabetical = "in alphabetical order; write them from the base to the tip"
-        return [*lines, *(f"    # {alphabetical if g is choice.group else 'candidate'}: {_columns(g.columns)}" for g in found[:8])]
+        texts = ", ".join(clean(text, 40) for text in texts_of(self.reading.table, ())) if found[0].order == "text" else ""
+        order = f"these are {texts}" if texts else "in alphabetical order"
+        ask = f"{order}; write them from the base to the tip"
+        return [*lines, *(f"    # {ask if g is choice.group else 'candidate'}: {_columns(g.columns)}" for g in found[:8])]
 
     def _drive(self) -> list[str]:
         ratios = [str(abs(self.ratios[j])) + ".0" if j in self.ratios else f'"{BLANK}"' for j in range(self.n)]

@@ -38,8 +38,9 @@ class Header:
     skipped: int  # lines above it that are neither names nor units
 
 
-def find_header(lines: list[Line], text: str, dialect: Dialect, source: str,
-                has_header: bool | None) -> Header:
+def find_header(
+    lines: list[Line], text: str, dialect: Dialect, source: str, has_header: bool | None
+) -> Header:
     """Return the header of a table.
 
     Args:
@@ -50,27 +51,33 @@ def find_header(lines: list[Line], text: str, dialect: Dialect, source: str,
         InputRejected: F16, one name more or less than columns; S03, two columns of one name.
     """
     width = dialect.width
-    table = [i for i, (_, line) in enumerate(lines[:_SEARCHED + _SAMPLED])
-             if len(cells_of(line, dialect.delimiter)) == width]
+    table = [
+        i
+        for i, (_, line) in enumerate(lines[: _SEARCHED + _SAMPLED])
+        if len(cells_of(line, dialect.delimiter)) == width
+    ]
     start = table[0] if table else 0
     if has_header is False:
         return _numbered(width, start)
     cells = [cells_of(lines[i][1], dialect.delimiter) for i in table]
     numeric = _numeric_columns(cells[2:] or cells[1:] or cells, dialect)
-    first = next((i for i, row in zip(table, cells, strict=True) if _is_data(row, numeric, dialect)),
-                 len(lines))
+    first = next(
+        (i for i, row in zip(table, cells, strict=True) if _is_data(row, numeric, dialect)),
+        len(lines),
+    )
     if first == len(lines) or not numeric:
         first = start + 1  # words alone: the first line names them
     number = lines[first][0] if first < len(lines) else lines[-1][0] + 1
     comments = _raw_lines_above(text, number, {n for n, _ in lines[:first]})
-    above = sorted([(*line, False) for line in lines[max(0, first - _SEARCHED):first]] + comments)
+    above = sorted([(*line, False) for line in lines[max(0, first - _SEARCHED) : first]] + comments)
     names, units, used = _names_above(above, dialect, numeric, cells, source)
     if names is None:
         return _numbered(width, first, skipped=first)
     plain = {n for n, _ in lines[:first]}
     named, found = names_and_units(names, source, min(used))
-    found |= {name: unit for name, unit in zip(named, units, strict=True)
-              if unit.lower() not in _NO_UNIT}
+    found |= {
+        name: unit for name, unit in zip(named, units, strict=True) if unit.lower() not in _NO_UNIT
+    }
     return Header(named, found, first, len(plain - used))
 
 
@@ -100,14 +107,20 @@ def _raw_lines_above(text: str, number: int, known: set[int]) -> list[tuple[int,
     """Return (line number, line, True) of the comments above line `number`."""
     above = text.split("\n", number)[: number - 1]
     begin = max(0, len(above) - _SEARCHED)
-    return [(k, line.lstrip().lstrip(_MARKS).strip(), True)
-            for k, line in enumerate(above[begin:], start=begin + 1)
-            if line.strip() and k not in known]
+    return [
+        (k, line.lstrip().lstrip(_MARKS).strip(), True)
+        for k, line in enumerate(above[begin:], start=begin + 1)
+        if line.strip() and k not in known
+    ]
 
 
-def _names_above(above: Sequence[tuple[int, str, bool]], dialect: Dialect, numeric: Sequence[int],
-                 rows: Sequence[Sequence[str]], source: str) -> tuple[
-                     tuple[str, ...] | None, tuple[str, ...], set[int]]:
+def _names_above(
+    above: Sequence[tuple[int, str, bool]],
+    dialect: Dialect,
+    numeric: Sequence[int],
+    rows: Sequence[Sequence[str]],
+    source: str,
+) -> tuple[tuple[str, ...] | None, tuple[str, ...], set[int]]:
     """Return names, units (empty where there are none) and the numbers of the lines they are in."""
     width = dialect.width
     units, unit_line = ("",) * width, 0
@@ -130,10 +143,12 @@ def _names_above(above: Sequence[tuple[int, str, bool]], dialect: Dialect, numer
             break
     if best is None:
         if odd is not None:
-            raise InputRejected("F16", f"{odd[1]} names above {width} columns",
-                                where=f"{source}, line {odd[0]}",
-                                remedy="correct the header, or give [format] header = false and "
-                                       "columns by number")
+            raise InputRejected(
+                "F16",
+                f"{odd[1]} names above {width} columns",
+                where=f"{source}, line {odd[0]}",
+                remedy="correct the header, or give [format] header = false and columns by number",
+            )
         return None, units, set()
     return best[1], units, {best[2], unit_line} - {0}
 
@@ -159,14 +174,19 @@ def _fitted(cells: list[str], width: int, rows: Sequence[Sequence[str]]) -> list
 
 
 def _from(first: str, count: int) -> range:
-    return range(int(first), int(first) + count) if first.isdecimal() and len(first) < 19 else range(0)
+    return (
+        range(int(first), int(first) + count) if first.isdecimal() and len(first) < 19 else range(0)
+    )
 
 
 def _words(cells: Sequence[str]) -> bool:
     """Tell whether the cells can be names: words, bare numbers among them at most, no formula."""
     words = [cell for cell in cells if cell and not is_number(cell)]
-    return bool(words) and all(cell in words or not cell or cell.isdecimal() for cell in cells) \
+    return (
+        bool(words)
+        and all(cell in words or not cell or cell.isdecimal() for cell in cells)
         and not any(_FORMULA.fullmatch(cell) for cell in words)
+    )
 
 
 def _counted(cells: Sequence[str], numeric: Sequence[int]) -> bool:
@@ -188,8 +208,9 @@ def split_unit(name: str) -> tuple[str, str]:
     return found.group(1), found.group(2)
 
 
-def names_and_units(cells: Sequence[str], source: str, line: int) -> tuple[
-        tuple[str, ...], dict[str, str]]:
+def names_and_units(
+    cells: Sequence[str], source: str, line: int
+) -> tuple[tuple[str, ...], dict[str, str]]:
     """Return the names and the units in brackets behind them.
 
     Names that differ only in their brackets keep them: "q[elbow]", "axis 1 (deg)", "axis 1 (Nm)".
@@ -199,12 +220,16 @@ def names_and_units(cells: Sequence[str], source: str, line: int) -> tuple[
     """
     pairs = [split_unit(cell) for cell in cells]
     short = [name for name, _ in pairs]
-    names = tuple((cell.strip() if short.count(name) > 1 else name) or f"column_{j + 1}"
-                  for j, (cell, name) in enumerate(zip(cells, short, strict=True)))
+    names = tuple(
+        (cell.strip() if short.count(name) > 1 else name) or f"column_{j + 1}"
+        for j, (cell, name) in enumerate(zip(cells, short, strict=True))
+    )
     for j, name in enumerate(names):
         if name in names[:j]:
-            raise InputRejected("S03",
-                                f"columns {names.index(name) + 1} and {j + 1} are both named '{name}'",
-                                where=f"{source}, line {line}",
-                                remedy="rename one of them in the file")
+            raise InputRejected(
+                "S03",
+                f"columns {names.index(name) + 1} and {j + 1} are both named '{name}'",
+                where=f"{source}, line {line}",
+                remedy="rename one of them in the file",
+            )
     return names, {name: unit for name, (_, unit) in zip(names, pairs, strict=True) if unit}

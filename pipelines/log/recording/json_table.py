@@ -1,8 +1,8 @@
 """Read a JSON recording: a list of frames, frames one a line, or arrays by name.
 
-    [{"t": 0.0, "q": [0.1, 0.2]}, …]            columns t, q[0], q[1]
-    {"frames": [{"joints": {"j1": {"pos": 0.1}}}, …]}       joints.j1.pos
-    {"t": [0.0, …], "q": [[0.1, 0.2], …]}       t, q_1, q_2
+[{"t": 0.0, "q": [0.1, 0.2]}, …]            columns t, q[0], q[1]
+{"frames": [{"joints": {"j1": {"pos": 0.1}}}, …]}       joints.j1.pos
+{"t": [0.0, …], "q": [[0.1, 0.2], …]}       t, q_1, q_2
 """
 
 from __future__ import annotations
@@ -27,7 +27,13 @@ _MOST_COLUMNS = 2000
 
 def is_json(data: bytes) -> bool:
     """Tell whether the file begins as JSON does: a list of lists or objects, or an object."""
-    head = data[:256].lstrip(b"\xef\xbb\xbf \t\r\n").replace(b" ", b"").replace(b"\n", b"").replace(b"\r", b"")
+    head = (
+        data[:256]
+        .lstrip(b"\xef\xbb\xbf \t\r\n")
+        .replace(b" ", b"")
+        .replace(b"\n", b"")
+        .replace(b"\r", b"")
+    )
     return head.startswith((b'{"', b"[{", b"[[", b"{}", b"[]"))
 
 
@@ -38,17 +44,28 @@ def read_json(data: bytes, source: str) -> RawTable:
         InputRejected: F08 not JSON, S12 no recording in it, X05 larger than a recording.
     """
     if len(data) > _LARGEST:
-        raise InputRejected("X05", f"{len(data)} bytes of JSON; import reads up to {_LARGEST}", where=source,
-                            remedy="split the recording, or save it as CSV or NPY")
+        raise InputRejected(
+            "X05",
+            f"{len(data)} bytes of JSON; import reads up to {_LARGEST}",
+            where=source,
+            remedy="split the recording, or save it as CSV or NPY",
+        )
     document = _parsed(data, source)
     frames = _frames(document, _DEEPEST)
     if frames is not None:
         return _table_of_frames(frames, source)
-    arrays = {name: values for name, value in _named(document, "", _DEEPEST)
-              if (values := _array(value)) is not None}
+    arrays = {
+        name: values
+        for name, value in _named(document, "", _DEEPEST)
+        if (values := _array(value)) is not None
+    }
     if not arrays:
-        raise InputRejected("S12", "no list of samples in the JSON file", where=source,
-                            remedy="save a list of frames, or one array a signal")
+        raise InputRejected(
+            "S12",
+            "no list of samples in the JSON file",
+            where=source,
+            remedy="save a list of frames, or one array a signal",
+        )
     return columns_of_arrays(arrays, source)
 
 
@@ -61,8 +78,12 @@ def _parsed(data: bytes, source: str) -> Any:
             lines = text.splitlines()
             return [json.loads(line) for line in lines if line.strip()]
     except (ValueError, RecursionError) as problem:
-        raise InputRejected("F08", f"not valid JSON: {problem}", where=source,
-                            remedy="copy the file again, or end the recording before it is copied") from None
+        raise InputRejected(
+            "F08",
+            f"not valid JSON: {problem}",
+            where=source,
+            remedy="copy the file again, or end the recording before it is copied",
+        ) from None
 
 
 def _frames(value: Any, depth: int) -> list[Mapping[str, Any]] | None:
@@ -102,8 +123,11 @@ def _cells(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
             continue
         for k, item in enumerate(value):
             if isinstance(item, dict):
-                yield from ((f"{path}[{k}].{inner}", f"{path}[{k}].{inner}", cell)
-                            for inner, cell in _named(item, "", _DEEPEST) if not isinstance(cell, list))
+                yield from (
+                    (f"{path}[{k}].{inner}", f"{path}[{k}].{inner}", cell)
+                    for inner, cell in _named(item, "", _DEEPEST)
+                    if not isinstance(cell, list)
+                )
             elif not isinstance(item, list):
                 yield f"{path}[{k}]", path, item
 
@@ -119,17 +143,32 @@ def _table_of_frames(frames: list[Mapping[str, Any]], source: str) -> RawTable:
             elif isinstance(value, int | float):
                 if path not in columns:
                     if len(columns) == _MOST_COLUMNS:
-                        raise InputRejected("X05", f"more than {_MOST_COLUMNS} numbers in a frame", where=source,
-                                            remedy="save the signals of the joints alone")
+                        raise InputRejected(
+                            "X05",
+                            f"more than {_MOST_COLUMNS} numbers in a frame",
+                            where=source,
+                            remedy="save the signals of the joints alone",
+                        )
                     columns[path] = np.full(len(frames), np.nan)
                     groups.setdefault(group, []).append(path)
                 columns[path][i] = _real(value)
     if not columns:
-        raise InputRejected("S12", "the frames hold no numbers", where=source, remedy="save the samples as numbers")
-    labels = {path: found[0] for path, found in texts.items() if len(found) == len(frames) and len(set(found)) == 1}
-    return RawTable(source, columns, np.arange(len(frames)), labels=labels,
-                    groups={name: tuple(paths) for name, paths in groups.items() if paths != [name]},
-                    text={path: found[0][:40] for path, found in texts.items() if path not in columns})
+        raise InputRejected(
+            "S12", "the frames hold no numbers", where=source, remedy="save the samples as numbers"
+        )
+    labels = {
+        path: found[0]
+        for path, found in texts.items()
+        if len(found) == len(frames) and len(set(found)) == 1
+    }
+    return RawTable(
+        source,
+        columns,
+        np.arange(len(frames)),
+        labels=labels,
+        groups={name: tuple(paths) for name, paths in groups.items() if paths != [name]},
+        text={path: found[0][:40] for path, found in texts.items() if path not in columns},
+    )
 
 
 def _real(value: float) -> float:

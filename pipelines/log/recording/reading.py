@@ -18,22 +18,36 @@ from pipelines.log.recording.clock_guess import Clock, find_clock
 from pipelines.log.recording.column_roles import (
     Choice,
     Group,
+    by_texts,
     choose,
     companion_of,
     file_quantity,
     groups_of,
+    texts_of,
 )
 from pipelines.log.recording.evidence import Slope, slope_of
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
 
-__all__ = ["BY_FILE", "WITHOUT_NAME", "Arm", "Reading", "arm_beside", "companion_for", "matrix", "read_recording", "with_companion"]
+__all__ = [
+    "BY_FILE",
+    "WITHOUT_NAME",
+    "Arm",
+    "Reading",
+    "arm_beside",
+    "companion_for",
+    "matrix",
+    "read_recording",
+    "with_companion",
+]
 
 WITHOUT_NAME, BY_FILE = "columns without a name", "columns named by their file"
 _MOST_JOINTS = 16
 _MOST_BLOCKS = 6
-_JOINT_WORDS = frozenset({"joint", "joints", "jnt", "axis", "axes", "achse", "gelenk", "j", "a", "link"})
+_JOINT_WORDS = frozenset(
+    {"joint", "joints", "jnt", "axis", "axes", "achse", "gelenk", "j", "a", "link"}
+)
 
 
 @dataclass(frozen=True)
@@ -67,7 +81,9 @@ class Reading:
     @property
     def joints(self) -> int:
         groups = [choice.group for choice in (self.q, self.tau) if choice.group]
-        return self.arm.robot.n_joints if self.arm.robot else len(groups[0].columns) if groups else 1
+        return (
+            self.arm.robot.n_joints if self.arm.robot else len(groups[0].columns) if groups else 1
+        )
 
 
 def arm_beside(folder: Path, named: str | None = None) -> Arm:
@@ -101,7 +117,11 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     groups = _with_file_name(groups_of(table, arm.names), path)
     clock = find_clock(table, groups)
     used = clock.columns if clock else ()
-    groups = [replace(g, columns=rest) for g in groups if (rest := tuple(c for c in g.columns if c not in used))]
+    groups = [
+        replace(g, columns=rest)
+        for g in groups
+        if (rest := tuple(c for c in g.columns if c not in used))
+    ]
     n = arm.robot.n_joints if arm.robot else None
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and not q.others:
@@ -116,7 +136,11 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
         q, dq, tau = found or (q, dq, tau)
     slope = None
     if q.group and dq.group:
-        slope = slope_of(matrix(table, q.group.columns), matrix(table, dq.group.columns), clock.values if clock else None)
+        slope = slope_of(
+            matrix(table, q.group.columns),
+            matrix(table, dq.group.columns),
+            clock.values if clock else None,
+        )
     return Reading(path, table, arm, clock, q, dq, _in_one_order(q, tau), table, slope, by_evidence)
 
 
@@ -157,7 +181,11 @@ def _names_joints(group: Group) -> bool:
 def _unnamed_positions(groups: Sequence[Group], n: int | None) -> Choice:
     """Take columns that are called joints, and nothing else, for their positions, where torques are named beside them."""
     beside = [g for g in groups if g.quantity in ("torque", "current", "velocity")]
-    named = [g for g in groups if not g.quantity and _names_joints(g) and (n is None or len(g.columns) == n)]
+    named = [
+        g
+        for g in groups
+        if not g.quantity and _names_joints(g) and (n is None or len(g.columns) == n)
+    ]
     if len(named) == 1 and beside and any(len(g.columns) == len(named[0].columns) for g in beside):
         return Choice(replace(named[0], quantity="position"))
     return Choice(None)
@@ -165,13 +193,19 @@ def _unnamed_positions(groups: Sequence[Group], n: int | None) -> Choice:
 
 def _in_one_order(q: Choice, tau: Choice) -> Choice:
     """Leave the torques open where positions are in the robot's order, and theirs cannot be known."""
-    if q.group and tau.group and "robot" in (q.group.order, tau.group.order) and q.group.order != tau.group.order:
+    if (
+        q.group
+        and tau.group
+        and "robot" in (q.group.order, tau.group.order)
+        and q.group.order != tau.group.order
+    ):
         return Choice(None, (tau.group, *tau.others))
     return tau
 
 
-def _blocks(table: RawTable, groups: Sequence[Group], clock: Clock | None, arm: Arm, tau: Choice) -> tuple[
-        Choice, Choice, Choice] | None:
+def _blocks(
+    table: RawTable, groups: Sequence[Group], clock: Clock | None, arm: Arm, tau: Choice
+) -> tuple[Choice, Choice, Choice] | None:
     """Return positions, velocities and torques among columns without names: dq is the slope of q.
 
     None where no column lacks a name. The unit of a torque found so is open: nobody called it one.
@@ -186,41 +220,76 @@ def _blocks(table: RawTable, groups: Sequence[Group], clock: Clock | None, arm: 
         k, rest = divmod(len(columns), n)
         if rest or not 2 <= k <= _MOST_BLOCKS:
             continue
-        for blocks in ([columns[b * n:(b + 1) * n] for b in range(k)], [columns[b::k] for b in range(k)]):
+        for blocks in (
+            [columns[b * n : (b + 1) * n] for b in range(k)],
+            [columns[b::k] for b in range(k)],
+        ):
             if (found := _by_slope(table, blocks, t)) is not None:
-                q, dq, others = found
-                last = tau if tau.group or tau.others else (
-                    Choice(others[0]) if len(others) == 1 else Choice(None, tuple(others)))
+                q, dq, *others = (
+                    _by_texts(group, table, arm) for group in (found[0], found[1], *found[2])
+                )
+                last = (
+                    tau
+                    if tau.group or tau.others
+                    else (Choice(others[0]) if len(others) == 1 else Choice(None, tuple(others)))
+                )
                 return Choice(q), Choice(dq), last
     n = arm.robot.n_joints if arm.robot else len(columns)
-    whole = [columns[b:b + n] for b in range(0, len(columns), n)] if len(columns) % n == 0 else [columns]
+    whole = (
+        [columns[b : b + n] for b in range(0, len(columns), n)]
+        if len(columns) % n == 0
+        else [columns]
+    )
     open_groups = tuple(_block(part, "") for part in whole)
-    return Choice(None, open_groups), Choice(None), tau if tau.group or tau.others else Choice(None, open_groups)
+    return (
+        Choice(None, open_groups),
+        Choice(None),
+        tau if tau.group or tau.others else Choice(None, open_groups),
+    )
 
 
-def _by_slope(table: RawTable, blocks: list[list[str]], t: Array | None) -> tuple[Group, Group, list[Group]] | None:
+def _by_texts(group: Group, table: RawTable, arm: Arm) -> Group:
+    columns, order = by_texts(group.columns, texts_of(table, arm.names), arm.names)
+    return replace(group, columns=tuple(columns), order=order or group.order)
+
+
+def _by_slope(
+    table: RawTable, blocks: list[list[str]], t: Array | None
+) -> tuple[Group, Group, list[Group]] | None:
     """Return the block that is a position, the one that is its velocity, and those that may be torques.
 
     Two positions (measured and reference) beside one velocity decide nothing: None.
     """
     values = [matrix(table, block) for block in blocks]
-    pairs = [(a, b) for a in range(len(blocks)) for b in range(len(blocks))
-             if a != b and slope_of(values[a], values[b], t) is not None]
+    pairs = [
+        (a, b)
+        for a in range(len(blocks))
+        for b in range(len(blocks))
+        if a != b and slope_of(values[a], values[b], t) is not None
+    ]
     derived = {b for _, b in pairs}
     pairs = [(a, b) for a, b in pairs if a not in derived]  # q, dq, ddq: the first is the position
     if len(pairs) != 1:
         return None
     a, b = pairs[0]
-    others = [_block(block, "torque") for k, block in enumerate(blocks)
-              if k not in (a, *derived) and not _same(values[k], values[a]) and not _same(values[k], values[b])]
+    others = [
+        _block(block, "torque")
+        for k, block in enumerate(blocks)
+        if k not in (a, *derived)
+        and not _same(values[k], values[a])
+        and not _same(values[k], values[b])
+    ]
     return _block(blocks[a], "position"), _block(blocks[b], "velocity"), others
 
 
 def _same(x: Array, y: Array) -> bool:
     """Tell whether one block follows the other: a reference and its measurement."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        alike = [float(np.corrcoef(x[:, j], y[:, j])[0, 1]) for j in range(x.shape[1])
-                 if np.ptp(x[:, j]) > 0 and np.ptp(y[:, j]) > 0]
+        alike = [
+            float(np.corrcoef(x[:, j], y[:, j])[0, 1])
+            for j in range(x.shape[1])
+            if np.ptp(x[:, j]) > 0 and np.ptp(y[:, j]) > 0
+        ]
     return bool(alike) and min(alike) > 0.99
 
 

@@ -106,7 +106,7 @@ class SignalSpec:
     __pydantic_config__ = _STRICT
     columns: Columns | None = None  # a list, a pattern such as "Joint_{j}", a 1-based number, or the name of a matrix
     column: Columns | None = None  # the same, for one joint
-    unit: str | None = None  # required: of the numbers as recorded; "counts" needs counts_per_rev
+    unit: Texts | None = None  # required: of the numbers as recorded, one or one a joint; "counts" needs counts_per_rev
     file: str | None = None  # in another file of the same recording: a name with {groups} and {stem}
     counts_per_rev: Numbers | None = None
     wrap: float | None = None  # the counter starts again after so much, in the recorded unit: unwrapped

@@ -226,7 +226,7 @@ def _meaning(recipe: Recipe, where: object) -> None:
         if (spec.columns is None) == (spec.column is None):
             raise UsageError("C02", f"'signals.{name}' needs columns (a list, a pattern or a name), once", where=where,
                              remedy='write columns = "q_{j}", or columns = ["a", "b", "c"]')
-        if spec.unit == "counts" and spec.counts_per_rev is None:
+        if "counts" in (spec.unit if isinstance(spec.unit, tuple) else (spec.unit,)) and spec.counts_per_rev is None:
             raise UsageError("C02", f"'signals.{name}' is in counts: counts_per_rev is missing", where=where,
                              remedy="add counts_per_rev")
     references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]

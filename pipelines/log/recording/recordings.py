@@ -152,10 +152,11 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
         import tomli_w
 
         return parse_robot(tomli_w.dumps(table), where=path), ()
+    beside = ("name", "gravity", "tip_link")
     for key in table:
-        if key not in ("name", "gravity"):
-            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, ('name', 'gravity'))}", where=path,
-                             remedy="beside use, name and gravity can be given; write the rest in the description")
+        if key not in beside:
+            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, beside)}", where=path,
+                             remedy="beside use, name, gravity and tip_link can be given; write the rest in the description")
     if not isinstance(use, str) or not use.strip():
         raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path,
                          remedy="fill it in")
@@ -165,7 +166,7 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
         raise UsageError("C04", f"the robot '{use}' that the recipe names lies neither {places}" if folder != path.parent
                          else f"the robot '{use}' that the recipe names does not lie in {folder}", where=path,
                          remedy="copy it to the recordings, give their folder with --source, or another robot with --robot")
-    robot = load_robot(found if found is not None else use)
+    robot = _with_tip(found, use, table.get("tip_link"), path)
     files = () if found is None else (found,)
     if "name" in table:
         robot = replace(robot, name=str(table["name"]))
@@ -176,6 +177,22 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
         raise UsageError("C02", f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]", where=path,
                          remedy="write gravity = [0.0, 0.0, -9.81]")
     return replace(robot, gravity=(float(gravity[0]), float(gravity[1]), float(gravity[2]))), files
+
+
+def _with_tip(found: Path | None, use: str, tip_link: object, path: Path) -> RobotDescription:
+    """Load the robot that `use` names; `tip_link` says which arm of a URDF that branches is meant.
+
+    Raises:
+        UsageError: C02, a tip_link that is no text, or of a robot that is no URDF.
+    """
+    if tip_link is None:
+        return load_robot(found if found is not None else use)
+    if not isinstance(tip_link, str) or found is None or found.suffix.lower() != ".urdf":
+        raise UsageError("C02", "'robot.tip_link' must name the last link of a URDF", where=path,
+                         remedy='write tip_link = "…" beside use = "….urdf"; a description in TOML has it under [kinematics]')
+    from pipelines.log.urdf import import_urdf
+
+    return import_urdf(found, tip_link=tip_link)
 
 
 def parse_map(entries: tuple[str, ...], recipe: Recipe, joints: int) -> Map:
@@ -208,7 +225,7 @@ class Assembled:
     """A recording before any repair: one part a clock, units as declared, columns as used."""
 
     recordings: tuple[Recording, ...]
-    units: Mapping[str, str]
+    units: Mapping[str, tuple[str, ...]]  # one a joint
     columns: Mapping[str, tuple[str, ...]]
     checks: tuple[Check, ...]
     undeclared: tuple[str, ...] = ()  # units that the recipe leaves open and where they come from, in words
@@ -223,7 +240,7 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
     recipe, n = material.recipe, material.robot.n_joints
     time = replace(recipe.time, column=mapped["t"][1]) if "t" in mapped else recipe.time
     checks: list[Check] = [check for table in source.tables.values() for check in table.checks]
-    units: dict[str, str] = {}
+    units: dict[str, tuple[str, ...]] = {}
     columns: dict[str, tuple[str, ...]] = {}
     recordings: list[Recording] = []
     undeclared: list[str] = []
@@ -232,10 +249,10 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
         for signal in here:
             spec = recipe.signals[signal]
             columns[signal] = expand(table, spec.where or 1, n, signal, mapped.get(signal))
-            units[signal] = unit_declared(signal, spec, table, columns[signal], assume_units, checks)
+            units[signal] = unit_declared(signal, spec, table, columns[signal], material.robot, assume_units, checks)
             if spec.unit is None:
                 origin = "from the header" if any(c in table.units for c in columns[signal]) else "assumed, as --assume-units says"
-                undeclared.append(f"{signal}: unit {units[signal]} {origin}")
+                undeclared.append(f"{signal}: unit {', '.join(dict.fromkeys(units[signal]))} {origin}")
         if not here and file != source.primary:
             continue
         own_clock = file == source.primary or all(isinstance(c, int) or c in table.columns for c, _ in time.parts)

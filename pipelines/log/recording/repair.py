@@ -105,10 +105,10 @@ def _refuse_absurd(recording: Recording, name: str, joint: int, values: Array) -
     remedy = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
     if bad.size:
         raise InputRejected("D03", f"{values[bad[0]]:g} in {recording.listed(bad)}", where=recording.column(name, joint),
-                            remedy=remedy.format(f"{values[bad[0]]:g}"))
+                            remedy=remedy.format(repr(float(values[bad[0]]))))
     filler = np.flatnonzero(sentinels(values[:, None])[:, 0])
     if filler.size:
-        value = f"{values[filler[0]]:.12g}"
+        value = f"{values[filler[0]]:.17g}"
         raise InputRejected("D03", f"{value} in {recording.listed(filler)} looks like 'no sample': nothing else comes near it",
                             where=recording.column(name, joint), remedy=remedy.format(value))
 

@@ -90,7 +90,7 @@ def _transposed(lines: list[Line], dialect: Dialect, source: str, checks: list[C
         if abs(len(row) - dialect.width) > 1:
             raise InputRejected("F09", f"{len(row)} cells, not {dialect.width}", where=f"{source}, line {number}",
                                 remedy="export the file again, one line a sample")
-    names, units = names_and_units([row[0] if begin else f"row_{i}" for i, row in enumerate(rows, start=1)], source, lines[0][0])
+    names, units = names_and_units([row[0] if begin else f"line_{i}" for i, row in enumerate(rows, start=1)], source, lines[0][0])
     if begin > 1:
         units |= {name: row[1].strip("[]() ") for name, row in zip(names, rows, strict=True) if row[1].strip("[]() -")}
     length = min(len(row) - (not row[-1]) for row in rows)
