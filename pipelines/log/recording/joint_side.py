@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected, UsageError
+from pipelines.errors import Check, Gathering, InputRejected, UsageError
 from pipelines.log import schema
 from pipelines.log.doctor.checks_motion import degrees_or_motor
 from pipelines.log.doctor.checks_subject import many
@@ -88,7 +88,7 @@ def unit_declared(name: str, spec: SignalSpec, table: RawTable, columns: tuple[s
         words = ", ".join(dict.fromkeys(given))
         checks.append(Check.of("S06", "ok", f"unit '{words}' taken from the header", where=where))
         return tuple(header or given[0] for header in headers)
-    wanted = tuple(schema.joint_unit(name, revolute) for revolute in robot.revolute)
+    wanted = _own_units(name, robot)
     words = f'"{wanted[0]}"' if len(set(wanted)) == 1 else json.dumps(wanted)
     if not assume:
         raise InputRejected("S04", f"no unit; say what the numbers of {name} are in", where=where,
@@ -115,13 +115,20 @@ def units_of_joints(name: str, spec: SignalSpec, robot: RobotDescription, where:
                              remedy="one unit, or one a joint")
         return spec.unit
     unit = canonical_unit(spec.unit or "")
-    own = tuple(schema.joint_unit(name, revolute) for revolute in robot.revolute)
+    own = _own_units(name, robot)
     if spec.side == "motor" or len(set(own)) == 1 or unit != schema.unit_of(name):
         return (spec.unit or "",) * n
     other = ", ".join(f"{own[j]} for joint {j + 1} '{robot.joints[j].name}'" for j in range(n) if own[j] != unit)
     checks.append(Check.of("S05", "warn", f"'{unit}' declared for turning and sliding joints: taken as SI, {other}", where=where,
                            remedy=f"write unit = {json.dumps(own)} in signals.{name}"))
     return own
+
+
+def _own_units(name: str, robot: RobotDescription) -> tuple[str, ...]:
+    """Return the SI unit of each joint; that of an injected excitation without a law of control is one of acceleration."""
+    if schema.SIGNALS[name][0] == "excitation":
+        return (schema.unit_of(name),) * robot.n_joints
+    return tuple(schema.joint_unit(name, revolute) for revolute in robot.revolute)
 
 
 def si_of(units: Sequence[str], spec: SignalSpec) -> float:
@@ -146,23 +153,12 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, tuple[str, .
     steps: list[str] = []
     altered: list[str] = []
     checks: list[Check] = []
-    n = robot.n_joints
     signals: dict[str, Signal] = {}
+    problems = Gathering()
     for name, raw in part.signals.items():
-        spec = recipe.signals[name]
-        values = _unwrapped(part, name, raw, spec, units[name], altered, checks)
-        values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where)
-        values = values * _per_joint(spec.sign, n, f"signals.{name}.sign", recipe.where)
-        values, current = _in_si(part, name, values, spec, units[name], drive, n, recipe, steps)
-        if current is not None and "current" not in recipe.signals:
-            signals["current"] = Signal(current, "A", schema.SIGNALS["current"][1])
-        values = _through_drive(name, values, spec, recipe, drive, steps)
-        _refuse_wrong_kind(part, name, units[name], spec, recipe, robot)
-        offset = _per_joint(spec.offset, n, f"signals.{name}.offset", recipe.where)
-        if offset.any():
-            steps.append(f"{name}: offset {', '.join(f'{x:.6g}' for x in offset)} added")
-        law = recipe.controller.law if recipe.controller else None
-        signals[name] = Signal(values + offset, schema.unit_of(name, law), schema.SIGNALS[name][1])
+        with problems.part():
+            signals |= _converted(part, name, raw, recipe, units[name], robot, drive, steps, altered, checks)
+    problems.raise_all()
     if not trust_units and "q" in signals:
         _refuse_degrees(part, signals["q"].values, units["q"], robot)
     turns = quarter_turns(part.signals["q"]) if "q" in part.signals and set(units["q"]) <= {"deg", "°"} else {}
@@ -172,6 +168,28 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, tuple[str, .
                                "pi/2, to the last digit: radians of the motor side?", where=f"{part.where}, signal q",
                                remedy='if so, declare unit = "rad" and add [drive] transmission = the gear ratios'))
     return Converted(signals, tuple(steps), tuple(altered), tuple(checks))
+
+
+def _converted(part: Recording, name: str, raw: Array, recipe: Recipe, units: tuple[str, ...], robot: RobotDescription,
+               drive: Drive | None, steps: list[str], altered: list[str], checks: list[Check]) -> dict[str, Signal]:
+    """One signal in SI on the joint side; and the current, where the torque was recorded as one."""
+    n = robot.n_joints
+    found: dict[str, Signal] = {}
+    spec = recipe.signals[name]
+    values = _unwrapped(part, name, raw, spec, units, altered, checks)
+    values = values * _per_joint(spec.scale, n, f"signals.{name}.scale", recipe.where)
+    values = values * _per_joint(spec.sign, n, f"signals.{name}.sign", recipe.where)
+    values, current = _in_si(part, name, values, spec, units, drive, n, recipe, steps)
+    if current is not None and "current" not in recipe.signals:
+        found["current"] = Signal(current, "A", schema.SIGNALS["current"][1])
+    values = _through_drive(name, values, spec, recipe, drive, steps)
+    _refuse_wrong_kind(part, name, units, spec, recipe, robot)
+    offset = _per_joint(spec.offset, n, f"signals.{name}.offset", recipe.where)
+    if offset.any():
+        steps.append(f"{name}: offset {', '.join(f'{x:.6g}' for x in offset)} added")
+    law = recipe.controller.law if recipe.controller else None
+    found[name] = Signal(values + offset, schema.unit_of(name, law), schema.SIGNALS[name][1])
+    return found
 
 
 def _unwrapped(part: Recording, name: str, raw: Array, spec: SignalSpec, units: tuple[str, ...], altered: list[str],
@@ -289,7 +307,7 @@ def _refuse_wrong_kind(part: Recording, name: str, units: tuple[str, ...], spec:
     for j, (unit, revolute) in enumerate(zip(units, robot.revolute, strict=True)):
         current = unit in UNITS and UNITS[unit].quantity == "current"
         if not current and revolute == (unit in _LINEAR):
-            own = tuple(schema.joint_unit(name, turns) for turns in robot.revolute)
+            own = _own_units(name, robot)
             wanted = f"such as {own[j]}" if len(set(own)) == 1 else f"one a joint: unit = {json.dumps(own)}"
             raise InputRejected("S05", f"'{unit}' for joint {j + 1} '{robot.joints[j].name}', which is {robot.joints[j].type}",
                                 where=part.column(name, j), remedy=f"declare its unit, {wanted}")
@@ -298,10 +316,13 @@ def _refuse_wrong_kind(part: Recording, name: str, units: tuple[str, ...], spec:
 def _refuse_degrees(part: Recording, q: Array, units: tuple[str, ...], robot: RobotDescription) -> None:
     """S07: declared radians that leave the joint's range by far: degrees, or the motor's. Only a person can tell which."""
     for j, joint in enumerate(robot.joints):
-        if units[j] != "rad":
+        if units[j] not in ("rad", "m"):
             continue
         low, high = joint.position
         span = float(np.ptp(q[:, j]))
+        if not joint.revolute and span > 2.0 * (high - low):
+            raise InputRejected("S07", f"moves over {span:.4g} declared m, its limits are {low:.4g} to {high:.4g} m: looks like mm",
+                                where=part.column("q", j), remedy='declare unit = "mm" for this joint, one unit a joint')
         if not joint.revolute or not (math.isfinite(low) and math.isfinite(high)) or span <= 4.0 * math.pi:
             continue
         slack = 0.05 * (high - low)
