@@ -25,9 +25,10 @@ from pipelines.log.log_reader import read_guarded
 from pipelines.log.robot import RobotDescription
 from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_format
 
-__all__ = ["ENDINGS", "PROVENANCE", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there", "open_log",
-           "regular_file", "write_log"]
+__all__ = ["ENDINGS", "PROVENANCE", "RECORDINGS", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there",
+           "open_log", "regular_file", "write_log"]
 
+RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".jsonl", ".json")  # what `import` reads
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -255,17 +256,37 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
         found += sorted(_below(root, root.resolve(), checks))
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
-        raise nothing_there(", ".join(map(str, inputs)), checks)
+        raise nothing_there(", ".join(map(str, inputs)), checks, _recording_in(inputs))
     return tuple(dict.fromkeys(found)), tuple(checks)
 
 
-def nothing_there(where: object, checks: Sequence[Check]) -> NothingMatched:
-    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie."""
+def _recording_in(folders: Iterable[Path]) -> Path | None:
+    """The first file in the folders that `import` may read; None where there is none."""
+    for folder in folders:
+        try:
+            names = sorted(entry.name for entry in os.scandir(folder) if entry.is_file())
+        except OSError:
+            continue
+        for ending in RECORDINGS:  # tables before texts and results that are JSON
+            if found := next((name for name in names if name.lower().endswith(ending)), None):
+                return folder / found
+    return None
+
+
+def nothing_there(where: object, checks: Sequence[Check], recording: Path | None = None) -> NothingMatched:
+    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie.
+
+    Args:
+        recording: a file there that `import` makes a log of.
+    """
     links = [str(check.where) for check in checks if check.code == "RRID-X11"]
     passed, remedy = "", "logs end in .h5 or .parquet"
     if links:
         passed = f"; {len(links)} link{'s' * (len(links) > 1)} passed over, {'first ' * (len(links) > 1)}{links[0]}"
         remedy = "give what a link leads to by its own path"
+    elif recording is not None:
+        passed = f", but recordings such as {recording.name}"
+        remedy = f"make logs of them: rrrid import --guess {recording} > recipe.toml, then rrrid import recipe.toml"
     return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
 
 

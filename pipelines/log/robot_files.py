@@ -33,7 +33,20 @@ def load_robot(source: str | Path) -> RobotDescription:
     if path.suffix.lower() in _URDF:
         return _from_urdf(path)
     text = read_small_text(path, what="a robot description (TOML) or a URDF")
+    _refuse_recipe(text, path)
     return _embed_urdf(text, path) or parse_robot(text, where=path)
+
+
+def _refuse_recipe(text: str, path: Path) -> None:
+    """C02: a recipe of `rrrid import` names its robot, and is none."""
+    table = _table_of(text)
+    if "kinematics" in table or not ({"signals", "log"} & set(table)):
+        return
+    robot = table.get("robot")
+    use = robot.get("use") if isinstance(robot, dict) else None
+    raise UsageError("C02", "this is a recipe of rrrid import, not the description of a robot", where=path,
+                     remedy=f"give the robot that the recipe names: {use}" if isinstance(use, str) else
+                     "write the recipe's [robot] into a file of its own, with [kinematics] and [[joint]] at its top")
 
 
 def robot_sources(source: str | Path) -> tuple[Path, ...]:

@@ -46,13 +46,10 @@ class Clock:
 
 def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     """Return the clock of the recording; None where no column rises like one."""
-    times = [
-        c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "time")
-    ]
-    counters = [
-        c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "index")
-    ]
-    plain = [c for c in table.columns if any(c in g.columns for g in groups if g.quantity == "")]
+    of = {column: group.quantity for group in groups for column in group.columns}
+    times, counters, plain = (
+        [c for c in table.columns if of.get(c) == quantity] for quantity in ("time", "index", "")
+    )
     found = [
         clock for pair in itertools.pairwise(times) if (clock := _pair(table, *pair, named=True))
     ]
@@ -65,10 +62,10 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         )
     if len(plain) > 2 and (clock := _pair(table, plain[0], plain[1], named=False)):
         return clock
-    for column in plain[:1] if len(table.columns) > 2 else []:
-        steps = np.diff(table.columns[column])
-        if (steps > 0).all() and np.std(steps) < _EVEN * np.mean(steps):
-            return _single(table, column)
+    even = [c for c in plain[:2] if len(table.columns) > 2 and _rises_evenly(table.columns[c])]
+    counting = [c for c in even if _counts(table.columns[c])]
+    for column in [*(c for c in even if c not in counting), *counting]:
+        return _single(table, column)
     counted = [c for c in counters if _rises(table.columns[c])]
     if not counted:
         return None
@@ -92,6 +89,16 @@ def _rises(values: Array) -> bool:
         else False
     )
     return float(np.mean(steps > 0)) > _RISING and not (again and values.min() >= 0.0)
+
+
+def _rises_evenly(values: Array) -> bool:
+    steps = np.diff(values)
+    return bool((steps > 0).all() and np.std(steps) < _EVEN * np.mean(steps))
+
+
+def _counts(values: Array) -> bool:
+    """Tell whether a column is 0, 1, 2, … or 1, 2, 3, …"""
+    return values[0] in (0.0, 1.0) and float(np.mean(np.diff(values) == 1.0)) > _RISING
 
 
 def _unevenness(values: Array) -> float:
@@ -159,7 +166,7 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
             f"{1 / (median * SECONDS[since[0]]):.4g} Hz",
         )
     rates = {unit: f"{1 / (median * SECONDS[unit]):.4g} Hz in {unit}" for unit in fits}
-    counts = bool(np.mean(steps == 1.0) > _RISING) and clock.values[0] in (0.0, 1.0)
+    counts = _counts(clock.values)
     why = [
         f"a median step of {median:.4g} would be {' or '.join(rates.values()) or 'no plausible rate'}"
     ]

@@ -50,7 +50,7 @@ _QUANTITIES: dict[str, frozenset[str]] = {
     "index": _set(
         "idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id cycle"
     ),
-    "temperature": _set("temp temps temperature temperatures temperatur tmp"),
+    "temperature": _set("temp temperature temperatures temperatur tmp"),
     # Numbers of the tool, the mains and the state of the machine: of no joint, or no motion of it.
     "other": _set(
         "pose ee eef eff_pose tcp tool flange cart cartesian force forces wrench ft voltage voltages volt volts "
@@ -251,6 +251,8 @@ def read_name(column: str, unit: str = "") -> ColumnName:
     if not quantity:
         quantity = _without_noun(held)
     named, unit_words = _unit_in_name(column, quantity)
+    # A unit in the header is stronger than a word: "temps (s)" is a time, in French.
+    quantity = quantity if quantity == "other" else _quantity_of(unit) or quantity
     unit = unit or named
     quantity = quantity or _quantity_of(unit)
     desired = at is not None and "d" in words[at + 1 :]  # Franka Emika: q_d, tau_J_d

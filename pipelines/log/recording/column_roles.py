@@ -169,7 +169,7 @@ def choose(groups: Sequence[Group], quantities: Sequence[str], n: int | None, co
     sized = [g for g in fitting if n is None or len(g.columns) == n]
 
     def key(group: Group) -> tuple[object, ...]:
-        return (group.origin == "commanded", quantities.index(group.quantity), group.rank)
+        return (group.origin == "commanded", group.order != "robot", quantities.index(group.quantity), group.rank)
 
     sized.sort(key=key)
     rest = tuple(g for g in (*fitting, *others) if not sized or g is not sized[0])

@@ -12,7 +12,7 @@ from pipelines.errors import Check, InputRejected
 __all__ = ["MISSING", "Dialect", "TextFormat", "cells_of", "decode", "find_dialect", "is_number", "lines_of"]
 
 MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "-nan", "-NaN", "-"})
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|Inf|INF|infinity|Infinity)")
+_NUMBER = re.compile(r"[+-]?(\d++\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|Inf|INF|infinity|Infinity)")
 _COMMENTS = ("#", "%", "//")
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _WORDS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks", "": "one column"}

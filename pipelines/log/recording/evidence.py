@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 
 __all__ = ["ANGULAR_RATIOS", "Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
@@ -44,6 +45,7 @@ def rollover(values: Array) -> float | None:
 # Slope of the position over recorded velocity, by their units: q in the first, dq in the second.
 ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
                   6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
+_ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
 
@@ -179,15 +181,16 @@ def held(tau: Array, q: Array) -> Guess:
 
 
 def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tuple[Guess, str]:
-    resolution = wrap if wrap is not None else min(_RESOLUTIONS, key=lambda r: abs(span - r))
     why = "named so" if named else f"whole numbers over a range of {span:.5g}"
     if wrap is not None:
         return (Guess("counts", "sure" if named else "likely", f"{why}; it starts again after {wrap:g}, taken as one revolution"),
-                f", counts_per_rev = {resolution:g}, wrap = {wrap:g}")
-    return (Guess("counts", "likely" if named else "unsure",
-                  f"{why}; counts_per_rev {resolution:g} is the usual number nearest to the range of {span:.5g}; "
-                  "add wrap where the counter starts again"),
-            f", counts_per_rev = {resolution:g}")
+                f", counts_per_rev = {wrap:g}, wrap = {wrap:g}")
+    near = min(_RESOLUTIONS, key=lambda r: abs(span - r))
+    if abs(span / near - 1.0) < _ONE_TURN:
+        return (Guess("counts", "likely", f"{why}; the range of {span:.5g} is likely one revolution of {near}; "
+                      "add wrap where the counter starts again"), f", counts_per_rev = {near}")
+    return (Guess("counts", "likely" if named else "unsure", f"{why}; the counts of a revolution are in the encoder's data sheet"),
+            f', counts_per_rev = "{BLANK}"')
 
 
 def _by_velocity(slope: Slope) -> Guess | None:

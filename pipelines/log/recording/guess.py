@@ -51,6 +51,7 @@ from pipelines.log.robot import Joint
 
 __all__ = ["Draft", "guess_recipe"]
 
+_MOST_COLUMNS = 2000
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
@@ -87,7 +88,14 @@ def guess_recipe(path: Path, robot: str | None = None) -> Draft:
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
-    table = _sound(read_table(path))
+    table = read_table(path)
+    if len(table.columns) > _MOST_COLUMNS:
+        raise InputRejected("F16", f"{len(table.columns)} columns: too many to guess what each is", where=path,
+                            remedy="export the joints' signals alone, or write the recipe")
+    for column, period in table.cycles.items():
+        raise InputRejected("S11", f"column '{clean(column, 40)}' goes through {period} texts, again and again: one line a joint?",
+                            where=path, remedy="put the joints beside each other, one line a sample (a pivot of the table)")
+    table = _sound(table)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
     companion = companion_for(reading)
     if companion is not None:
@@ -161,12 +169,14 @@ class _Drafting:
                 if "tip_link" in arm.problem:
                     lines.append(f'tip_link = "{self.blank("robot.tip_link")}"')
             return [*lines, ""]
-        if not arm.files and self.n == 1:
+        known = self.reading.q.group or self.reading.tau.group
+        if not arm.files and known and self.n == 1:
             return _ONE_JOINT.split("\n")
         which = "robot.toml, a URDF, or a shipped name"
         if arm.files:
             which = f"one of {', '.join(clean(file, 40) for file in arm.files)}"
-        return ["[robot]", f'use = "{self.blank("robot.use")}"   # the robot of {self.n} joints: {which}', ""]
+        joints = f" of {self.n} joints" if known else ""
+        return ["[robot]", f'use = "{self.blank("robot.use")}"   # the robot{joints}: {which}', ""]
 
     def _log(self) -> list[str]:
         name = _quoted(self.reading.path.name)
@@ -240,6 +250,8 @@ class _Drafting:
         if choice.group is None or self.q is None or self._out_of_order(choice.group):
             return self._open("q", choice)
         units, further, why = self._position_units(choice.group)
+        if BLANK in further:
+            self.blanks.append("signals.q.counts_per_rev")
         lines = [f"q = {{ {_columns(choice.group.columns)}, unit = {self._units('q', units)}{further} }}"]
         lines += [f"    {self.note('q unit', guess)}" for guess in why]
         lines += [f"    {comment}" for comment in (*self._order(choice.group), *motion_of(self.q, units[0]))]
@@ -359,6 +371,11 @@ class _Drafting:
                 self.blanks.append("drive.torque_constant")
                 lines.append(f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet')
             return [*lines, ""]
+        if self.reading.q.group and self.reading.q.group.motor and not self.joints_side():
+            self.blanks.append("drive.transmission")
+            lines = ["[drive]                  # positions are named the motor's: q_motor = N q_joint, tau_joint = N^T tau_motor",
+                     f'transmission = "{BLANK}"   # gear ratio of each joint; remove [drive] where they are the joints\'']
+            return [*lines, *([f'torque_constant = "{self.blank("drive.torque_constant")}"'] if self.current else []), ""]
         lines = ["# [drive]                # where numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
                  f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
         if not self.current:
@@ -366,6 +383,13 @@ class _Drafting:
         self.blanks.append("drive.torque_constant")
         return ["[drive]", f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet',
                 f"# transmission = [{', '.join(['100.0'] * self.n)}]   # where numbers are motor side: q_motor = N q_joint", ""]
+
+    def joints_side(self) -> bool:
+        """Tell whether positions that are named the motor's are inside the limits of the robot's joints, in some unit."""
+        if not self.joints or self.q is None:
+            return False
+        group = self.reading.q.group
+        return group is not None and "" not in self._position_units(group)[0]
 
     def _resample(self) -> list[str]:
         if self.t is None:

@@ -9,6 +9,7 @@ line of units below the names is read as such.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,7 +22,7 @@ __all__ = ["Header", "find_header", "names_and_units", "split_unit"]
 Line = tuple[int, str]
 
 _SEARCHED = 40  # lines above the numbers
-_SAMPLED = 50  # lines of numbers that say which columns are numbers
+_SAMPLED = 20  # lines of numbers that say which columns are numbers
 _MARKS = "#%/*! "  # what a comment begins with
 _DELIMITERS = (",", ";", "\t", " ", "|")
 _NO_UNIT = frozenset({"", "-", "1", "none", "n/a", "[]"})
@@ -181,11 +182,12 @@ def _from(first: str, count: int) -> range:
 
 def _words(cells: Sequence[str]) -> bool:
     """Tell whether the cells can be names: words, bare numbers among them at most, no formula."""
-    words = [cell for cell in cells if cell and not is_number(cell)]
+    numbers = [cell for cell in cells if is_number(cell)]
+    words = sum(cell != "" for cell in cells) - len(numbers)
     return (
-        bool(words)
-        and all(cell in words or not cell or cell.isdecimal() for cell in cells)
-        and not any(_FORMULA.fullmatch(cell) for cell in words)
+        words > 0
+        and all(cell.isdecimal() for cell in numbers)
+        and not any(_FORMULA.fullmatch(cell) for cell in cells)
     )
 
 
@@ -202,10 +204,14 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 def split_unit(name: str) -> tuple[str, str]:
     """Return ("q1", "deg") for "q1 [deg]" or "q1 (deg)"; an index in brackets is no unit."""
-    found = re.fullmatch(r"\s*(.*?)\s*[\[(]\s*([^\[\]()]{1,20})\s*[\])]\s*", name)
-    if not found or not found.group(1) or re.fullmatch(r"[\d\s,:]+", found.group(2)):
-        return name.strip(), ""
-    return found.group(1), found.group(2)
+    text = name.strip()
+    stem, bracket, rest = text.rpartition(max("[(", key=text.rfind))
+    unit = rest[:-1].strip()
+    if not bracket or not stem.strip() or rest[-1:] not in ("]", ")") or not 0 < len(unit) <= 20:
+        return text, ""
+    if set(unit) & set("[]()") or set(unit) <= set("0123456789 ,:"):
+        return text, ""
+    return stem.strip(), unit
 
 
 def names_and_units(
@@ -219,16 +225,17 @@ def names_and_units(
         InputRejected: S03, two columns of one name.
     """
     pairs = [split_unit(cell) for cell in cells]
-    short = [name for name, _ in pairs]
+    times = Counter(name for name, _ in pairs)
     names = tuple(
-        (cell.strip() if short.count(name) > 1 else name) or f"column_{j + 1}"
-        for j, (cell, name) in enumerate(zip(cells, short, strict=True))
+        (cell.strip() if times[name] > 1 else name) or f"column_{j + 1}"
+        for j, (cell, (name, _)) in enumerate(zip(cells, pairs, strict=True))
     )
+    first: dict[str, int] = {}
     for j, name in enumerate(names):
-        if name in names[:j]:
+        if first.setdefault(name, j) != j:
             raise InputRejected(
                 "S03",
-                f"columns {names.index(name) + 1} and {j + 1} are both named '{name}'",
+                f"columns {first[name] + 1} and {j + 1} are both named '{name[:80]}'",
                 where=f"{source}, line {line}",
                 remedy="rename one of them in the file",
             )

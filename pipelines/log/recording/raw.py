@@ -28,6 +28,7 @@ class RawTable:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # matrix -> its columns
     text: Mapping[str, str] = field(default_factory=dict)  # columns that are not numbers -> an example
     labels: Mapping[str, str] = field(default_factory=dict)  # those of them that hold one text throughout -> that text
+    cycles: Mapping[str, int] = field(default_factory=dict)  # columns of text that repeat -> after how many samples
     lines: npt.NDArray[np.int64] | None = None  # (samples,) line numbers, in a text file
     breaks: tuple[int, ...] = ()  # index of the first sample after damage: the clock of a fixed rate is lost there
     checks: tuple[Check, ...] = ()

@@ -210,7 +210,8 @@ def _blocks(
 
     None where no column lacks a name. The unit of a torque found so is open: nobody called it one.
     """
-    columns = [c for c in table.columns if any(c in g.columns for g in groups if not g.quantity)]
+    unnamed = {column for group in groups if not group.quantity for column in group.columns}
+    columns = [c for c in table.columns if c in unnamed]
     columns = [c for c in columns if not (np.diff(table.columns[c]) == 1.0).all()]  # a counter
     if not columns:
         return None

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipelines.errors import Check, Gathering, InputRejected, NothingMatched, UsageError, did_you_mean
 from pipelines.log.experiment import Array
+from pipelines.log.files import RECORDINGS
 from pipelines.log.recording import filenames
 from pipelines.log.recording.clock import time_of
 from pipelines.log.recording.joint_side import drive_of, si_of, unit_declared
@@ -25,7 +26,6 @@ from pipelines.log.text import read_small_text
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 
-_RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".json", ".jsonl")
 
 Map = Mapping[str, Mapping[int, str]]
 
@@ -90,11 +90,11 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
               if (groups := filenames.match(spec.match, name)) is not None]
     if not sources and not tables:
         patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
-        there = filenames.lying_there(names, _RECORDINGS)
+        there = filenames.lying_there(names, RECORDINGS)
         raise NothingMatched("C06", f"no file matches {patterns}; {there}", where=folder, remedy="correct match in the recipe" + (
             "" if source else ", or give the folder of the recordings with --source"))
     return Material(recipe, path, folder, replace(arm, drive=drive), drive, tuple(sources), tuple(tables),
-                    tuple(name for name in names if name not in read and Path(name).suffix.lower() in _RECORDINGS),
+                    tuple(name for name in names if name not in read and Path(name).suffix.lower() in RECORDINGS),
                     (path, *described, *(folder / name for name in read)),
                     hashes={folder / name: table.sha256 for name, table in read.items()})
 

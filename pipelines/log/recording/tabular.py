@@ -26,6 +26,8 @@ Line = tuple[int, str]
 
 _MOST_DAMAGED = 10  # lines
 _DAMAGED_SHARE = 1e-3
+_MOST_JOINTS = 32
+_WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
 _FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
@@ -43,6 +45,9 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     if not lines:
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy="record again, or copy the file again")
     dialect = find_dialect(lines, source, given)
+    if dialect.width > _WIDEST:
+        raise InputRejected("F16", f"{dialect.width} cells in a line, {dialect.words}: not a table of columns", where=source,
+                            remedy="give delimiter and decimal under [format], or one row a sample")
     if (dialect.delimiter, dialect.decimal) not in ((",", "."), ("\t", "."), ("", ".")) and given.delimiter is None:
         checks.append(Check.of("F16", "warn", f"read as: {dialect.words}", where=source, remedy="say so under [format] to be sure"))
     long = dialect.width >= max(_LONGEST_SIDE * len(lines), FEWEST) and given.header is None
@@ -65,15 +70,17 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
         del columns[name]  # every line ends in a delimiter
     clocks = {name: "s" for name in columns if name in labels and labels[name] is None}
     return RawTable(source, columns, rows, units=units | clocks, text=words, lines=lines_kept, breaks=breaks, checks=tuple(checks),
-                    groups=_numbered(names), labels={name: label for name, label in labels.items() if label is not None})
+                    groups=_numbered(names), labels={name: label for name, label in labels.items() if isinstance(label, str)},
+                    cycles={name: label for name, label in labels.items() if isinstance(label, int)})
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     """Columns "q_1", "q_2", … may be asked for together as "q"."""
     groups: dict[str, list[str]] = {}
     for name in names:
-        if found := re.fullmatch(r"(.*?)_?(\d+)", name):
-            groups.setdefault(found.group(1), []).append(name)
+        stem = name.rstrip("0123456789")
+        if stem != name:
+            groups.setdefault(stem.removesuffix("_"), []).append(name)
     return {stem: tuple(found) for stem, found in groups.items()}
 
 
@@ -110,7 +117,7 @@ class _Damage:
 
 
 def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, ...], source: str,
-             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str], dict[str, str | None]]:
+             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str], dict[str, str | int | None]]:
     widths = [line.count(dialect.delimiter) + 1 if dialect.delimiter not in ("", " ") and '"' not in line
               else len(cells_of(line, dialect.delimiter)) for _, line in body]
     damage = [_Damage(i, body[i][0], f"{width} cells, not {dialect.width}") for i,
@@ -134,12 +141,12 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
             {name: np.ascontiguousarray(values[keep]) for name, values in columns.items()}, words, labels)
 
 
-_Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], dict[str, str | None]]
+_Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], dict[str, str | int | None]]
 
 
 def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Columns of numbers, columns of text with an example, the lines (by index) with a cell that is no number, and labels:
-    the text of a column that never changes, None of a column of clock times."""
+    the text of a column that never changes, the period of one that repeats, None of a column of clock times."""
     # numpy rounds every number correctly; pandas does so only where asked, and newer ones refuse to be asked.
     text = "\n".join(line for _, line in lines)
     try:
@@ -155,7 +162,7 @@ def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: 
 def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Cell by cell, to find out which cell is no number."""
     cells = [cells_of(line, dialect.delimiter) for _, line in lines]
-    labels: dict[str, str | None] = {}
+    labels: dict[str, str | int | None] = {}
     columns: dict[str, Array] = {}
     words: dict[str, str] = {}
     wrong: dict[int, str] = {}
@@ -175,8 +182,8 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
                 columns[name], labels[name] = clock, None
                 continue
             words[name] = cells[bad[0]][j][:40]
-            if all(row[j] == cells[0][j] for row in cells):
-                labels[name] = cells[0][j]
+            if (period := _period([row[j] for row in cells])) is not None:
+                labels[name] = cells[0][j] if period == 1 else period
         else:
             columns[name] = values
             wrong |= {i: f"'{cells[i][j][:30]}' in column '{name}' is no number" for i in bad}
@@ -184,6 +191,11 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
         raise InputRejected("F16", "no column of numbers", where=source,
                             remedy="rrrid import reads CSV and text tables, MAT (v5, v7.3) and NPY")
     return columns, words, wrong, labels
+
+
+def _period(cells: list[str]) -> int | None:
+    """The number of samples after which a column of text repeats, up to that of the joints of an arm; 1 where it never changes."""
+    return next((k for k in range(1, min(_MOST_JOINTS, len(cells) // 2) + 1) if cells[k:] == cells[:-k]), None)
 
 
 def _clock_times(cells: list[str]) -> Array | None:
