@@ -965,6 +965,8 @@ def filled(draft: str, answers: Mapping[str, Any]) -> dict[str, Any]:
                             value["scale"] = answers[f"{section}.{key}.scale"]
             elif BLANK in str(value):
                 body[key] = answers[f"{section}.{key}"]
+    if recipe["signals"]["tau"].get("unit") in ("A", "mA") and "drive.torque_constant" in answers:
+        recipe.setdefault("drive", {})["torque_constant"] = answers["drive.torque_constant"]
     if recipe["time"].get("unit") == "sample":
         recipe["time"]["rate"] = answers["time.rate"]
     return recipe

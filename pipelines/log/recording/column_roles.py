@@ -57,9 +57,13 @@ class Choice:
 def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     """Return the groups of the columns of `table`; `joints` names the robot's, from the base to the tip."""
     texts = texts_of(table, joints)
+    patterns = [re.compile(rf"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])", re.IGNORECASE) for name in joints if len(name) > 2]
+    # All of the robot's names, or none: columns joint_0, joint_1, … do not name the robot's joint_1, joint_2, …
+    if len(patterns) < len(joints) or not all(any(p.search(column) for column in table.columns) for p in patterns):
+        patterns = []
     found: dict[tuple[object, ...], list[tuple[ColumnName, int | None]]] = {}
     for column in table.columns:
-        rest, place = _without_joint(column, joints)
+        rest, place = _without_joint(column, patterns)
         name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
         if place is None:
             place = _place_by_words(name.label, joints)
@@ -72,12 +76,10 @@ def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     return groups
 
 
-def _without_joint(column: str, joints: Sequence[str]) -> tuple[str, int | None]:
+def _without_joint(column: str, names: Sequence[re.Pattern[str]]) -> tuple[str, int | None]:
     """Return the column's name without the name of a joint in it, and the place of that joint (from 0)."""
-    for place in sorted(range(len(joints)), key=lambda k: -len(joints[k])):
-        name = joints[place]
-        found = re.search(rf"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])", column, re.IGNORECASE)
-        if found and len(name) > 2:
+    for place in sorted(range(len(names)), key=lambda k: -len(names[k].pattern)):
+        if found := names[place].search(column):
             return column[: found.start()] + " " + column[found.end():], place
     return column, None
 

@@ -371,7 +371,8 @@ class _Drafting:
                 self.blanks.append("drive.torque_constant")
                 lines.append(f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet')
             return [*lines, ""]
-        if self.reading.q.group and self.reading.q.group.motor and not self.joints_side():
+        group = self.reading.q.group
+        if group and group.motor and "theta" not in group.words and not self.joints_side():
             self.blanks.append("drive.transmission")
             lines = ["[drive]                  # positions are named the motor's: q_motor = N q_joint, tau_joint = N^T tau_motor",
                      f'transmission = "{BLANK}"   # gear ratio of each joint; remove [drive] where they are the joints\'']

@@ -124,10 +124,18 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     ]
     n = arm.robot.n_joints if arm.robot else None
     q = choose(groups, ("position",), n, commanded=False)
-    if q.group is None and not q.others:
-        q = _unnamed_positions(groups, n)
+    if q.group is None and all(group.origin == "commanded" for group in q.others):
+        q = _unnamed_positions(table, groups, n, q)
     n = n or (len(q.group.columns) if q.group else None)
+    unnamed = tuple(
+        g
+        for g in groups
+        if not g.quantity and n in (None, len(g.columns)) and g.columns != _columns_of(q)
+    )
     tau = choose(groups, ("torque", "current"), n, commanded=True)
+    if unnamed and q.group and (tau.group is None or tau.group.origin == "commanded"):
+        # Columns that no word explains may be the measured torque.
+        tau = Choice(None, (*((tau.group,) if tau.group else ()), *tau.others, *unnamed))
     dq = choose(groups, ("velocity",), n, commanded=False)
     by_evidence = False
     if q.group is None and not q.others:
@@ -178,17 +186,30 @@ def _names_joints(group: Group) -> bool:
     return group.order == "robot" or bool(set(group.words.split()) & _JOINT_WORDS)
 
 
-def _unnamed_positions(groups: Sequence[Group], n: int | None) -> Choice:
-    """Take columns that are called joints, and nothing else, for their positions, where torques are named beside them."""
+def _columns_of(choice: Choice) -> tuple[str, ...]:
+    return choice.group.columns if choice.group else ()
+
+
+def _unnamed_positions(
+    table: RawTable, groups: Sequence[Group], n: int | None, found: Choice
+) -> Choice:
+    """Take columns that are called joints, and nothing else, for their positions.
+
+    Torques, currents or velocities must be named beside them, and a commanded position must be followed.
+    """
     beside = [g for g in groups if g.quantity in ("torque", "current", "velocity")]
     named = [
-        g
-        for g in groups
-        if not g.quantity and _names_joints(g) and (n is None or len(g.columns) == n)
+        g for g in groups if not g.quantity and _names_joints(g) and n in (None, len(g.columns))
     ]
-    if len(named) == 1 and beside and any(len(g.columns) == len(named[0].columns) for g in beside):
-        return Choice(replace(named[0], quantity="position"))
-    return Choice(None)
+    if len(named) != 1 or not any(len(g.columns) == len(named[0].columns) for g in beside):
+        return found if not found.others else Choice(None, (*found.others, *named))
+    references = [g for g in found.others if len(g.columns) == len(named[0].columns)]
+    followed = [
+        _same(matrix(table, g.columns), matrix(table, named[0].columns)) for g in references
+    ]
+    if references and not all(followed):
+        return Choice(None, (*found.others, *named))
+    return Choice(replace(named[0], quantity="position"), found.others)
 
 
 def _in_one_order(q: Choice, tau: Choice) -> Choice:

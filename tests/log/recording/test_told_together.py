@@ -50,8 +50,8 @@ def test_each_failure_is_one_line_and_in_the_json(tmp_path: Path) -> None:
     write(tmp_path, text(good()).replace("q_2", "x", 1), "a.csv")
     write(tmp_path, text(good()).replace("q_3", "y", 1), "b.csv")
     write(tmp_path, RECIPE, "recipe.toml")
-    done = subprocess.run([sys.executable, "-m", "rrrid_cli.main", "import", "recipe.toml", "--out", str(tmp_path.parent / "out"),
-                           "--json"], cwd=tmp_path, capture_output=True, text=True, check=False,
+    command = [sys.executable, "-m", "rrrid_cli.main", "import", "recipe.toml", "--out", str(tmp_path.parent / "out"), "--json"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False,
                           env={"PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""})
     assert done.returncode == 3
     assert done.stderr.count("\n") == 2
@@ -75,8 +75,8 @@ def test_a_clock_of_two_columns_keeps_every_digit(tmp_path: Path) -> None:
     ticks = np.arange(1200) * 1_000_001
     stamps = {"sec": 1_700_000_000 + ticks // 1_000_000_000, "nanosec": ticks % 1_000_000_000}
     rows = ["sec,nanosec," + ",".join(name for name in columns if name != "t")]
-    rows += [",".join([str(stamps["sec"][k]), str(stamps["nanosec"][k]), *(repr(float(v[k])) for n, v in columns.items() if n != "t")])
-             for k in range(1200)]
+    signals = [values for name, values in columns.items() if name != "t"]
+    rows += [",".join([str(stamps["sec"][k]), str(stamps["nanosec"][k]), *(repr(float(x[k])) for x in signals)]) for k in range(1200)]
     write(tmp_path / "data", "\n".join(rows) + "\n")
     two = RECIPE.replace('column = "t"\nunit = "s"', 'column = ["sec", "nanosec"]\nunit = ["s", "ns"]')
     log = open_log(run(tmp_path / "data", two).folder / "logs" / "run.h5").log
