@@ -52,6 +52,7 @@ from pipelines.log.robot import Joint
 __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
+_BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
@@ -291,13 +292,12 @@ class _Drafting:
         return f'"{words[0]}"' if len(set(words)) == 1 else f"[{', '.join(map(_quoted, words))}]"
 
     def _out_of_order(self, group: Group) -> bool:
-        """Tell whether the order of the joints is open: alphabetical names, or texts, that are not the robot's."""
-        if group.order == "text":
-            return True
-        if group.order != "file" or len(group.columns) < 3 or self.reading.by_evidence:
-            return False
+        """Tell whether the order of the joints is open: words that are not the robot's, in no order from base to tip."""
+        if group.order != "file" or len(group.columns) < 2 or self.reading.by_evidence:
+            return group.order == "text"
         lower = [column.lower() for column in group.columns]
-        return lower == sorted(lower)
+        ranks = [next((k for k, part in enumerate(_BASE_TO_TIP) if part in name), -1) for name in lower]
+        return -1 in ranks or ranks != sorted(ranks) or lower == sorted(lower)
 
     def _order(self, group: Group) -> list[str]:
         if group.order == "robot":
@@ -317,8 +317,8 @@ class _Drafting:
         clock = self.reading.clock
         factor = slope.factor if clock is None or clock.paired else slope.factor / SECONDS[self.clock_unit]
         named = unit_of_group(group.columns, self.reading.table)[0]
-        unit = named or velocity_unit(Slope(factor, slope.correlation), self._position_units(self.reading.q.group)[0][0])
-        if not unit:
+        unit = velocity_unit(Slope(factor, slope.correlation), self._position_units(self.reading.q.group)[0][0])
+        if not unit or named not in (None, unit):
             return []
         guess = Guess(unit, "likely", f"the position's slope is {factor:.4g} times it; remove the line where it was not measured")
         return [f"dq = {{ {_columns(group.columns)}, unit = {_quoted(unit)} }}", f"    {self.note('dq unit', guess)}"]
@@ -355,7 +355,7 @@ class _Drafting:
             return lines
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
         texts = ", ".join(clean(text, 40) for text in texts_of(self.reading.table, ())) if found[0].order == "text" else ""
-        order = f"these are {texts}" if texts else "in alphabetical order"
+        order = f"these are {texts}" if texts else "in the order of the file"
         ask = f"{order}; write them from the base to the tip"
         return [*lines, *(f"    # {ask if g is choice.group else 'candidate'}: {_columns(g.columns)}" for g in found[:8])]
 

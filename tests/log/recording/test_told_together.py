@@ -76,7 +76,8 @@ def test_a_clock_of_two_columns_keeps_every_digit(tmp_path: Path) -> None:
     stamps = {"sec": 1_700_000_000 + ticks // 1_000_000_000, "nanosec": ticks % 1_000_000_000}
     rows = ["sec,nanosec," + ",".join(name for name in columns if name != "t")]
     signals = [values for name, values in columns.items() if name != "t"]
-    rows += [",".join([str(stamps["sec"][k]), str(stamps["nanosec"][k]), *(repr(float(x[k])) for x in signals)]) for k in range(1200)]
+    for k in range(1200):
+        rows.append(",".join([str(stamps["sec"][k]), str(stamps["nanosec"][k]), *(repr(float(x[k])) for x in signals)]))
     write(tmp_path / "data", "\n".join(rows) + "\n")
     two = RECIPE.replace('column = "t"\nunit = "s"', 'column = ["sec", "nanosec"]\nunit = ["s", "ns"]')
     log = open_log(run(tmp_path / "data", two).folder / "logs" / "run.h5").log
