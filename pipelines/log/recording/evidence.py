@@ -46,6 +46,7 @@ def rollover(values: Array) -> float | None:
 ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
                   6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
 _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
+_STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
 
@@ -61,19 +62,24 @@ class Slope:
 def slope_of(q: Array, dq: Array, t: Array | None) -> Slope | None:
     """Return the relation of `dq` to `q` (samples, joints); None where it is not its slope.
 
-    Both are compared over stretches of a two-hundredth of the recording: the integral form does not
+    Both are compared over stretches of the recording, short ones first: the integral form does not
     amplify the steps of an encoder as a difference of neighbours does.
     """
     clock = np.arange(len(q), dtype=np.float64) if t is None else t
     if q.shape != dq.shape or len(q) < 50:
         return None
     summed = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(clock)[:, None], axis=0)])
-    width = max(2, len(q) // 200)
-    moved, expected = q[width:] - q[:-width], summed[width:] - summed[:-width]
     moving = (np.ptp(q, axis=0) > 1e-3 * np.ptp(q)) & (np.ptp(dq, axis=0) > 1e-3 * np.ptp(dq))
     if not moving.any():
         return None
-    moved, expected = moved[:, moving], expected[:, moving]
+    widths = sorted({max(2, len(q) // share) for share in _STRETCHES})
+    found = (_slope_over(q[:, moving], summed[:, moving], width) for width in widths)
+    return next((slope for slope in found if slope is not None), None)
+
+
+def _slope_over(q: Array, summed: Array, width: int) -> Slope | None:
+    """The relation over stretches of `width` samples; `summed` is the integral of the velocity."""
+    moved, expected = q[width:] - q[:-width], summed[width:] - summed[:-width]
     power = (expected**2).sum(axis=0)
     inner = (moved * expected).sum(axis=0)
     size = np.sqrt(power * (moved**2).sum(axis=0))

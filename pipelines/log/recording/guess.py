@@ -253,10 +253,10 @@ class _Drafting:
         units, further, why = self._position_units(choice.group)
         if BLANK in further:
             self.blanks.append("signals.q.counts_per_rev")
-        lines = [f"q = {{ {_columns(choice.group.columns)}, unit = {self._units('q', units)}{further} }}"]
+        lines = [f"q = {{ {_columns(choice.group.columns, self.reading.table)}, unit = {self._units('q', units)}{further} }}"]
         lines += [f"    {self.note('q unit', guess)}" for guess in why]
         lines += [f"    {comment}" for comment in (*self._order(choice.group), *motion_of(self.q, units[0]))]
-        return [*lines, *_also(choice)]
+        return [*lines, *_also(choice, self.reading.table)]
 
     def _position_units(self, group: Group) -> tuple[list[str], str, list[Guess]]:
         """Return the unit of each joint, further keys of the recipe, and the reasons."""
@@ -321,7 +321,8 @@ class _Drafting:
         if not unit or named not in (None, unit):
             return []
         guess = Guess(unit, "likely", f"the position's slope is {factor:.4g} times it; remove the line where it was not measured")
-        return [f"dq = {{ {_columns(group.columns)}, unit = {_quoted(unit)} }}", f"    {self.note('dq unit', guess)}"]
+        columns = _columns(group.columns, self.reading.table)
+        return [f"dq = {{ {columns}, unit = {_quoted(unit)} }}", f"    {self.note('dq unit', guess)}"]
 
     def _torque(self) -> list[str]:
         choice, table = self.reading.tau, self.reading.torque_table
@@ -340,11 +341,11 @@ class _Drafting:
         if guess.value == "N m" and self.joints:
             units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]
         file = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
-        lines = [f"tau = {{ {_columns(choice.group.columns)}, unit = {self._units('tau', units)}{file} }}",
+        lines = [f"tau = {{ {_columns(choice.group.columns, table)}, unit = {self._units('tau', units)}{file} }}",
                  f"    {self.note('tau unit', guess)}", *(f"    {line}" for line in self._order(choice.group))]
         if self.q is not None and self.q.shape == self.tau.shape:
             lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
-        return [*lines, *_also(choice)]
+        return [*lines, *_also(choice, self.reading.table)]
 
     def _open(self, signal: str, choice: Choice) -> list[str]:
         """Return a blank line with the candidates."""
@@ -357,7 +358,8 @@ class _Drafting:
         texts = ", ".join(clean(text, 40) for text in texts_of(self.reading.table, ())) if found[0].order == "text" else ""
         order = f"these are {texts}" if texts else "in the order of the file"
         ask = f"{order}; write them from the base to the tip"
-        return [*lines, *(f"    # {ask if g is choice.group else 'candidate'}: {_columns(g.columns)}" for g in found[:8])]
+        return [*lines, *(f"    # {ask if g is choice.group else 'candidate'}: {_columns(g.columns, self.reading.table)}"
+                         for g in found[:8])]
 
     def _drive(self) -> list[str]:
         ratios = [str(abs(self.ratios[j])) + ".0" if j in self.ratios else f'"{BLANK}"' for j in range(self.n)]
@@ -408,9 +410,9 @@ class _Drafting:
         return ["[resample]", f"rate = {rate:g}   {self.note('resample', guess)}", 'method = "spline"']
 
 
-def _also(choice: Choice) -> list[str]:
+def _also(choice: Choice, table: RawTable) -> list[str]:
     """Return comments that name the other columns of that quantity."""
-    return [f"    # also there: {group.words} ({group.quantity}, {group.origin}), {_columns(group.columns)}"
+    return [f"    # also there: {group.words} ({group.quantity}, {group.origin}), {_columns(group.columns, table)}"
             for group in choice.others[:6] if not group.partial]
 
 
@@ -425,12 +427,13 @@ def _round_number(rate: float) -> float | None:
     return below if abs(rate / below - 1.0) < 5e-3 else None
 
 
-def _columns(names: Sequence[str]) -> str:
-    """Return columns = "q_{j}" where the names count from 1, else a list."""
+def _columns(names: Sequence[str], table: RawTable) -> str:
+    """Return columns = "q_{j}" where the names count from 1, and no further column of `table` goes on, else a list."""
     if len(names) == 1:
         return f"column = {_quoted(names[0])}"
     pattern = re.sub(r"1(?!.*1)", "{j}", names[0])
-    if "{j}" in pattern and all(pattern.replace("{j}", str(j)) == name for j, name in enumerate(names, start=1)):
+    counted = [pattern.replace("{j}", str(j)) for j in range(1, len(names) + 2)]
+    if "{j}" in pattern and counted[:-1] == list(names) and counted[-1] not in table.columns:
         return f"columns = {_quoted(pattern)}"
     return f"columns = [{', '.join(map(_quoted, names))}]"
 

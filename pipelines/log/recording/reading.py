@@ -6,7 +6,7 @@ velocity is the slope of its position. Where neither decides, nothing is chosen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -236,38 +236,42 @@ def _blocks(
     columns = [c for c in columns if not (np.diff(table.columns[c]) == 1.0).all()]  # a counter
     if not columns:
         return None
-    counts = [arm.robot.n_joints] if arm.robot else range(_MOST_JOINTS, 0, -1)
     t = clock.values if clock else None
-    for n in counts:
-        k, rest = divmod(len(columns), n)
+    open_blocks = [columns]
+    for blocks in _splits(columns, arm.robot.n_joints if arm.robot else None):
+        pairs = _pairs(table, blocks, t)
+        if len(pairs) != 1:
+            open_blocks = blocks if pairs or arm.robot else open_blocks
+            if pairs:
+                break  # two positions beside one velocity: measured and reference cannot be told apart
+            continue
+        q, dq = (
+            _by_texts(_block(blocks[k], kind), table, arm)
+            for k, kind in zip(pairs[0], ("position", "velocity"), strict=True)
+        )
+        others = [
+            _by_texts(_block(block, "torque"), table, arm)
+            for block in _neither(table, blocks, pairs[0], t)
+        ]
+        if not tau.group and not tau.others:
+            tau = Choice(others[0]) if len(others) == 1 else Choice(None, tuple(others))
+        return Choice(q), Choice(dq), tau
+    candidates = tuple(_block(part, "") for part in open_blocks)
+    return (
+        Choice(None, candidates),
+        Choice(None),
+        tau if tau.group or tau.others else Choice(None, candidates),
+    )
+
+
+def _splits(columns: list[str], n: int | None) -> Iterator[list[list[str]]]:
+    """Yield the columns in blocks of as many as there are joints, side by side or interleaved; few blocks first."""
+    for joints in (n,) if n else range(_MOST_JOINTS, 0, -1):
+        k, rest = divmod(len(columns), joints)
         if rest or not 2 <= k <= _MOST_BLOCKS:
             continue
-        for blocks in (
-            [columns[b * n : (b + 1) * n] for b in range(k)],
-            [columns[b::k] for b in range(k)],
-        ):
-            if (found := _by_slope(table, blocks, t)) is not None:
-                q, dq, *others = (
-                    _by_texts(group, table, arm) for group in (found[0], found[1], *found[2])
-                )
-                last = (
-                    tau
-                    if tau.group or tau.others
-                    else (Choice(others[0]) if len(others) == 1 else Choice(None, tuple(others)))
-                )
-                return Choice(q), Choice(dq), last
-    n = arm.robot.n_joints if arm.robot else len(columns)
-    whole = (
-        [columns[b : b + n] for b in range(0, len(columns), n)]
-        if len(columns) % n == 0
-        else [columns]
-    )
-    open_groups = tuple(_block(part, "") for part in whole)
-    return (
-        Choice(None, open_groups),
-        Choice(None),
-        tau if tau.group or tau.others else Choice(None, open_groups),
-    )
+        yield [columns[b * joints : (b + 1) * joints] for b in range(k)]
+        yield [columns[b::k] for b in range(k)]
 
 
 def _by_texts(group: Group, table: RawTable, arm: Arm) -> Group:
@@ -275,33 +279,30 @@ def _by_texts(group: Group, table: RawTable, arm: Arm) -> Group:
     return replace(group, columns=tuple(columns), order=order or group.order)
 
 
-def _by_slope(
-    table: RawTable, blocks: list[list[str]], t: Array | None
-) -> tuple[Group, Group, list[Group]] | None:
-    """Return the block that is a position, the one that is its velocity, and those that may be torques.
-
-    Two positions (measured and reference) beside one velocity decide nothing: None.
-    """
+def _pairs(table: RawTable, blocks: list[list[str]], t: Array | None) -> list[tuple[int, int]]:
+    """Return (position, velocity) of each block that is the slope of another; of q, dq and ddq only the first two."""
     values = [matrix(table, block) for block in blocks]
-    pairs = [
+    found = [
         (a, b)
         for a in range(len(blocks))
         for b in range(len(blocks))
         if a != b and slope_of(values[a], values[b], t) is not None
     ]
-    derived = {b for _, b in pairs}
-    pairs = [(a, b) for a, b in pairs if a not in derived]  # q, dq, ddq: the first is the position
-    if len(pairs) != 1:
-        return None
-    a, b = pairs[0]
-    others = [
-        _block(block, "torque")
-        for k, block in enumerate(blocks)
-        if k not in (a, *derived)
-        and not _same(values[k], values[a])
-        and not _same(values[k], values[b])
+    derived = {b for _, b in found}
+    return [(a, b) for a, b in found if a not in derived]
+
+
+def _neither(
+    table: RawTable, blocks: list[list[str]], pair: tuple[int, int], t: Array | None
+) -> list[list[str]]:
+    """Return the blocks that follow neither the position nor the velocity, and are no acceleration."""
+    q, dq = (matrix(table, blocks[k]) for k in pair)
+    rest = [(block, matrix(table, block)) for k, block in enumerate(blocks) if k not in pair]
+    return [
+        block
+        for block, x in rest
+        if not _same(x, q) and not _same(x, dq) and slope_of(dq, x, t) is None
     ]
-    return _block(blocks[a], "position"), _block(blocks[b], "velocity"), others
 
 
 def _same(x: Array, y: Array) -> bool:
