@@ -5,7 +5,7 @@
 Each layout is a small recording, written after the documentation of a recorder or a public report,
 with what is true. A draft is "right" where the imported log equals the truth without an answer,
 "asks" where it does so once the blanks are filled as a person would fill them, or where the file
-is refused with a reason; "wrong" where the import succeeds and the log differs: the bar is none.
+is refused with a reason; "wrong" where the import succeeds and the log differs: no layout may be wrong.
 "failed" is a draft that no answer makes usable.
 """
 
@@ -300,7 +300,7 @@ def layout_ur_rtde() -> Layout:
 
 @layout
 def layout_ur_currents_only() -> Layout:
-    """A UR log of positions and currents, without a robot beside it."""
+    """A UR log of positions and currents, without a robot in the folder."""
     m = motion(6, 0.008)
     data = table({"timestamp": 3211.5 + m.t, "actual_q_#": m.q, "actual_current_#": m.tau / 10.0})
     return Layout(
@@ -720,7 +720,7 @@ def layout_headerless_interleaved() -> Layout:
 
 @layout
 def layout_headerless_two_references() -> Layout:
-    """q, q_ref, dq, tau without names: measured and reference cannot be told apart."""
+    """q, q_ref, dq, tau without names: measured and reference look alike."""
     m = motion(6, 0.01)
     data = table({"t": m.t, "r#": m.q + 1e-3, "q#": m.q, "d#": m.dq, "u#": m.tau}, header=False)
     answers = {

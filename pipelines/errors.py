@@ -155,7 +155,7 @@ class Gathering:
             problem.others = ()
 
     def raise_all(self) -> None:
-        """Raise what was found, each text once."""
+        """Raise the errors, each text once."""
         if self.found:
             first, *others = {str(problem): problem for problem in self.found}.values()
             first.others = tuple(others)

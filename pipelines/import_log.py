@@ -1,4 +1,4 @@
-"""Import recordings: CSV, MAT and NumPy files become logs, by a recipe.
+"""Import recordings: CSV, JSON, MAT and NumPy files become logs, by a recipe.
 
 Reads    a recipe (TOML, `pipelines.log.recording.recipe`) and the recorded files its patterns match
 Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet for maps without a clock, result.json, report.html

@@ -28,7 +28,7 @@ from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_form
 __all__ = ["ENDINGS", "PROVENANCE", "RECORDINGS", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there",
            "open_log", "regular_file", "write_log"]
 
-RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".jsonl", ".json")  # what `import` reads
+RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".jsonl")  # what `import` reads; JSON as well, but so are results
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -267,7 +267,7 @@ def _recording_in(folders: Iterable[Path]) -> Path | None:
             names = sorted(entry.name for entry in os.scandir(folder) if entry.is_file())
         except OSError:
             continue
-        for ending in RECORDINGS:  # tables before texts and results that are JSON
+        for ending in RECORDINGS:  # tables before texts
             if found := next((name for name in names if name.lower().endswith(ending)), None):
                 return folder / found
     return None

@@ -24,7 +24,7 @@ __all__ = ["Clock", "find_clock", "unit_of_clock"]
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _RATES = (1.0, 2e4)  # [Hz] of recordings whose time has no unit
-_PACE = (0.02, 50.0)  # [1/s] fastest speed over range of motion, whatever their unit
+_PACE = (0.02, 50.0)  # [1/s] fastest speed over range of motion; the unit of length or angle cancels
 _EPOCH = (1e9, 4e9)  # [s] since 1970: the years 2001 to 2096
 _RISING = 0.9  # of all steps of a clock; some stamps come twice, some clocks are set back
 _EVEN = 0.3  # standard deviation over mean of the steps of a clock without a name
@@ -80,7 +80,7 @@ def _single(table: RawTable, column: str) -> Clock:
 
 
 def _rises(values: Array) -> bool:
-    """Tell whether a column rises like a clock; a fraction of a second that starts again is none by itself."""
+    """Tell whether a column rises like a clock; a fraction of a second that starts again is not enough."""
     steps = np.diff(values)
     falls = -steps[steps < 0]
     again = (

@@ -164,7 +164,7 @@ class ColumnName:
     filtered: bool
     label: tuple[str, ...]  # the words and numbers that are left: the joint
     role: tuple[str, ...]  # the words that say what it is, without the joint
-    unit: str  # named by a part of the name; "" where there is none
+    unit: str  # named by a part of the name; "" where no part does
 
 
 def words_of(name: str) -> list[str]:
@@ -193,7 +193,7 @@ def words_of(name: str) -> list[str]:
 
 
 def _whole_words(name: str) -> str:
-    """Return the name with "NanoSec" and "nano_sec" as one word."""
+    """Return the name in which "NanoSec" and "nano_sec" are a single word."""
     return re.sub(
         r"(?i)(nano|micro|milli)[\s_]*(s(?:ec(?:ond)?s?)?)(?![a-z])",
         lambda m: (m[1] + m[2]).lower(),

@@ -57,10 +57,7 @@ class Choice:
 def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     """Return the groups of the columns of `table`; `joints` names the robot's, from the base to the tip."""
     texts = texts_of(table, joints)
-    patterns = [re.compile(rf"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])", re.IGNORECASE) for name in joints if len(name) > 2]
-    # All of the robot's names, or none: columns joint_0, joint_1, … do not name the robot's joint_1, joint_2, …
-    if len(patterns) < len(joints) or not all(any(p.search(column) for column in table.columns) for p in patterns):
-        patterns = []
+    patterns = _patterns(table, joints)
     found: dict[tuple[object, ...], list[tuple[ColumnName, int | None]]] = {}
     for column in table.columns:
         rest, place = _without_joint(column, patterns)
@@ -74,6 +71,21 @@ def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
         for part in _split(members):
             groups.append(_ordered(part, joints, texts))
     return groups
+
+
+def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
+    """Return a pattern for each joint's name, with or without words such as "joint"; none where a joint is not found.
+
+    All of the robot's names, or none: columns joint_0, joint_1, … do not name the robot's joint_1, joint_2, …
+    """
+    for generic in (frozenset[str](), _GENERIC):
+        names = [[w for w in re.findall(r"\d+|[A-Z]?[a-z]+|[A-Z]+", name) if w.lower() not in generic] for name in joints]
+        if any(sum(map(len, words)) < 3 or not any(map(str.isalpha, words)) for words in names):
+            continue
+        found = [re.compile(rf"(?<![A-Za-z0-9]){'[^A-Za-z0-9]?'.join(words)}(?![A-Za-z0-9])", re.IGNORECASE) for words in names]
+        if found and all(any(pattern.search(column) for column in table.columns) for pattern in found):
+            return found
+    return []
 
 
 def _without_joint(column: str, names: Sequence[re.Pattern[str]]) -> tuple[str, int | None]:
@@ -197,7 +209,7 @@ def file_quantity(path: Path) -> str:
 
 
 def companion_of(path: Path, table: RawTable) -> RawTable | None:
-    """Return a file beside it with the same columns and as many rows: positions here, torques there."""
+    """Return a file in the same folder with the same columns and as many rows: positions here, torques there."""
     for other in sorted(path.parent.iterdir())[:200]:
         if other == path or other.suffix.lower() != path.suffix.lower() or not other.is_file() or other.stat().st_size > 1 << 30:
             continue
@@ -206,7 +218,7 @@ def companion_of(path: Path, table: RawTable) -> RawTable | None:
         try:
             candidate = read_table(other)
         except InputRejected:
-            continue  # other files of the folder are none of this recording
+            continue  # another file of the folder
         if list(candidate.columns) == list(table.columns) and candidate.rows.size == table.rows.size:
             return candidate
     return None

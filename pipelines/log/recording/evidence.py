@@ -221,7 +221,7 @@ def velocity_unit(slope: Slope, position: str) -> str:
 def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[float] = ()) -> Guess:
     """The unit of torques, "" where it stays open: by name, by the robot's limits of effort, by size.
 
-    `limits` holds the joints' limits of effort [N m], infinite where there is none.
+    `limits` holds the joints' limits of effort [N m], infinite where it has no limit.
     """
     peaks = np.abs(tau).max(axis=0)
     peak = float(peaks.max())

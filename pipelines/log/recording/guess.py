@@ -81,7 +81,7 @@ class Draft:
 
 
 def guess_recipe(path: Path, robot: str | None = None) -> Draft:
-    """Return a commented recipe for the recording in `path`; companions and a robot beside it are used.
+    """Return a commented recipe for the recording in `path`; companion files and the robot in its folder are used.
 
     Args:
         robot: description to use instead of the one beside the recording.
@@ -163,7 +163,8 @@ class _Drafting:
     def _robot(self) -> list[str]:
         arm = self.reading.arm
         if len(arm.files) == 1:
-            lines = ["[robot]", f"use = {_quoted(arm.files[0])}   # check: likely, the robot beside the recording"]
+            why = "as --robot says" if arm.named else "check: likely, the robot beside the recording"
+            lines = ["[robot]", f"use = {_quoted(arm.files[0])}   # {why}"]
             if arm.problem:
                 self.evidence.append(f"robot: {clean(arm.problem, 300)}")
                 lines.append(f"# {clean(arm.problem, 300)}")

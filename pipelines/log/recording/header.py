@@ -122,7 +122,7 @@ def _names_above(
     rows: Sequence[Sequence[str]],
     source: str,
 ) -> tuple[tuple[str, ...] | None, tuple[str, ...], set[int]]:
-    """Return names, units (empty where there are none) and the numbers of the lines they are in."""
+    """Return names, units (empty where no line has them) and the numbers of the lines they are in."""
     width = dialect.width
     units, unit_line = ("",) * width, 0
     best: tuple[tuple[int, ...], tuple[str, ...], int] | None = None

@@ -172,7 +172,7 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, tuple[str, .
 
 def _converted(part: Recording, name: str, raw: Array, recipe: Recipe, units: tuple[str, ...], robot: RobotDescription,
                drive: Drive | None, steps: list[str], altered: list[str], checks: list[Check]) -> dict[str, Signal]:
-    """One signal in SI on the joint side; and the current, where the torque was recorded as one."""
+    """One signal in SI on the joint side; and the current, where the torque was recorded as such."""
     n = robot.n_joints
     found: dict[str, Signal] = {}
     spec = recipe.signals[name]

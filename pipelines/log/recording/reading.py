@@ -1,6 +1,6 @@
 """Choose the columns of a recording that are its clock, positions, velocities and torques.
 
-Names decide first (`column_roles`); columns without a telling name are told apart by evidence: a
+Names decide first (`column_roles`); columns without a clear name are distinguished by evidence: a
 velocity is the slope of its position. Where neither decides, nothing is chosen.
 """
 
@@ -57,6 +57,7 @@ class Arm:
     files: tuple[str, ...] = ()  # several: which one is open
     robot: RobotDescription | None = None
     problem: str = ""  # why it could not be read
+    named: bool = False  # by the user
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,7 +66,7 @@ class Arm:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What the columns of a recording are, as far as names and evidence say."""
+    """The columns of a recording by signal, as far as names and evidence decide."""
 
     path: Path
     table: RawTable
@@ -89,7 +90,7 @@ class Reading:
 def arm_beside(folder: Path, named: str | None = None) -> Arm:
     """Return the robot in the folder: its only URDF, or the only TOML file that describes one."""
     if named is not None:
-        return Arm((named,), load_robot(named))
+        return Arm((named,), load_robot(named), named=True)
     files = sorted(folder.glob("*.urdf"))[:9]
     descriptions = []
     for path in [] if files else sorted(folder.glob("*.toml"))[:9]:
@@ -195,7 +196,7 @@ def _unnamed_positions(
 ) -> Choice:
     """Take columns that are called joints, and nothing else, for their positions.
 
-    Torques, currents or velocities must be named beside them, and a commanded position must be followed.
+    Torques, currents or velocities must be named as well, and a commanded position must be followed.
     """
     beside = [g for g in groups if g.quantity in ("torque", "current", "velocity")]
     named = [
@@ -229,7 +230,7 @@ def _blocks(
 ) -> tuple[Choice, Choice, Choice] | None:
     """Return positions, velocities and torques among columns without names: dq is the slope of q.
 
-    None where no column lacks a name. The unit of a torque found so is open: nobody called it one.
+    None where no column lacks a name. The unit of a torque found so is open: no name says it.
     """
     unnamed = {column for group in groups if not group.quantity for column in group.columns}
     columns = [c for c in table.columns if c in unnamed]
@@ -243,7 +244,7 @@ def _blocks(
         if len(pairs) != 1:
             open_blocks = blocks if pairs or arm.robot else open_blocks
             if pairs:
-                break  # two positions beside one velocity: measured and reference cannot be told apart
+                break  # two positions beside one velocity: measured and reference look alike
             continue
         q, dq = (
             _by_texts(_block(blocks[k], kind), table, arm)
