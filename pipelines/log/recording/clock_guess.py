@@ -76,7 +76,7 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
 
 def _single(table: RawTable, column: str) -> Clock:
     unit = unit_of_group([column], table)[0] or ""
-    return Clock((column,), (unit if unit in SECONDS else "",), table.columns[column])
+    return Clock((column,), (unit,), table.columns[column])
 
 
 def _rises(values: Array) -> bool:
@@ -148,6 +148,8 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
     if clock.units[0] == "sample":
         return "sample", Guess("sample", "likely", "named a counter: the rate is not in the file")
     named = clock.units[0]
+    if named and named not in SECONDS:
+        return "", Guess("", "unsure", f"its name or header says '{named}': s, ms, us or ns?")
     if named and 0.1 * _RATES[0] <= 1.0 / (median * SECONDS[named]) <= 10.0 * _RATES[1]:
         return named, Guess(
             named,

@@ -145,6 +145,11 @@ _SUFFIX_UNITS = {
     "degps": "deg/s",
     "dps": "deg/s",
     "mm": "mm",
+    "pct": "%",
+    "percent": "%",
+    "permille": "‰",
+    "promille": "‰",
+    "lsb": "LSB",
 }
 
 
@@ -339,6 +344,7 @@ def _unit_in_name(column: str, quantity: str) -> tuple[str, frozenset[str]]:
         unit = _SUFFIX_UNITS.get(word, "")
         if not unit or (len(pieces) == 1 and quantity != "time") or piece == "a":
             continue
-        if _quantity_of(unit) == quantity or (not quantity and len(word) > 1):
+        relative = unit in ("%", "‰", "LSB")  # of a rated value that only the drive knows
+        if relative or _quantity_of(unit) == quantity or (not quantity and len(word) > 1):
             return unit, frozenset({word, *words_of(piece)})
     return "", frozenset()

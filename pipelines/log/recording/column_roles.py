@@ -17,7 +17,7 @@ from pipelines.errors import InputRejected
 from pipelines.log.recording.column_names import ColumnName, read_name, words_of
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
-from pipelines.log.units import UNITS, canonical_unit
+from pipelines.log.units import canonical_unit
 
 __all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of", "texts_of", "unit_of_group"]
 
@@ -194,12 +194,13 @@ def choose(groups: Sequence[Group], quantities: Sequence[str], n: int | None, co
 
 
 def unit_of_group(group: Sequence[str], table: RawTable) -> tuple[str | None, ...]:
-    """Return the unit of each column as the header or its name says it; None where neither does."""
-    found: list[str | None] = []
-    for column in group:
-        header = canonical_unit(table.units.get(column, ""))
-        found.append(header if header in UNITS or header == "counts" else read_name(column).unit or None)
-    return tuple(found)
+    """Return the unit of each column as the header or its name says it; None where neither does.
+
+    It may be one that `UNITS` does not have, such as "%".
+    """
+    headers = [canonical_unit(table.units.get(column, "")).strip() for column in group]
+    return tuple(header if header not in ("", "-", "1") else read_name(column).unit or None
+                 for header, column in zip(headers, group, strict=True))
 
 
 def file_quantity(path: Path) -> str:

@@ -14,7 +14,7 @@ from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 
 __all__ = ["ANGULAR_RATIOS", "Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
-           "slide_unit", "slope_of", "torque_unit", "velocity_unit"]
+           "slide_unit", "slope_of", "torque_unit", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
@@ -106,12 +106,21 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
     if named in ("rad", "mrad", "deg", "rev", "turn"):
         return Guess(named, "sure" if _possible(span, named) else "unsure",
                      f"named so; the largest range is {span:.4g} {named}"), further
+    if named is not None:
+        return unknown_unit(named), further
     if slope is not None and (found := _by_velocity(slope)) is not None:
         return found, further
     if turns := quarter_turns(q):
         return Guess("rad", "likely", f"starts at {', '.join(f'{x}' for x in turns.values())} times pi/2: "
                      "motor side, and these are likely its gear ratios for [drive]"), further
+    if _whole(q) and span > 10.0:
+        return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
     return _by_limits(q, t, joints) or _by_size(q, t, span), further
+
+
+def unknown_unit(named: str) -> Guess:
+    """An open unit: what the file says is no unit of the signal."""
+    return Guess("", "unsure", f"its name or header says '{named}', which is no unit that import knows here")
 
 
 def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | None:
@@ -152,6 +161,8 @@ def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
     """The unit of the position of one sliding joint, "" where it stays open."""
     if named in ("m", "mm", "um"):
         return Guess(named, "sure", "named so")
+    if named is not None:
+        return unknown_unit(named)
     low, high = joint.position
     if math.isfinite(low) and math.isfinite(high):
         slack = 0.05 * (high - low)
@@ -227,6 +238,10 @@ def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[f
     peak = float(peaks.max())
     if named is not None and (named in ("A", "mA") or named.endswith("N m") or named.endswith("N")):
         return Guess(named, "sure", f"named so; up to {peak:.4g} {named}")
+    if named is not None:
+        return unknown_unit(named)
+    if current and (_whole(tau) or 60.0 < peak <= 200.0):
+        return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or the drive's own unit?")
     if current:
         return Guess("mA" if peak > 200.0 else "A", "likely", f"named a current; up to {peak:.4g}")
     if _whole(tau) and peak > 20.0:

@@ -48,6 +48,7 @@ from pipelines.log.recording.reading import (
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Joint
+from pipelines.log.units import UNITS
 
 __all__ = ["Draft", "guess_recipe"]
 
@@ -275,7 +276,8 @@ class _Drafting:
             joints = [self.joints[j] for j in turning] if self.joints else ()
             guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints)
             for j in turning:
-                units[j] = named[j] or guess.value
+                said = named[j] or ""
+                units[j] = said if said in UNITS or said == "counts" else guess.value
             why.append(guess)
             if guess.value == "rad" and "times pi/2" in guess.why:
                 self.ratios = quarter_turns(self.q)
@@ -338,7 +340,7 @@ class _Drafting:
         elif choice.group.words == BY_FILE and guess.confidence != "sure":
             guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
         self.current = guess.value in ("A", "mA")
-        units = [unit or guess.value for unit in named]
+        units = [unit if unit is not None and unit in UNITS else guess.value for unit in named]
         if guess.value == "N m" and self.joints:
             units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]
         file = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""

@@ -12,6 +12,7 @@ import pytest
 
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.log.files import find_logs, open_log
+from pipelines.log.recording.guess import guess_recipe
 from pipelines.log.recording.recipe_reader import parse_recipe
 from pipelines.log.robot_files import load_robot
 from tests.log.recording.good import RECIPE, good, run, text, write
@@ -107,3 +108,14 @@ def test_a_folder_of_recordings_points_to_the_import(tmp_path: Path) -> None:
     write(tmp_path, text(good()))
     with pytest.raises(NothingMatched, match=r"RRID-C06.*recordings such as run.csv.*rrrid import --guess .*run.csv"):
         find_logs((tmp_path,))
+
+
+@pytest.mark.parametrize(("names", "blank"), [
+    ({"tau": "torque_{} [%]"}, "signals.tau.unit"), ({"tau": "torque_percent_{}"}, "signals.tau.unit"),
+    ({"q": "position {} [inch]"}, "signals.q.unit"), ({"t": "time [h]"}, "time.unit"),
+])
+def test_a_unit_that_is_not_known_is_asked_for(tmp_path: Path, names: dict[str, str], blank: str) -> None:
+    """A header that says "%" is no torque in N m."""
+    columns = {names.get(name.split("_")[0], name).format(name[-1]): values for name, values in good().items()}
+    draft = guess_recipe(write(tmp_path, text(columns)))
+    assert draft.blanks == ("robot.use", blank)
