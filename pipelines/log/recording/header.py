@@ -239,4 +239,10 @@ def names_and_units(
                 where=f"{source}, line {line}",
                 remedy="rename one of them in the file",
             )
-    return names, {name: unit for name, (_, unit) in zip(names, pairs, strict=True) if unit}
+    # Where brackets alone distinguish columns, only a known unit in them is one: not a joint's name.
+    units = {
+        name: unit
+        for name, (short, unit) in zip(names, pairs, strict=True)
+        if unit and (times[short] == 1 or canonical_unit(unit) in UNITS)
+    }
+    return names, units

@@ -134,7 +134,8 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
         if not g.quantity and n in (None, len(g.columns)) and g.columns != _columns_of(q)
     )
     tau = choose(groups, ("torque", "current"), n, commanded=True)
-    if unnamed and q.group and (tau.group is None or tau.group.origin == "commanded"):
+    commanded = tau.group is not None and tau.group.origin == "commanded"
+    if unnamed and (commanded or (q.group and not tau.group)):
         # Columns that no word explains may be the measured torque.
         tau = Choice(None, (*((tau.group,) if tau.group else ()), *tau.others, *unnamed))
     dq = choose(groups, ("velocity",), n, commanded=False)
